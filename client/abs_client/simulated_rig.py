@@ -2,6 +2,7 @@
 
 import importlib.util
 import shlex
+import shutil
 import signal
 import socket
 import subprocess
@@ -144,9 +145,13 @@ def run_rig(settings: SimulatedRig = SimulatedRig()) -> Iterator[RunningRig]:
 def _service(command: str, folder: str) -> list[str]:
     if command:
         return [part.replace("{folder}", folder) for part in shlex.split(command)]
-    if importlib.util.find_spec("abs_service") is None:
-        raise RigFailedError("abs-service is not installed beside abs-service-client, and no other command is given")
-    return [sys.executable, "-m", "abs_service"]
+    if importlib.util.find_spec("abs_service") is not None:
+        return [sys.executable, "-m", "abs_service"]
+    if elsewhere := shutil.which("abs-service"):
+        return [elsewhere]
+    raise RigFailedError(
+        "abs-service is installed neither beside abs-service-client nor on PATH, and no command is given"
+    )
 
 
 def _wait_until_it_tracks(rig: RunningRig, log: Path) -> None:

@@ -9,6 +9,7 @@ from types import MappingProxyType
 import numpy as np
 from absmsg.v1.deformation_state_pb2 import DeformationState
 from absmsg.v1.deformed_mesh_pb2 import DeformedMesh, MeshTopology
+from google.protobuf.message import Message
 from numpy.typing import NDArray
 
 _TRIANGLE = [0, 1, 2, 1, 3, 4, 2, 4, 5]
@@ -130,8 +131,12 @@ class State:
     @property
     def shares(self) -> Mapping[str, float]:
         """All shares of the estimate, 0 to 1, by the names of the message: `inlier`, `folded`, …."""
-        names = [field.name for field in DeformationState.DESCRIPTOR.fields if field.name.endswith(_SHARE)]
-        return MappingProxyType({name.removesuffix(_SHARE): getattr(self.message, name) for name in names})
+        return _shares(self.message)
+
+    @property
+    def sensor_shares(self) -> Mapping[str, Mapping[str, float]]:
+        """The shares of each sensor, likewise; empty if the service tells none."""
+        return MappingProxyType({one.sensor: _shares(one) for one in self.message.sensors})
 
     @property
     def sensors(self) -> Mapping[str, DeformationState.Sensor]:
@@ -143,6 +148,11 @@ def received(message: DeformationState, mesh: DeformedMesh, topology: MeshTopolo
     """The state that a tracker published."""
     status = _STATUS.get(message.status, Status.LOST)
     return State(message, mesh, topology, status, tuple(message.reasons), age_s)
+
+
+def _shares(message: Message) -> Mapping[str, float]:
+    names = [field.name for field in message.DESCRIPTOR.fields if field.name.endswith(_SHARE)]
+    return MappingProxyType({name.removesuffix(_SHARE): getattr(message, name) for name in names})
 
 
 def _fixed(array: NDArray) -> NDArray:

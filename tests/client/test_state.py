@@ -38,7 +38,11 @@ def test_what_is_not_known_is_nan():
 
 def test_shares_and_sensors_have_every_field_of_the_message():
     given = received(state(1, inlier_share=0.9, sensors=[SENSOR]), mesh(1), topology(), 0)
-    named = {field.name for field in DeformationState.DESCRIPTOR.fields if field.name.endswith("_share")}
-    assert {f"{name}_share" for name in given.shares} == named
+    assert {f"{name}_share" for name in given.shares} == shares_in(DeformationState)
+    assert {f"{name}_share" for name in given.sensor_shares["tof"]} == shares_in(DeformationState.Sensor)
     assert given.shares["inlier"] == 0.9
     assert (given.sensors["tof"].visible, given.sensors["tof"].occluded) == (3, 1)
+
+
+def shares_in(message):
+    return {field.name for field in message.DESCRIPTOR.fields if field.name.endswith("_share")}
