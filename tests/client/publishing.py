@@ -32,6 +32,9 @@ class Tracker:
         self.version, self.size = self.version + 1, self.size + 1
         self._topology.put(topology(self.version, self.boot, self.vertices).SerializeToString())
 
+    def put_malformed(self):
+        self._state.put(b"\xff\xff\xff")
+
     def estimate(self, age_s=0.0):
         self.seq += 1
         stamps = {"t_host_ns": time.monotonic_ns() - round(age_s * 1e9), "host_clock": host_clock()}

@@ -121,7 +121,7 @@ def test_the_next_one_is_waited_for_no_longer_than_asked(endpoint, bus):
 def test_malformed_messages_do_not_end_the_stream(endpoint, bus, tracker):
     with subscribe(endpoint) as states:
         for _ in range(5):
-            tracker._state.put(b"\xff\xff\xff")
+            tracker.put_malformed()
             time.sleep(PERIOD_S)
         with estimating(tracker):
             assert first(states, Status.TRACKING).usable
