@@ -37,7 +37,7 @@ class Assembly:
         clock: this host's monotonic clock [ns].
 
     Attributes:
-        lacks_topology: whether the newest vertices wait for their topology.
+        lacks_topology: True while the newest vertices wait for their topology.
     """
 
     def __init__(self, clock: Callable[[], int]) -> None:

@@ -19,7 +19,7 @@ class NothingReceivedError(ClientError, TimeoutError):
 
 
 class Source(Protocol[T_co]):
-    """What a stream takes its items from."""
+    """Origin of the items of a stream."""
 
     @property
     def skipped(self) -> int:
