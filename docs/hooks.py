@@ -10,8 +10,10 @@ import re
 from collections.abc import Iterator, Mapping
 from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
+import abs_client
 from latex2mathml.converter import convert
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
@@ -43,6 +45,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         ("reference/commands.md", _commands()),
         ("reference/messages.md", _messages()),
         ("reference/classes.md", _classes()),
+        ("reference/client-names.md", _client_names()),
         ("decisions/index.md", _decisions()),
     ):
         files.append(File.generated(config, path, content=text))
@@ -139,14 +142,21 @@ def _messages() -> str:
 def _classes() -> str:
     """One mkdocstrings directive for each public name."""
     parts = ["# Every public name", "What [Python](api.md) describes in examples, from the docstrings."]
-    for package in (abs_service, abs_service.noise):
-        for name in package.__all__:
-            of = getattr(package, name)
-            if not inspect.ismodule(of):
-                heading = name if package is abs_service else f"noise.{name}"
-                options = f"    options:\n      heading: {heading}\n      toc_label: {heading}"
-                parts.append(f"::: {of.__module__}.{of.__qualname__}\n{options}")
+    parts += [*_public(abs_service), *_public(abs_service.noise, "noise.")]
     return "\n\n".join(parts)
+
+
+def _client_names() -> str:
+    parts = ["# Every public name of the client", "What [its page](../how-to/client.md) describes in examples."]
+    return "\n\n".join([*parts, *_public(abs_client)])
+
+
+def _public(package: ModuleType, prefix: str = "") -> Iterator[str]:
+    for name in package.__all__:
+        of = getattr(package, name)
+        if not inspect.ismodule(of):
+            options = f"    options:\n      heading: {prefix}{name}\n      toc_label: {prefix}{name}"
+            yield f"::: {of.__module__}.{of.__qualname__}\n{options}"
 
 
 def _decisions() -> str:

@@ -89,7 +89,11 @@ def test_the_newest_entry_of_the_changelog_is_this_version() -> None:
 
 
 def test_files_and_functions_are_short_enough_to_read_at_once() -> None:
-    texts = {path: path.read_text(encoding="utf-8") for package in PACKAGES for path in (ROOT / package).rglob("*.py")}
+    texts = {
+        path: path.read_text(encoding="utf-8")
+        for package in (*PACKAGES, "client")
+        for path in (ROOT / package).rglob("*.py")
+    }
     long = [f"{path} has {n} lines, the limit is 250" for path in texts if (n := len(texts[path].splitlines())) > 250]
     for path, text in texts.items():
         for function in (node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.FunctionDef)):

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-FOLDERS = ("abs_service", "calib", "drivers", "evaluation", "examples", "tests")
+FOLDERS = ("abs_service", "calib", "client", "drivers", "evaluation", "examples", "tests")
 QUESTION = re.compile(r'^ *"""(What|How|Where|Whether|Which|Why|When|Who)(ever|se)?\b.*', re.MULTILINE)
 
 

@@ -1,0 +1,236 @@
+"""The connection to a rig: a zenoh session of a client, and the threads that receive on it."""
+
+import json
+import re
+import threading
+import weakref
+from collections import Counter
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import partial
+from os import PathLike
+from types import TracebackType
+from typing import Any, Self
+
+import zenoh
+from google.protobuf.message import DecodeError
+
+from abs_client.wake import Wake
+
+#: Where a rig listens unless its file says otherwise.
+DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
+#: By when a rig must answer that is connected to, and a query [s].
+CONNECT_S, QUERY_S = 3.0, 2.0
+#: Messages of one topic that may wait for their thread; the oldest goes first.
+WAITING = 4
+#: By when receiving threads have ended after their session has [s].
+END_S = 2.0
+
+_ENDPOINT = re.compile(r"(tcp|tls|quic|udp|ws)/.+:\d{1,5}([?#]\S*)?")
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
+
+
+class ClientError(Exception):
+    """Anything that this package complains about."""
+
+
+class UnreachableError(ClientError, ConnectionError):
+    """Nothing answers at an endpoint, or it refuses this program."""
+
+
+class UnknownNameError(ClientError, ValueError):
+    """A name or an endpoint that cannot be one."""
+
+
+@dataclass(frozen=True)
+class Tls:
+    """The files by which this program proves who it is, as `abs-service keys` makes them.
+
+    Attributes:
+        authority: certificate of the lab's authority.
+        certificate, key: of this program, `viewer` or `operator`.
+    """
+
+    authority: str | PathLike[str]
+    certificate: str | PathLike[str]
+    key: str | PathLike[str]
+
+
+@dataclass(frozen=True)
+class Received:
+    """A message as it arrived.
+
+    Attributes:
+        key: zenoh's key, `abs/<rig>/<topic>`.
+        payload, attachment: the bytes; b"" if there is no attachment.
+    """
+
+    key: str
+    payload: bytes
+    attachment: bytes = b""
+
+
+class Link:
+    """A client's session with a rig. Ends with `close`, with a `with` block, or at the latest when the program does.
+
+    Args:
+        endpoint: `bus.endpoint` of the rig.
+        rig: its name.
+        tls: for a rig with `[bus.tls]`.
+
+    Attributes:
+        rig: its name.
+        malformed: messages that could not be read, by key; they are left out.
+
+    Raises:
+        UnknownNameError: `endpoint` or `rig` cannot be one.
+        UnreachableError: nothing answers there.
+    """
+
+    def __init__(self, endpoint: str, rig: str, tls: Tls | None = None) -> None:
+        if not _ENDPOINT.fullmatch(endpoint):
+            raise UnknownNameError(f"{endpoint!r} is no endpoint: write PROTOCOL/HOST:PORT, such as {DEFAULT_ENDPOINT}")
+        self.rig = checked(rig)
+        self.malformed: Counter[str] = Counter()
+        self._threads: list[threading.Thread] = []
+        self._waiting: weakref.WeakSet[Wake] = weakref.WeakSet()
+        try:
+            self._session = zenoh.open(zenoh.Config.from_json5(json.dumps(_settings(endpoint, tls))))
+        except zenoh.ZError as error:
+            raise UnreachableError(f"nothing answers at {endpoint} within {CONNECT_S:g} s: is it running?") from error
+        self._end = weakref.finalize(self, _end, self._session, self._threads)
+
+    @property
+    def closed(self) -> bool:
+        """True after `close`."""
+        return not self._end.alive
+
+    def wake_at_end(self, wake: Wake) -> None:
+        """Signals `wake` when the link is closed, so that nobody waits for it any more."""
+        self._waiting.add(wake)
+
+    def subscribe(self, topic: str, on_message: Callable[[Received], None]) -> Callable[[], None]:
+        """Calls `on_message`, which must not hold this link, from a thread of its own for the messages of a topic.
+
+        Returns:
+            What ends it; to be called once.
+        """
+        self._check_open()
+        channel = zenoh.handlers.RingChannel(WAITING)
+        subscriber = self._session.declare_subscriber(self.key(topic), channel)
+        self._start(_receive, subscriber, on_message)
+        return partial(_undeclare, subscriber)
+
+    def ask(self, topic: str, on_message: Callable[[Received], None]) -> None:
+        """Asks for a topic and returns at once; `on_message` is called from another thread for each answer."""
+        key = self.key(topic)
+        self._start(_receive_answers, lambda: self._session.get(key, timeout=QUERY_S), on_message)
+
+    def query(self, topic: str, payload: bytes | None = None, message: str = "") -> list[Received]:
+        """The answers to a query; none if nobody answers within `QUERY_S`.
+
+        Args:
+            topic: what is asked for.
+            payload, message: of a command: the message and its full name.
+        """
+        self._check_open()
+        details: dict[str, Any] = {"payload": payload, "encoding": f"application/protobuf;{message}"} if message else {}
+        answers = self._session.get(self.key(topic), target=zenoh.QueryTarget.ALL, timeout=QUERY_S, **details)
+        return [_received(answer.ok) for answer in answers if answer.ok is not None]
+
+    def tokens(self, topic: str) -> list[str]:
+        """Keys of the liveliness tokens there are."""
+        self._check_open()
+        answers = self._session.liveliness().get(self.key(topic), timeout=QUERY_S)
+        return [str(answer.ok.key_expr) for answer in answers if answer.ok is not None]
+
+    def key(self, topic: str) -> str:
+        """The zenoh key of a topic of the rig."""
+        return f"abs/{self.rig}/{topic}"
+
+    def close(self) -> None:
+        """Ends the session and all that receives on it; may be called again."""
+        self._end()
+        for wake in list(self._waiting):
+            wake.signal()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _check_open(self) -> None:
+        if self.closed:
+            raise UnreachableError("the connection to the rig was closed")
+
+    def _start(self, receive: Callable[..., None], source: Any, on_message: Callable[[Received], None]) -> None:
+        # A daemon, because the interpreter waits for all others before it calls what would end them.
+        take = partial(_take, on_message, self.malformed)
+        thread = threading.Thread(target=receive, args=(source, take), name="abs_client", daemon=True)
+        self._threads[:] = [one for one in self._threads if one.is_alive()]
+        self._threads.append(thread)
+        thread.start()
+
+
+def checked(name: str) -> str:
+    """Returns the name of a rig, tracker, sensor or stream if it can be one.
+
+    Raises:
+        UnknownNameError: it cannot.
+    """
+    if not _NAME.fullmatch(name):
+        raise UnknownNameError(f"{name!r} is no name: 1 to 64 letters, digits, - and _, the first a letter or digit")
+    return name
+
+
+def _settings(endpoint: str, tls: Tls | None) -> dict[str, object]:
+    own = {} if tls is None else {"connect_certificate": str(tls.certificate), "connect_private_key": str(tls.key)}
+    link = {"tls": {"root_ca_certificate": str(tls.authority), "enable_mtls": True, **own}} if tls else {}
+    return {
+        "mode": "client",
+        "connect": {"endpoints": [endpoint], "timeout_ms": round(CONNECT_S * 1000), "exit_on_failure": True},
+        "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}, "delay": 0},
+        "transport": {"link": link, "shared_memory": {"enabled": True}},
+    }
+
+
+def _undeclare(subscriber: Any) -> None:
+    with suppress(zenoh.ZError):  # its session has ended before
+        subscriber.undeclare()
+
+
+def _receive(subscriber: Any, on_message: Callable[[Received], None]) -> None:
+    with suppress(zenoh.ZError):  # the session has ended
+        for sample in subscriber:
+            on_message(_received(sample))
+
+
+def _receive_answers(ask: Callable[[], Any], on_message: Callable[[Received], None]) -> None:
+    with suppress(zenoh.ZError):
+        for answer in ask():
+            if answer.ok is not None:
+                on_message(_received(answer.ok))
+
+
+def _take(on_message: Callable[[Received], None], malformed: Counter[str], one: Received) -> None:
+    try:
+        on_message(one)
+    except DecodeError:
+        malformed[one.key] += 1
+
+
+def _received(sample: zenoh.Sample) -> Received:
+    attachment = sample.attachment
+    return Received(str(sample.key_expr), sample.payload.to_bytes(), attachment.to_bytes() if attachment else b"")
+
+
+def _end(session: zenoh.Session, threads: list[threading.Thread]) -> None:
+    # Threads that return from zenoh into an interpreter that has ended would abort the process.
+    session.close()
+    for thread in threads:
+        if thread is not threading.current_thread():
+            thread.join(END_S)

@@ -1,0 +1,146 @@
+"""A running rig: its estimates, images and calibrations, and commands to it."""
+
+from collections.abc import Mapping
+from types import TracebackType
+from typing import Self
+
+from absmsg.v1.command_pb2 import CommandAnswer, Record, Reinitialize
+from absmsg.v1.common_pb2 import Header
+from absmsg.v1.sensor_model_pb2 import SensorModel
+
+from abs_client import images, states
+from abs_client.camera import Camera, camera
+from abs_client.images import Image
+from abs_client.link import DEFAULT_ENDPOINT, ClientError, Link, Tls, checked
+from abs_client.state import State
+from abs_client.stream import NothingReceivedError, Stream
+
+#: Estimates that are older are left out [s].
+LARGEST_AGE_S = 0.5
+
+
+class RefusedError(ClientError):
+    """A command was refused, with the reason."""
+
+
+def subscribe(
+    endpoint: str = DEFAULT_ENDPOINT,
+    rig: str = "demo",
+    tracker: str = "sheet",
+    largest_age_s: float = LARGEST_AGE_S,
+    tls: Tls | None = None,
+) -> Stream[State]:
+    """The estimates of a tracker for `for` or `async for`: always the newest, and what belongs together.
+
+    A reader that is slow gets fewer, not older ones. When no estimate younger than `largest_age_s` came for so long, it
+    gets a STALE state, again after every `largest_age_s`, until there are new ones. Connecting may take some seconds.
+
+    Args:
+        endpoint: `bus.endpoint` of the rig.
+        rig, tracker: their names.
+        largest_age_s: age beyond which an estimate is not given [s].
+        tls: for a rig with `[bus.tls]`.
+
+    Raises:
+        UnknownNameError: `endpoint`, `rig` or `tracker` cannot be one.
+        UnreachableError: nothing answers at `endpoint`.
+    """
+    checked(tracker)
+    link = Link(endpoint, rig, tls)
+    return states.states(link, tracker, largest_age_s, link.close)
+
+
+class Rig:
+    """A connection to a rig, for several trackers, images, calibrations and commands.
+
+    Args:
+        endpoint, rig, tls: see `subscribe`, errors too.
+    """
+
+    def __init__(self, endpoint: str = DEFAULT_ENDPOINT, rig: str = "demo", tls: Tls | None = None) -> None:
+        self._link = Link(endpoint, rig, tls)
+
+    @property
+    def malformed(self) -> Mapping[str, int]:
+        """Messages so far that could not be read, by key; they are left out."""
+        return dict(self._link.malformed)
+
+    def states(self, tracker: str, largest_age_s: float = LARGEST_AGE_S) -> Stream[State]:
+        """The estimates of a tracker, see `subscribe`."""
+        return states.states(self._link, checked(tracker), largest_age_s)
+
+    def images(self, sensor: str, stream: str) -> Stream[Image]:
+        """The images of a sensor's stream, for `for` or `async for`: always the newest."""
+        return images.images(self._link, checked(sensor), checked(stream))
+
+    def image(self, sensor: str, stream: str, timeout_s: float = 2.0) -> Image:
+        """The next image of a sensor's stream.
+
+        Raises:
+            NothingReceivedError: there was none within `timeout_s`.
+        """
+        with self.images(sensor, stream) as newest:
+            return newest.next(timeout_s)
+
+    def camera(self, sensor: str) -> Camera:
+        """Calibration of a sensor.
+
+        Raises:
+            NothingReceivedError: nobody tells it.
+        """
+        for answer in self._link.query(f"{checked(sensor)}/model"):
+            return camera(SensorModel.FromString(answer.payload))
+        raise NothingReceivedError(f"nobody tells the calibration of sensor {sensor!r}")
+
+    def processes(self) -> tuple[str, ...]:
+        """The processes of the rig that live: `capture`, `record`, `track/<tracker>`."""
+        prefix = self._link.key("live/")
+        return tuple(sorted(key.removeprefix(prefix) for key in self._link.tokens("live/**")))
+
+    def reinitialize(self, tracker: str, seed: tuple[int, int] | None = None) -> str:
+        """Has a tracker detect its object anew.
+
+        Args:
+            tracker: its name.
+            seed: a pixel (column, row) of the object in the depth image of the tracker's reference sensor; None: what
+                the region of the rig file says.
+
+        Returns:
+            The lines of the rig file that make a seed last; "" without a seed.
+
+        Raises:
+            RefusedError: the tracker refuses, or this program's certificate does not allow it.
+            NothingReceivedError: there is no answer.
+        """
+        command = Reinitialize(header=self._header(), tracker=checked(tracker))
+        if seed is not None:
+            command.seed.column, command.seed.row = seed
+            command.seed.SetInParent()  # a pixel (0, 0) is one, too
+        return self._command(f"{tracker}/reinitialize", command).region
+
+    def record(self, recording: bool) -> None:
+        """Has the rig record, or wait; needs `record.when` in its file. Raises as `reinitialize`."""
+        self._command("record", Record(header=self._header(), recording=recording))
+
+    def close(self) -> None:
+        """Ends the connection and all streams on it; may be called again."""
+        self._link.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _header(self) -> Header:
+        return Header(rig=self._link.rig)
+
+    def _command(self, topic: str, command: Reinitialize | Record) -> CommandAnswer:
+        for one in self._link.query(topic, command.SerializeToString(), command.DESCRIPTOR.full_name):
+            answer = CommandAnswer.FromString(one.payload)
+            if not answer.accepted:
+                raise RefusedError(answer.reason)
+            return answer
+        raise NothingReceivedError(f"nobody answers on {topic}")

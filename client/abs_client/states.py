@@ -1,0 +1,134 @@
+"""The newest estimate of a tracker, or that there is none."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from time import monotonic_ns
+
+from absmsg.v1.common_pb2 import Header
+from absmsg.v1.deformation_state_pb2 import DeformationState
+from absmsg.v1.deformed_mesh_pb2 import DeformedMesh, MeshTopology
+
+from abs_client.ages import Ages
+from abs_client.assembly import Assembly
+from abs_client.link import Link, Received
+from abs_client.state import State, Status, received
+from abs_client.stream import Stream
+from abs_client.wake import Wake
+
+#: Pause between two questions for a topology [ns].
+PAUSE_NS = 200_000_000
+
+_NOTHING = State(DeformationState(), DeformedMesh(), MeshTopology(), Status.STALE, (), float("nan"))
+
+
+def states(link: Link, tracker: str, largest_age_s: float, close: Callable[[], None] | None = None) -> Stream[State]:
+    """The estimates of a tracker, the newest first and only.
+
+    Args:
+        link: to the rig.
+        tracker: its name.
+        largest_age_s: older estimates are left out; when there are no others for so long, a STALE one is given.
+        close: what ends the link, if the stream is all that uses it.
+    """
+    wake = Wake()
+    source = StateSource(link, tracker, largest_age_s, wake, monotonic_ns)
+    return Stream(source, wake, link, close or source.close)
+
+
+class StateSource:
+    """Joins what arrives of a tracker and judges its age; see `stream.Source`.
+
+    Args:
+        link, tracker, largest_age_s: see `states`.
+        wake: signalled when there may be a state.
+        clock: this host's monotonic clock [ns].
+    """
+
+    def __init__(self, link: Link, tracker: str, largest_age_s: float, wake: Wake, clock: Callable[[], int]) -> None:
+        self._link = link
+        self._tracker = tracker
+        self._wake = wake
+        self._clock = clock
+        self._largest_age_s = largest_age_s
+        self._assembly = Assembly(clock)
+        self._ages = Ages(clock, self._ask_clock)
+        self._last, self._arrived_ns = _NOTHING, 0
+        self._stale_ns = clock() + round(largest_age_s * 1e9)
+        self._skipped = 0
+        # What receives holds neither the source nor the link, so that both end with their stream.
+        self._subscriptions = _subscribe(link, tracker, self._assembly, wake)
+        self._asked_ns = clock()
+        link.ask(f"{tracker}/topology", _topology_into(self._assembly, wake))  # there is one already, most often
+
+    @property
+    def skipped(self) -> int:
+        """See `stream.Source`."""
+        return self._skipped
+
+    def take(self) -> State | None:
+        """The newest estimate, or a STALE one after every `largest_age_s` without."""
+        self._ask_for_topology()
+        if (whole := self._assembly.take()) is not None:
+            age_s = self._ages.age_s(whole.state, whole.arrived_ns)
+            newest, self._arrived_ns = received(whole.state, whole.mesh, whole.topology, age_s), whole.arrived_ns
+            self._count_between(self._last.message.header, newest.message.header)
+            self._last = newest
+            if age_s <= self._largest_age_s:
+                self._stale_ns = self._clock() + round(self._largest_age_s * 1e9)
+                return self._last
+            self._skipped += 1
+        if self._clock() < self._stale_ns:
+            return None
+        self._stale_ns = self._clock() + round(self._largest_age_s * 1e9)
+        return self._stale()
+
+    def due_s(self) -> float:
+        """See `stream.Source`."""
+        return max((self._stale_ns - self._clock()) * 1e-9, 0.0)
+
+    def close(self) -> None:
+        """Receives nothing any more."""
+        for end in self._subscriptions:
+            end()
+
+    def _count_between(self, before: Header, newest: Header) -> None:
+        if before.boot_id == newest.boot_id:
+            self._skipped += newest.seq - before.seq - 1
+
+    def _stale(self) -> State:
+        if self._last is _NOTHING:
+            return replace(_NOTHING, reasons=(f"nothing was received of tracker {self._tracker} yet",))
+        age_s = self._ages.age_s(self._last.message, self._arrived_ns)
+        return replace(
+            self._last, status=Status.STALE, reasons=(f"the newest estimate is {age_s:.1f} s old",), age_s=age_s
+        )
+
+    def _ask_for_topology(self) -> None:
+        if self._assembly.lacks_topology and self._clock() - self._asked_ns > PAUSE_NS:
+            self._asked_ns = self._clock()
+            self._link.ask(f"{self._tracker}/topology", _topology_into(self._assembly, self._wake))
+
+    def _ask_clock(self, host_clock: str) -> None:
+        ages = self._ages
+        self._link.ask(f"clock/{host_clock}", lambda one: ages.add(Header.FromString(one.payload)))
+
+
+def _subscribe(link: Link, tracker: str, assembly: Assembly, wake: Wake) -> list[Callable[[], None]]:
+    def on_state(one: Received) -> None:
+        assembly.add_state(DeformationState.FromString(one.payload))
+        wake.signal()
+
+    def on_mesh(one: Received) -> None:
+        assembly.add_mesh(DeformedMesh.FromString(one.payload))
+        wake.signal()
+
+    topics = {"topology": _topology_into(assembly, wake), "state": on_state, "mesh": on_mesh}
+    return [link.subscribe(f"{tracker}/{topic}", on_message) for topic, on_message in topics.items()]
+
+
+def _topology_into(assembly: Assembly, wake: Wake) -> Callable[[Received], None]:
+    def on_topology(one: Received) -> None:
+        assembly.add_topology(MeshTopology.FromString(one.payload))
+        wake.signal()
+
+    return on_topology

@@ -1,0 +1,1 @@
+"""An application: a gripper that follows a sheet of paper."""

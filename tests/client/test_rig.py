@@ -1,0 +1,156 @@
+"""Images, calibrations and commands of a rig, by what its own processes publish and answer."""
+
+import threading
+
+import numpy as np
+import pytest
+from abs_client import NothingReceivedError, RefusedError, Rig, Tls, UnreachableError
+from abs_client.images import ImageError, read
+from abs_client.link import Received
+from absmsg.v1.common_pb2 import Header
+from absmsg.v1.sensor_model_pb2 import SensorModel
+from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
+
+from abs_service.bus import keys as topics
+from abs_service.bus.contract import IMAGES
+from abs_service.bus.health import Health
+from abs_service.bus.session import Role
+from abs_service.bus.stamps import HeaderFactory, WallClock
+from abs_service.wire import commands
+from drivers.encoding import codec
+from drivers.simulated.address import parse
+from tests.client.publishing import PERIOD_S
+from tests.conftest import encrypted
+
+POSE = np.array([[1.0, 0, 0, 0.05], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
+MODEL = SensorModel(sensor="tof", width=4, height=3, fx=5, fy=6, cx=1, cy=2, lens=[0.1], T_rs=POSE.ravel())
+NAMES = ("viewer", "operator")
+REGION = '[trackers.sheet.region]\ntype = "seed"\n'
+SIMULATION = parse("simulated://sheet?sensors=tof,color,bayer").build()
+
+
+@pytest.fixture
+def headers():
+    return HeaderFactory("demo", WallClock())
+
+
+@pytest.fixture
+def rig(bus, endpoint):
+    with Rig(endpoint) as rig:
+        yield rig
+
+
+def sample(frame):
+    """A frame as it travels."""
+    info = codec.encode_info(frame, Header(rig="demo"))
+    return Received(f"abs/demo/{frame.sensor}/{frame.stream}/image", codec.encode_image(frame, 0), info)
+
+
+@pytest.mark.parametrize("frame", SIMULATION.frames(40), ids=lambda frame: f"{frame.sensor}/{frame.stream}")
+def test_an_image_of_every_kind_has_the_pixels_of_its_frame(frame):
+    image = read(sample(frame))
+    np.testing.assert_array_equal(image.pixels, frame.data)
+    assert (image.encoding, image.info.kind, image.t_host_ns) == (frame.encoding, frame.kind, frame.t_host_ns)
+    wanted = np.where(frame.data == frame.invalid, np.nan, frame.data * np.float32(frame.scale))
+    np.testing.assert_array_equal(image.values, wanted)
+
+
+@pytest.mark.parametrize("change", [{"encoding": "yuv"}, {"width": 3}, {"data": b"\0"}])
+def test_what_is_no_image_is_told(change):
+    given = {"width": 2, "height": 2, "encoding": "mono8", "data": b"\0\1\2\3"} | change
+    with pytest.raises(ImageError, match=r"abs/demo/tof/depth/image: "):
+        read(Received("abs/demo/tof/depth/image", RawImage(**given).SerializeToString(), b""))
+
+
+def test_the_next_image_of_a_stream(bus, rig):
+    frame = SIMULATION.frames(0)[0]
+    images = bus.publisher(topics.image("tof", "depth"), codec.IMAGE_SCHEMA, IMAGES)
+    enough = threading.Event()
+
+    def put():
+        while not enough.wait(PERIOD_S):
+            images.put(sample(frame).payload, sample(frame).attachment)
+
+    thread = threading.Thread(target=put)
+    thread.start()
+    try:
+        np.testing.assert_array_equal(rig.image("tof", "depth").pixels, frame.data)
+    finally:
+        enough.set()
+        thread.join()
+    with pytest.raises(NothingReceivedError):
+        rig.image("tof", "amplitude", timeout_s=0.2)
+
+
+def test_the_calibration_of_a_sensor(bus, rig):
+    bus.answer_queries(topics.model("tof"), SensorModel.DESCRIPTOR.full_name, MODEL.SerializeToString)
+    camera = rig.camera("tof")
+    np.testing.assert_array_equal(camera.K, [[5, 0, 1], [0, 6, 2], [0, 0, 1]])
+    np.testing.assert_array_equal(camera.T_rs, POSE)
+    assert (camera.width, camera.height, camera.lens, camera.lens_model) == (4, 3, (0.1,), "brown_conrady")
+    with pytest.raises(NothingReceivedError, match="'color'"):
+        rig.camera("color")
+
+
+@pytest.mark.parametrize("seed", [None, (0, 0), (111, 133)])
+def test_a_tracker_detects_its_object_anew(bus, rig, headers, seed):
+    seeds = []
+
+    def act(given):
+        seeds.append(given)
+        return REGION if given else ""
+
+    commands.answer_reinitialize(bus, "sheet", headers, Health(bus, "track/sheet", headers), act)
+    assert rig.reinitialize("sheet", seed) == (REGION if seed else "")
+    assert seeds == [seed]
+
+
+def test_a_refusal_is_raised_with_its_reason(bus, rig, headers):
+    def act(seed):
+        raise commands.RefusedError("the pixel is outside the image")
+
+    commands.answer_reinitialize(bus, "sheet", headers, Health(bus, "track/sheet", headers), act)
+    with pytest.raises(RefusedError, match="the pixel is outside the image"):
+        rig.reinitialize("sheet", (9999, 0))
+
+
+def test_the_recorder_records_and_waits(bus, rig, headers):
+    asked = []
+    commands.answer_record(bus, headers, Health(bus, "record", headers), lambda on: asked.append(on) or "")
+    rig.record(True)
+    rig.record(False)
+    assert asked == [True, False]
+
+
+def test_a_command_that_nobody_answers_is_told(rig):
+    with pytest.raises(NothingReceivedError, match="nobody answers on sheet/reinitialize"):
+        rig.reinitialize("sheet")
+
+
+def test_a_closed_connection_ends_its_streams_and_says_so(rig):
+    states = rig.states("sheet", largest_age_s=60.0)
+    threading.Timer(0.2, rig.close).start()
+    assert list(states) == []
+    with pytest.raises(UnreachableError, match="was closed"):
+        rig.camera("tof")
+
+
+def test_a_viewer_reads_and_only_an_operator_commands(secured, keys, endpoint, headers):
+    bus = secured("rig", Role.ROUTER)
+    bus.answer_queries(topics.model("tof"), SensorModel.DESCRIPTOR.full_name, MODEL.SerializeToString)
+    commands.answer_reinitialize(bus, "sheet", headers, Health(bus, "track/sheet", headers), lambda seed: "")
+    files = {name: [keys / f"{part}" for part in ("authority.pem", f"{name}.pem", f"{name}.key")] for name in NAMES}
+    viewer, operator = (Rig(encrypted(endpoint), tls=Tls(*files[name])) for name in NAMES)
+    with viewer, operator:
+        assert viewer.camera("tof").width == operator.camera("tof").width == 4
+        with pytest.raises(NothingReceivedError):
+            viewer.reinitialize("sheet")
+        assert operator.reinitialize("sheet") == ""
+    with pytest.raises(UnreachableError):
+        Rig(encrypted(endpoint))
+
+
+def test_the_processes_that_live(bus, rig):
+    bus.declare_liveliness("capture")
+    bus.declare_liveliness("track/sheet")
+    assert rig.processes() == ("capture", "track/sheet")
