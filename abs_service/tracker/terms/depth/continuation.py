@@ -24,8 +24,8 @@ LARGEST_REACH = 0.25
 class Continuation(Protocol):
     """The measured surface that is continuous with the object in one camera's image."""
 
-    def observe(self, shown: NDArray[np.bool_], predicted: Surface, window: Window = WHOLE) -> None:
-        """Sets the pixels (rows, columns) in a window that show the object; `predicted` is a population of one."""
+    def observe(self, shown: NDArray[np.bool_], window: Window = WHOLE) -> None:
+        """Sets the pixels (rows, columns) in a window that show the object."""
         ...
 
     def remainder(self, surface: Surface) -> Remainder:
@@ -36,7 +36,7 @@ class Continuation(Protocol):
 class NoContinuation:
     """Null object: nothing is known."""
 
-    def observe(self, shown: NDArray[np.bool_], predicted: Surface, window: Window = WHOLE) -> None:
+    def observe(self, shown: NDArray[np.bool_], window: Window = WHOLE) -> None:
         """No effect."""
 
     def remainder(self, surface: Surface) -> Remainder:
@@ -62,22 +62,22 @@ class CoarseContinuation:
         self._focal = camera.fx / self._step
         self._gap_m = float(np.median(edge_lengths(mesh.vertices, mesh.edges)))
         self._reach_m = LARGEST_REACH * float(np.sqrt(mesh.area)) + self._gap_m
-        self._at_first: float | None = None
+        self._at_first = float("nan")
 
-    def observe(self, shown: NDArray[np.bool_], predicted: Surface, window: Window = WHOLE) -> None:
-        """Takes every few pixels; the first image tells what continues beside a mesh that is right."""
+    def observe(self, shown: NDArray[np.bool_], window: Window = WHOLE) -> None:
+        """Takes every few pixels."""
         rows, columns = self._shown.shape
         top, _, left, _ = limits(window, (rows * self._step, columns * self._step))
         few = shown[-top % self._step :: self._step, -left % self._step :: self._step]
         row, column = -(-top // self._step), -(-left // self._step)
         self._shown[:] = False
         self._shown[row : row + few.shape[0], column : column + few.shape[1]] = few
-        if self._at_first is None:
-            self._at_first = self._share(predicted)
 
     def remainder(self, surface: Surface) -> Remainder:
-        """Share of the object's pixels that lie beside a population of one, now and at first."""
-        return Remainder(self._share(surface), np.nan if self._at_first is None else self._at_first)
+        """Share of the object's pixels that lie beside a population of one, now and the first time."""
+        share = self._share(surface)
+        self._at_first = share if np.isnan(self._at_first) else self._at_first
+        return Remainder(share, self._at_first)
 
     def _share(self, surface: Surface) -> float:
         """Share of the pixels beside the mesh in those and the ones on it; NaN without any."""

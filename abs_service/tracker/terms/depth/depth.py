@@ -93,7 +93,7 @@ class DepthTerm:
         empty = self._background.observe(missing & ~single, np.isfinite(expected), window, (height, width))
         seen = classify(distance, expected, self._view.camera.fx, empty, single)
         doubtful = self._outline.observe(distance, seen, expected, predicted, window)
-        self._continuation.observe(seen.object, predicted, window)
+        self._continuation.observe(seen.object, window)
         self._window, self._distance, self._foreground = window, distance, seen.foreground
         self._place(seen, doubtful, (height, width))
         self._explain_pixels(texture, seen, doubtful, predicted)

@@ -123,7 +123,7 @@ def test_shares_are_of_the_vertices_that_face_the_sensor(name: str):
 
 def continuation(size: tuple[float, float], camera: Camera = CAMERA) -> CoarseContinuation:
     result = CoarseContinuation(camera, MESH)
-    result.observe(picture(size) < 1.3, moved())
+    result.observe(picture(size) < 1.3)
     return result
 
 
@@ -147,6 +147,7 @@ def test_what_is_left_is_measured_near_the_mesh():
 
 def test_a_mesh_that_slides_leaves_surface_behind():
     shown = continuation((0.32, 0.22))
+    assert shown.remainder(moved()).gained == 0.0
     assert shown.remainder(moved(0.08)).gained == pytest.approx(0.2, abs=0.05)
     assert shown.remainder(moved(0.0)).gained == 0.0
 
@@ -155,14 +156,14 @@ def test_only_the_window_is_looked_at():
     whole, part = CoarseContinuation(CAMERA, MESH), CoarseContinuation(CAMERA, MESH)
     shown = picture((0.4, 0.2)) < 1.3
     window = (slice(21, 101), slice(3, 157))
-    whole.observe(shown, moved())
-    part.observe(shown[window], moved(), window)
+    whole.observe(shown)
+    part.observe(shown[window], window)
     assert whole.remainder(moved()).share == part.remainder(moved()).share > 0
 
 
 def test_without_the_object_the_remainder_is_unknown():
     shown = CoarseContinuation(CAMERA, MESH)
-    shown.observe(np.zeros((CAMERA.height, CAMERA.width), bool), moved())
+    shown.observe(np.zeros((CAMERA.height, CAMERA.width), bool))
     found = shown.remainder(moved())
     assert np.isnan(found.share)
     assert found.gained == 0.0
