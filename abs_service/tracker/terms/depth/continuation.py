@@ -86,7 +86,7 @@ class CoarseContinuation:
         explained = int(np.count_nonzero(on_mesh & self._shown))
         if not explained:
             return float("nan")
-        pixel_m = float(np.median(distance[on_mesh])) / self._focal
+        pixel_m = float(distance[on_mesh].mean()) / self._focal
         away_m = pixel_m * cv2.distanceTransform((~on_mesh).view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_3)
         beside = self._shown & (away_m > max(self._gap_m, pixel_m)) & (away_m <= self._reach_m)
         left = int(np.count_nonzero(beside))
