@@ -1,6 +1,6 @@
 """Status of an estimate: its agreement with the measurements, with the outline, and with itself.
 
-A reason says what is the matter, and after a dash what to do.
+A reason says what is the matter, and after a dash what to do about it.
 """
 
 from collections.abc import Iterator, Sequence
@@ -60,7 +60,7 @@ class Settings:
 def judge(
     fits: Sequence[SensorFit], missing: Sequence[str], shape: ShapeQuality, surprise: float, limits: Settings
 ) -> tuple[Status, tuple[str, ...]]:
-    """Status, and the reasons for any other than TRACKING, each with what to do.
+    """Status, and the reasons for any other than TRACKING.
 
     Args:
         fits: agreement of every contributing sensor.
@@ -70,7 +70,7 @@ def judge(
         limits: thresholds.
     """
     lost = inlier_share(fits) < limits.lost_below
-    reasons = [f"no frame from {name} – is it connected, and are its images in time?" for name in missing]
+    reasons = [f"no frame from {name}" for name in missing]
     reasons += _seen(fits, lost, limits)
     reasons += _placed(fits, shape, surprise, limits)
     reasons += _shaped(shape, limits)

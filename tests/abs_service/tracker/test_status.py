@@ -106,9 +106,9 @@ def test_measured_surface_beyond_the_mesh_degrades_an_estimate_unless_it_was_hid
 def test_every_reason_says_what_to_do():
     folded = ShapeQuality(stretch=0.1, folded_share=0.1, deviation_m=1e-3)
     off = [replace(on_the_rim(visible=60, outside=30), inliers=0, occluded=99_000, remainder=Remainder(0.9, 0.0))]
-    status, lost = judge(off, ("color",), folded, 3.0, SETTINGS)
+    status, lost = judge(off, (), folded, 3.0, SETTINGS)
     assert status == Status.LOST
-    assert "it is looked for again" in lost[1]
+    assert "it is looked for again" in lost[0]
     _, degraded = judge([fit(0.5)], (), SHAPE, 0.0, SETTINGS)
     for reason in (*lost, *degraded):
         assert len(reason.partition(" – ")[2]) > 20
