@@ -134,7 +134,7 @@ def _numbers(tracker: TrackerLog) -> list[RenderableType]:
 
 def _shares(view: RigView) -> RenderableType:
     """What every sensor of the last estimates shows of the vertices that face it."""
-    columns = ("agree", "disagree", "no return", "occluder", "itself", "outside", "unexplained")
+    columns = ("agree", "off", "missing", "behind", "itself", "outside", "beyond")
     table = _table("vertices", *columns)
     for name, tracker in view.live.trackers.items():
         for sensor, shares in tracker.last.shares.items() if tracker.last else ():

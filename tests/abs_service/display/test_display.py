@@ -123,11 +123,12 @@ def row(text, begin):
 
 
 def test_what_each_sensor_shows_of_the_vertices_is_in_the_table(live):
-    assert "no return" not in drawn(view(live))
+    assert "behind" not in drawn(view(live))
     shares = {"tof": SensorShares(0.86, 0.02, 0.07, 0.05, 0.0, 0.0, 0.03, 0.03)}
     shares["color"] = SensorShares(0.9, 0.1, 0.0, 0.0, 0.0, 0.0, None, None)
     live.trackers["sheet"].last = report(shares=shares)
-    text = drawn(view(live), 100)
+    text = drawn(view(live))
+    assert row(text, "vertices")[1:] == ["agree", "off", "missing", "behind", "itself", "outside", "beyond"]
     assert row(text, "sheet tof") == ["sheet", "tof", "86%", "2%", "7%", "5%", "0%", "0%", "3%"]
     assert row(text, "sheet color")[-1] == "–"
 
