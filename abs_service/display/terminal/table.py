@@ -133,7 +133,7 @@ def _numbers(tracker: TrackerLog) -> list[RenderableType]:
 
 
 def _shares(view: RigView) -> RenderableType:
-    """What every sensor of the last estimates shows of the vertices that face it."""
+    """Shares of the vertices that face each sensor, of the last estimates."""
     columns = ("agree", "off", "missing", "behind", "itself", "outside", "beyond")
     table = _table("vertices", *columns)
     for name, tracker in view.live.trackers.items():

@@ -73,7 +73,7 @@ class Remainder:
 
     @property
     def gained(self) -> float:
-        """How much more is unexplained than in the first image; 0 if unknown."""
+        """Increase of the share since the first image, not below 0; 0 if unknown."""
         return max(float(np.nan_to_num(self.share - self.at_first)), 0.0)
 
 

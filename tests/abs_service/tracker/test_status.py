@@ -21,7 +21,7 @@ def fit(inliers: float, occluded: float = 0.0) -> SensorFit:
 
 
 def facts(reasons: tuple[str, ...]) -> tuple[str, ...]:
-    """What is the matter, without what to do."""
+    """The facts, without the advice."""
     return tuple(reason.partition(" – ")[0] for reason in reasons)
 
 

@@ -73,7 +73,7 @@ def test_the_mesh_grows_when_what_hid_the_object_leaves(columns: slice, rows: sl
 
 
 def test_a_mesh_that_something_covers_later_stays():
-    """What hides the object from the fifth frame on has no part in the mesh, and uncovers nothing when it leaves."""
+    """A cover from the fifth frame on has no part in the mesh, and uncovers nothing when it leaves."""
     simulation = simulate("simulated://sheet?seed=3")
     tracking = session(simulation, grow_s=0.1)
     change = hiding(slice(60, 100), slice(0, 100), until=LEAVES)

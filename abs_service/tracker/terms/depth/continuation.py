@@ -29,7 +29,7 @@ class Continuation(Protocol):
         ...
 
     def remainder(self, surface: Surface) -> Remainder:
-        """What a population of one leaves unexplained."""
+        """Surface that a population of one leaves unexplained."""
         ...
 
 
@@ -45,7 +45,7 @@ class NoContinuation:
 
 
 class CoarseContinuation:
-    """Every few pixels: does the image show the object where the mesh is not?
+    """Pixels of the object beside the mesh, of every few in a row.
 
     A mesh made from an image ends up to one cell inside the object, so pixels as near as that do not count.
 
