@@ -1,6 +1,9 @@
-"""Status of an estimate: its agreement with the measurements, with the outline, and with itself."""
+"""Status of an estimate: its agreement with the measurements, with the outline, and with itself.
 
-from collections.abc import Sequence
+A reason says what is the matter, and after a dash what to do about it.
+"""
+
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -10,6 +13,7 @@ from annotated_types import Gt, Interval
 from abs_service.tracker.estimate import Status
 from abs_service.tracker.shape_quality import ShapeQuality
 from abs_service.tracker.terms.base import RimFit, SensorFit, inlier_share, occluded_share
+from abs_service.tracker.terms.vertex_counts import VertexCounts
 
 #: With fewer visible vertices on the free edges, their shares say nothing.
 MIN_RIM = 8
@@ -22,10 +26,15 @@ class Settings:
     Attributes:
         degraded_below: inlier share below which an estimate is DEGRADED.
         lost_below: inlier share below which the object is LOST.
+        degraded_agreeing: share that agrees with a measurement, of the vertices that should be in sight, below which an
+            estimate is DEGRADED, in the sensor in which most do. Vertices without return, behind an occluder or outside
+            the image count against it.
         degraded_occluded: occluded share above which an estimate is DEGRADED, in the sensor that sees most.
         degraded_rim: share of the visible free edges that lie off the outline above which an estimate is DEGRADED.
         degraded_rim_m: mean distance of the visible free edges from the outline above which an estimate is DEGRADED, if
             it is above the standard deviation of a vertex as well [m].
+        degraded_unexplained: by how much the share of the measured surface beside the mesh may be larger than in the
+            first image. Something that touches a square object along one whole side adds 0.2.
         degraded_surprise: distance of an estimate from where the object was expected, in standard deviations of the
             motion prior, above which it is DEGRADED: the prior has held the mesh back.
         degraded_folded: share of folded faces above which an estimate is DEGRADED.
@@ -37,9 +46,11 @@ class Settings:
 
     degraded_below: Annotated[float, Interval(gt=0, lt=1)] = 0.6
     lost_below: Annotated[float, Interval(gt=0, lt=1)] = 0.3
+    degraded_agreeing: Annotated[float, Interval(gt=0, lt=1)] = 0.5
     degraded_occluded: Annotated[float, Interval(gt=0, le=1)] = 0.5
     degraded_rim: Annotated[float, Interval(gt=0, le=1)] = 0.3
     degraded_rim_m: Annotated[float, Gt(0)] = 0.005
+    degraded_unexplained: Annotated[float, Interval(gt=0, le=1)] = 0.25
     degraded_surprise: Annotated[float, Gt(1)] = 2.0
     degraded_folded: Annotated[float, Interval(gt=0, le=1)] = 0.05
     degraded_deviation_m: Annotated[float, Gt(0)] = 0.015
@@ -58,32 +69,96 @@ def judge(
         surprise: see `MotionPrior`.
         limits: thresholds.
     """
-    inliers, occluded = inlier_share(fits), occluded_share(fits)
+    lost = inlier_share(fits) < limits.lost_below
     reasons = [f"no frame from {name}" for name in missing]
-    if inliers < limits.degraded_below:
-        reasons.append(f"only {inliers:.0%} of the visible vertices agree with a measurement")
-    if occluded > limits.degraded_occluded:
-        reasons.append(f"{occluded:.0%} of the vertices are occluded in the sensor that sees most of them")
+    reasons += _seen(fits, lost, limits)
+    reasons += _placed(fits, shape, surprise, limits)
+    reasons += _shaped(shape, limits)
+    if lost:
+        return Status.LOST, tuple(reasons)
+    return (Status.DEGRADED if reasons else Status.TRACKING), tuple(reasons)
+
+
+def _seen(fits: Sequence[SensorFit], lost: bool, limits: Settings) -> Iterator[str]:
+    """Reasons by what the sensors show of the vertices."""
+    inliers, occluded = inlier_share(fits), occluded_share(fits)
+    disagree, hidden = inliers < limits.degraded_below, occluded > limits.degraded_occluded
+    if disagree:
+        yield f"only {inliers:.0%} of the visible vertices agree with a measurement – " + (_FIND if lost else _FOLLOW)
+    if hidden:
+        yield (
+            f"{occluded:.0%} of the vertices are occluded in the sensor that sees most of them – "
+            "take away what hides the object, or add a camera on another side"
+        )
+    counts = most_agreeing(fits)
+    if not (disagree or hidden) and counts.agreeing < limits.degraded_agreeing * counts.expected:
+        cause = max(_ABSENT, key=counts.share)
+        yield (
+            f"only {counts.agreeing / counts.expected:.0%} of the vertices that should be in sight agree with a "
+            f"measurement, {counts.share(cause):.0%} of all {_ABSENT[cause]}"
+        )
+
+
+#: What to do if the mesh does not agree.
+_FOLLOW = "take away what touches the object, move it more slowly, or give the model more control points"
+_FIND = "bring the object back into sight; it is looked for again, at once by abs-service reinitialize"
+
+#: Why a vertex is not seen to agree, and what to do.
+_ABSENT = {
+    "disagreeing": f"disagree – {_FOLLOW}",
+    "missing": "have no return – bring the surface nearer, or turn it towards the camera",
+    "behind_occluder": "are behind something – take it away, or add a camera on another side",
+    "outside": "are outside the image – bring the object back into it",
+}
+
+
+def _placed(fits: Sequence[SensorFit], shape: ShapeQuality, surprise: float, limits: Settings) -> Iterator[str]:
+    """Reasons by where the mesh lies."""
     if is_misplaced(fits, shape, limits):
-        reasons.append(
+        yield (
             f"{rim_share(fits):.0%} of the free edges lie off the object's outline, all together "
-            f"{rim_distance(fits) * 1e3:.0f} mm on average: the mesh has slid or turned on it"
+            f"{rim_distance(fits) * 1e3:.0f} mm on average: the mesh has slid or turned on it – "
+            "it is made anew if that lasts; a print that a colour camera sees would hold it"
+        )
+    if (gained := unexplained_share(fits)) > limits.degraded_unexplained:
+        yield (
+            f"{gained:.0%} more of the measured surface continues beyond the mesh than at first – "
+            "take away what touches the object, or have the mesh made anew by abs-service reinitialize"
         )
     if surprise > limits.degraded_surprise:
-        reasons.append(
+        yield (
             f"the object moved {surprise:.1f} times as far from where it was expected as priors.speed allows for: "
-            "the mesh lags behind"
+            "the mesh lags behind – move it more slowly, or raise priors.speed or the camera's rate"
         )
+
+
+def _shaped(shape: ShapeQuality, limits: Settings) -> Iterator[str]:
+    """Reasons by what the deformed mesh shows by itself."""
     if shape.folded_share > limits.degraded_folded:
-        reasons.append(f"{shape.folded_share:.0%} of the faces are folded: the model cannot follow the shape")
+        yield (
+            f"{shape.folded_share:.0%} of the faces are folded: the model cannot follow the shape – "
+            "give it more control points, or make priors.stretch smaller"
+        )
     if shape.deviation_m > limits.degraded_deviation_m or shape.unheld_m > limits.degraded_unheld_m:
-        reasons.append(
+        yield (
             f"nothing holds the surface along itself, vertices are known to {shape.deviation_m * 1e3:.0f} mm so far: "
             "it needs a print that a colour camera sees, or free edges in sight"
         )
-    if inliers < limits.lost_below:
-        return Status.LOST, tuple(reasons)
-    return (Status.DEGRADED if reasons else Status.TRACKING), tuple(reasons)
+
+
+def most_agreeing(fits: Sequence[SensorFit]) -> VertexCounts:
+    """Counts of the sensor in which the largest share of what should be in sight agrees; zeros without any."""
+    counts = (fit.counts for fit in fits if fit.counts.expected)
+    return max(counts, key=lambda one: one.agreeing / one.expected, default=VertexCounts())
+
+
+def unexplained_share(fits: Sequence[SensorFit]) -> float:
+    """Surface beside the mesh that was not there at first, see `Remainder`; the smallest of the sensors, 0 without.
+
+    Where the object comes into sight beyond an edge that something hid at first, the mesh is right as far as it goes.
+    """
+    shares = [fit.remainder.gained for fit in fits if np.isfinite(fit.remainder.share) and not fit.rim.uncovered]
+    return min(shares, default=0.0)
 
 
 def is_misplaced(fits: Sequence[SensorFit], shape: ShapeQuality, limits: Settings) -> bool:

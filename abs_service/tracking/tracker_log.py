@@ -1,9 +1,8 @@
 """Log of one tracker: estimates, errors where ground truth is known, and statistics."""
 
-import math
 from collections import Counter
-from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ from absmsg.v1.deformation_state_pb2 import DeformationState
 from absmsg.v1.deformed_mesh_pb2 import DeformedMesh, MeshTopology
 from numpy.typing import NDArray
 
+from abs_service.tracking.sensor_shares import SensorShares, known
 from abs_service.tracking.truth import TruthComparison, rms_sigma_mm
 
 
@@ -33,6 +33,7 @@ class EstimateReport:
         age_ms: from the exposure to the publication [ms]; None offline.
         generations, evaluations: of the search.
         skipped: frame sets passed over before this one.
+        shares: what every sensor that contributed shows of the vertices.
     """
 
     tracker: str
@@ -50,6 +51,7 @@ class EstimateReport:
     generations: int
     evaluations: int
     skipped: int
+    shares: Mapping[str, SensorShares] = field(default_factory=dict)
 
     def as_dict(self) -> dict[str, Any]:
         """The fields by name."""
@@ -158,14 +160,15 @@ class TrackerLog:
             reasons=tuple(state.reasons),
             warnings=tuple(state.warnings),
             theta=tuple(state.theta),
-            error_mm=_known(errors.vertex_mm) if errors else None,
-            surface_mm=_known(errors.surface_mm) if errors else None,
-            vertex_sigma_mm=_known(rms_sigma_mm(mesh.covariance_f32)),
+            error_mm=known(errors.vertex_mm) if errors else None,
+            surface_mm=known(errors.surface_mm) if errors else None,
+            vertex_sigma_mm=known(rms_sigma_mm(mesh.covariance_f32)),
             solve_ms=state.solve_ms,
-            age_ms=_known(state.age_ms),
+            age_ms=known(state.age_ms),
             generations=state.generations,
             evaluations=state.evaluations,
             skipped=state.skipped,
+            shares={one.sensor: SensorShares.of(one) for one in state.sensors if not one.missing},
         )
         self.last, self.estimates, self.skipped = report, self.estimates + 1, self.skipped + report.skipped
         self.statuses[report.status] += 1
@@ -173,10 +176,6 @@ class TrackerLog:
         self.surface_mm.add(report.surface_mm)
         self.solve_ms.add(report.solve_ms)
         return report
-
-
-def _known(value: float | None) -> float | None:
-    return value if value is not None and math.isfinite(value) else None
 
 
 def points(xyz_f32: bytes) -> NDArray[np.float32]:

@@ -136,6 +136,14 @@ def _sensors(estimate: Estimate, dropped: Mapping[str, int]) -> Iterator[State.S
             rim_outside=fit.rim.outside,
             rim_inside=fit.rim.inside,
             rim_occluded=fit.rim.occluded,
+            agreeing_share=fit.counts.share("agreeing"),
+            disagreeing_share=fit.counts.share("disagreeing"),
+            no_return_share=fit.counts.share("missing"),
+            occluder_share=fit.counts.share("behind_occluder"),
+            self_occluded_share=fit.counts.share("behind_itself"),
+            outside_share=fit.counts.share("outside"),
+            unexplained_share=fit.remainder.share,
+            unexplained_at_first=fit.remainder.at_first,
         )
     for sensor in estimate.missing:
         yield State.Sensor(sensor=sensor, missing=True, dropped=dropped.get(sensor, 0))

@@ -2,13 +2,15 @@
 
 import re
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import yaml
 
 from abs_service.tracker import status
 from abs_service.tracker.shape_quality import ShapeQuality
-from abs_service.tracker.terms.base import RimFit, SensorFit
+from abs_service.tracker.terms.base import Remainder, RimFit, SensorFit
+from abs_service.tracker.terms.vertex_counts import VertexCounts
 
 ROOT = Path(__file__).parents[2]
 TROUBLESHOOTING = (ROOT / "docs" / "how-to" / "troubleshooting.md").read_text(encoding="utf-8")
@@ -43,10 +45,18 @@ def test_every_decision_has_a_number_of_its_own():
 
 
 def test_troubleshooting_has_every_reason_of_a_status():
-    nothing_right = SensorFit("tof", 100, 300, 100, 10, -1.0, 1.0, RimFit(20, 10, 10))
+    counts = VertexCounts(400, 10, 90, missing=300)
+    nothing_right = SensorFit("tof", 100, 300, 100, 10, -1.0, 1.0, RimFit(20, 10, 10), counts, Remainder(0.9, 0.0))
+    doubtful = replace(nothing_right, inliers=50)
+    out_of_sight = replace(nothing_right, inliers=100, occluded=50)
     bad = ShapeQuality(folded_share=0.5, deviation_m=1.0, unheld_m=1.0)
-    _, reasons = status.judge([nothing_right], ["color"], bad, 9.9, status.Settings())
-    assert len(reasons) == 7
+    found = [
+        status.judge([fit], ["color"], bad, 9.9, status.Settings())[1]
+        for fit in (nothing_right, doubtful, out_of_sight)
+    ]
+    assert [len(reasons) for reasons in found] == [8, 8, 7]
+    reasons = {reason for of in found for reason in of}
+    assert len(reasons) == 10
     page = _without_numbers(TROUBLESHOOTING)
     assert [reason for reason in reasons if _without_numbers(reason.partition(" so far")[0]) not in page] == []
 

@@ -106,7 +106,7 @@ def _streams(view: RigView) -> RenderableType:
 
 def _trackers(view: RigView) -> RenderableType:
     table = _table("tracker", "status", "error", "surface", "solve", "age", "search", "skipped")
-    parts: list[RenderableType] = [table]
+    parts: list[RenderableType] = [table, _shares(view)]
     for name, tracker in view.live.trackers.items():
         table.add_row(f" {name}", *_numbers(tracker))
         if tracker.last is not None:
@@ -130,6 +130,20 @@ def _numbers(tracker: TrackerLog) -> list[RenderableType]:
         f"{last.generations}/{last.evaluations}",
         str(tracker.skipped),
     ]
+
+
+def _shares(view: RigView) -> RenderableType:
+    """Shares of the vertices that face each sensor, of the last estimates."""
+    columns = ("agree", "off", "missing", "behind", "itself", "outside", "beyond")
+    table = _table("vertices", *columns)
+    for name, tracker in view.live.trackers.items():
+        for sensor, shares in tracker.last.shares.items() if tracker.last else ():
+            values = (
+                shares.agreeing, shares.disagreeing, shares.no_return, shares.occluder, shares.self_occluded,
+                shares.outside, shares.unexplained,
+            )  # fmt: skip
+            table.add_row(Text(f" {name} {sensor}"), *("–" if one is None else f"{one:.0%}" for one in values))
+    return table if table.row_count else Group()
 
 
 def _theta(name: str, report: EstimateReport) -> Text:

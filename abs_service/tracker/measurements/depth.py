@@ -11,6 +11,7 @@ from abs_service.pairing.images import DepthImage
 from abs_service.tracker.measurements.base import Comparison, Decoder
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.synthesis.base import Synthesizer
+from abs_service.tracker.terms.depth.continuation import CoarseContinuation
 from abs_service.tracker.terms.depth.depth import DepthTerm
 from abs_service.tracker.terms.depth.outline import NoOutline, Outline, RimOutline
 from abs_service.tracker.terms.depth.rim import Rim
@@ -40,9 +41,10 @@ class Measurement:
         return _DepthDecoder(sensor, _auxiliary(self.noise)).decode
 
     def term(self, sensor: Sensor, mesh: Mesh, synthesizer: Synthesizer, comparison: Comparison) -> DepthTerm:
-        """Distances, and the outline at the mesh's rim."""
+        """Distances, the outline at the mesh's rim, and the surface beyond it."""
         outline = _outline(mesh, comparison.outline_px)
-        return DepthTerm(sensor.name, synthesizer, len(mesh.vertices), self.noise, comparison.bounds, outline)
+        beyond = partial(CoarseContinuation, mesh=mesh)
+        return DepthTerm(sensor.name, synthesizer, len(mesh.vertices), self.noise, comparison.bounds, outline, beyond)
 
 
 def _auxiliary(noise: DepthNoise) -> tuple[Kind, ...]:

@@ -1,7 +1,7 @@
 """Interface of a term, and summary of its agreement with a deformed mesh."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -11,6 +11,7 @@ from abs_service.pairing.images import Image
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import View
 from abs_service.tracker.terms.linearization import Linear
+from abs_service.tracker.terms.vertex_counts import Sight, VertexCounts
 from calib.no_return import CAUTIOUS, NoReturn
 from calib.noise.fit.truncation import deviation_within
 
@@ -59,6 +60,24 @@ class RimFit:
 
 
 @dataclass(frozen=True, slots=True)
+class Remainder:
+    """Measured surface that continues from the object beyond the mesh, as a share of this surface and the mesh, 0…1.
+
+    Attributes:
+        share: in this image; NaN for a sensor that measures no distances, or if it does not show the object.
+        at_first: in the first image, in which the mesh is right: an object in contact continues in others.
+    """
+
+    share: float = float("nan")
+    at_first: float = float("nan")
+
+    @property
+    def gained(self) -> float:
+        """Increase of the share since the first image, not below 0; 0 if unknown."""
+        return max(float(np.nan_to_num(self.share - self.at_first)), 0.0)
+
+
+@dataclass(frozen=True, slots=True)
 class SensorFit:
     """Agreement of one sensor with one deformed mesh.
 
@@ -74,6 +93,8 @@ class SensorFit:
         normalized_residual: standard deviation of the normalised residuals, estimated from the inliers: 1 if the noise
             model is right, 2 if its σ is half the true one; NaN without inliers or without a noise model.
         rim: agreement of the mesh's edges with the outline; zeros for a sensor that measures no distances.
+        counts: the vertices by what the sensor's image shows of them; zeros for a light barrier.
+        remainder: measured surface of the object that the mesh leaves unexplained.
     """
 
     sensor: str
@@ -84,12 +105,13 @@ class SensorFit:
     mean_log_likelihood: float
     normalized_residual: float
     rim: RimFit = RimFit()
+    counts: VertexCounts = field(default_factory=VertexCounts)
+    remainder: Remainder = Remainder()
 
 
 def summarize(
     sensor: str,
-    visible: NDArray[np.bool_],
-    occluded: NDArray[np.bool_],
+    sight: Sight,
     measured: NDArray[np.bool_],
     residual: NDArray[np.float64],
     mean_log_likelihood: float,
@@ -101,7 +123,8 @@ def summarize(
 
     Args:
         sensor: its name.
-        visible, occluded, measured: masks of the vertices that are visible, occluded, and measured.
+        sight: the vertices by whether the sensor sees them.
+        measured: mask of the vertices with a measurement.
         residual: absolute normalised residual, root mean square over the channels.
         mean_log_likelihood: see `SensorFit`.
         channels: number of values per measurement.
@@ -111,12 +134,13 @@ def summarize(
     spread = deviation_within(square, INLIER_DEVIATIONS, channels)
     return SensorFit(
         sensor,
-        visible=int(np.count_nonzero(visible)),
-        occluded=int(np.count_nonzero(occluded)),
+        visible=int(np.count_nonzero(sight.visible)),
+        occluded=sight.occluded,
         samples=int(np.count_nonzero(measured)),
         inliers=int(np.count_nonzero(inlier)),
         mean_log_likelihood=mean_log_likelihood,
         normalized_residual=spread,
+        counts=sight.count(measured, inlier),
     )
 
 

@@ -35,7 +35,7 @@ class DeformationState(_message.Message):
     STOP_EVALUATIONS: DeformationState.Stop
     STOP_TIME: DeformationState.Stop
     class Sensor(_message.Message):
-        __slots__ = ("sensor", "seq", "t_host_ns", "samples", "mean_log_likelihood", "normalized_residual", "missing", "dropped", "visible", "occluded", "rim_visible", "rim_outside", "rim_inside", "rim_occluded")
+        __slots__ = ("sensor", "seq", "t_host_ns", "samples", "mean_log_likelihood", "normalized_residual", "missing", "dropped", "visible", "occluded", "rim_visible", "rim_outside", "rim_inside", "rim_occluded", "agreeing_share", "disagreeing_share", "no_return_share", "occluder_share", "self_occluded_share", "outside_share", "unexplained_share", "unexplained_at_first")
         SENSOR_FIELD_NUMBER: _ClassVar[int]
         SEQ_FIELD_NUMBER: _ClassVar[int]
         T_HOST_NS_FIELD_NUMBER: _ClassVar[int]
@@ -50,6 +50,14 @@ class DeformationState(_message.Message):
         RIM_OUTSIDE_FIELD_NUMBER: _ClassVar[int]
         RIM_INSIDE_FIELD_NUMBER: _ClassVar[int]
         RIM_OCCLUDED_FIELD_NUMBER: _ClassVar[int]
+        AGREEING_SHARE_FIELD_NUMBER: _ClassVar[int]
+        DISAGREEING_SHARE_FIELD_NUMBER: _ClassVar[int]
+        NO_RETURN_SHARE_FIELD_NUMBER: _ClassVar[int]
+        OCCLUDER_SHARE_FIELD_NUMBER: _ClassVar[int]
+        SELF_OCCLUDED_SHARE_FIELD_NUMBER: _ClassVar[int]
+        OUTSIDE_SHARE_FIELD_NUMBER: _ClassVar[int]
+        UNEXPLAINED_SHARE_FIELD_NUMBER: _ClassVar[int]
+        UNEXPLAINED_AT_FIRST_FIELD_NUMBER: _ClassVar[int]
         sensor: str
         seq: int
         t_host_ns: int
@@ -64,7 +72,15 @@ class DeformationState(_message.Message):
         rim_outside: int
         rim_inside: int
         rim_occluded: int
-        def __init__(self, sensor: _Optional[str] = ..., seq: _Optional[int] = ..., t_host_ns: _Optional[int] = ..., samples: _Optional[int] = ..., mean_log_likelihood: _Optional[float] = ..., normalized_residual: _Optional[float] = ..., missing: _Optional[bool] = ..., dropped: _Optional[int] = ..., visible: _Optional[int] = ..., occluded: _Optional[int] = ..., rim_visible: _Optional[int] = ..., rim_outside: _Optional[int] = ..., rim_inside: _Optional[int] = ..., rim_occluded: _Optional[int] = ...) -> None: ...
+        agreeing_share: float
+        disagreeing_share: float
+        no_return_share: float
+        occluder_share: float
+        self_occluded_share: float
+        outside_share: float
+        unexplained_share: float
+        unexplained_at_first: float
+        def __init__(self, sensor: _Optional[str] = ..., seq: _Optional[int] = ..., t_host_ns: _Optional[int] = ..., samples: _Optional[int] = ..., mean_log_likelihood: _Optional[float] = ..., normalized_residual: _Optional[float] = ..., missing: _Optional[bool] = ..., dropped: _Optional[int] = ..., visible: _Optional[int] = ..., occluded: _Optional[int] = ..., rim_visible: _Optional[int] = ..., rim_outside: _Optional[int] = ..., rim_inside: _Optional[int] = ..., rim_occluded: _Optional[int] = ..., agreeing_share: _Optional[float] = ..., disagreeing_share: _Optional[float] = ..., no_return_share: _Optional[float] = ..., occluder_share: _Optional[float] = ..., self_occluded_share: _Optional[float] = ..., outside_share: _Optional[float] = ..., unexplained_share: _Optional[float] = ..., unexplained_at_first: _Optional[float] = ...) -> None: ...
     HEADER_FIELD_NUMBER: _ClassVar[int]
     TRACKER_FIELD_NUMBER: _ClassVar[int]
     STATUS_FIELD_NUMBER: _ClassVar[int]

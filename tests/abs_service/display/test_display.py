@@ -13,6 +13,7 @@ from abs_service.display.terminal.table import TableDisplay, draw
 from abs_service.supervision.rig_state import RigState
 from abs_service.supervision.rig_view import RigView, size
 from abs_service.supervision.supervisor import Child, State
+from abs_service.tracking.sensor_shares import SensorShares
 from abs_service.tracking.tracker_log import EstimateReport
 from tests.abs_service.supervision.idle_process import Idle
 
@@ -119,6 +120,17 @@ def drawn(view, width=80):
 
 def row(text, begin):
     return next(line.split() for line in text.splitlines() if line.strip().startswith(begin))
+
+
+def test_what_each_sensor_shows_of_the_vertices_is_in_the_table(live):
+    assert "behind" not in drawn(view(live))
+    shares = {"tof": SensorShares(0.86, 0.02, 0.07, 0.05, 0.0, 0.0, 0.03, 0.03)}
+    shares["color"] = SensorShares(0.9, 0.1, 0.0, 0.0, 0.0, 0.0, None, None)
+    live.trackers["sheet"].last = report(shares=shares)
+    text = drawn(view(live))
+    assert row(text, "vertices")[1:] == ["agree", "off", "missing", "behind", "itself", "outside", "beyond"]
+    assert row(text, "sheet tof") == ["sheet", "tof", "86%", "2%", "7%", "5%", "0%", "0%", "3%"]
+    assert row(text, "sheet color")[-1] == "–"
 
 
 def test_streams_show_rate_age_and_losses(live):

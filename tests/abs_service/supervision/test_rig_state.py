@@ -111,6 +111,22 @@ def test_the_error_that_the_tracker_expects_needs_no_truth(live):
     assert report.vertex_sigma_mm is None
 
 
+def test_the_shares_of_every_sensor_that_contributed_are_reported(live):
+    message = DeformationState(tracker="sheet")
+    message.header.t_host_ns = 2
+    message.sensors.add(sensor="tof", agreeing_share=0.75, no_return_share=0.25, unexplained_share=math.nan)
+    message.sensors.add(sensor="color", missing=True)
+    (report,) = take(live, sample("sheet/state", message), mesh(2))
+    assert list(report.shares) == ["tof"]
+    shares = report.as_dict()["shares"]["tof"]
+    assert (shares["agreeing"], shares["no_return"], shares["outside"], shares["unexplained"]) == (
+        0.75,
+        0.25,
+        0.0,
+        None,
+    )
+
+
 def test_totals_are_kept_over_all_estimates(live):
     take(live, truth(1), topology(1))
     for t in (2, 3, 4):

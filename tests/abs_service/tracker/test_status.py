@@ -7,7 +7,8 @@ import pytest
 from abs_service.tracker.estimate import Status
 from abs_service.tracker.shape_quality import ShapeQuality
 from abs_service.tracker.status import Settings, judge
-from abs_service.tracker.terms.base import RimFit, SensorFit
+from abs_service.tracker.terms.base import Remainder, RimFit, SensorFit
+from abs_service.tracker.terms.vertex_counts import VertexCounts
 
 SETTINGS = Settings(degraded_below=0.6, lost_below=0.3)
 SHAPE = ShapeQuality(stretch=0.01, folded_share=0.0, deviation_m=1e-3)
@@ -17,6 +18,16 @@ def fit(inliers: float, occluded: float = 0.0) -> SensorFit:
     """A sensor in which shares of 10 000 vertices are occluded, and of the others inliers."""
     visible = round(10_000 * (1 - occluded))
     return SensorFit("tof", visible, 10_000 - visible, visible, round(inliers * visible), 0.0, 1.0)
+
+
+def facts(reasons: tuple[str, ...]) -> tuple[str, ...]:
+    """The facts, without the advice."""
+    return tuple(reason.partition(" – ")[0] for reason in reasons)
+
+
+def seen(**counts: int) -> SensorFit:
+    """A sensor that sees what it should see as it should be, but for 100 vertices with given classes."""
+    return replace(fit(1.0), counts=VertexCounts(facing=100, **counts))
 
 
 @pytest.mark.parametrize(
@@ -33,7 +44,8 @@ def fit(inliers: float, occluded: float = 0.0) -> SensorFit:
     ],
 )
 def test_status_and_reasons(share, missing, status, reasons):
-    assert judge([fit(share)], missing, SHAPE, 0.0, SETTINGS) == (status, reasons)
+    found, said = judge([fit(share)], missing, SHAPE, 0.0, SETTINGS)
+    assert (found, facts(said)) == (status, reasons)
 
 
 def test_a_lost_object_names_every_reason():
@@ -45,7 +57,61 @@ def test_a_lost_object_names_every_reason():
 def test_a_mostly_hidden_object_is_degraded_even_if_the_rest_agrees():
     assert judge([fit(1.0, 0.5)], (), SHAPE, 0.0, SETTINGS) == (Status.TRACKING, ())
     reason = "62% of the vertices are occluded in the sensor that sees most of them"
-    assert judge([fit(1.0, 0.62), fit(1.0, 0.9)], (), SHAPE, 0.0, SETTINGS) == (Status.DEGRADED, (reason,))
+    status, reasons = judge([fit(1.0, 0.62), fit(1.0, 0.9)], (), SHAPE, 0.0, SETTINGS)
+    assert (status, facts(reasons)) == (Status.DEGRADED, (reason,))
+
+
+@pytest.mark.parametrize(
+    ("counts", "reason"),
+    [
+        ({"agreeing": 50, "missing": 50}, None),
+        ({"agreeing": 40, "behind_itself": 60}, None),  # the object hides them, nothing is wrong
+        ({"agreeing": 40, "disagreeing": 10}, None),  # half are not judged
+        (
+            {"agreeing": 45, "missing": 35, "outside": 20},
+            ("45%", "35% of all have no return – bring the surface nearer"),
+        ),
+        (
+            {"agreeing": 45, "missing": 15, "outside": 40},
+            ("45%", "40% of all are outside the image – bring the object"),
+        ),
+        ({"agreeing": 30, "behind_occluder": 50}, ("38%", "50% of all are behind something – take it away")),
+        ({"agreeing": 40, "disagreeing": 60}, ("40%", "60% of all disagree – take away what touches")),
+    ],
+)
+def test_of_the_vertices_that_should_be_in_sight_half_have_to_agree_in_one_sensor(counts, reason):
+    status, reasons = judge([seen(**counts)], (), SHAPE, 0.0, SETTINGS)
+    assert status == (Status.DEGRADED if reason else Status.TRACKING)
+    if reason:
+        share, cause = reason
+        assert reasons[0].startswith(f"only {share} of the vertices that should be in sight agree")
+        assert cause in reasons[0]
+    both = [seen(**counts), seen(agreeing=90, missing=10)]
+    assert judge(both, (), SHAPE, 0.0, SETTINGS) == (Status.TRACKING, ())
+
+
+def test_measured_surface_beyond_the_mesh_degrades_an_estimate_unless_it_was_hidden_at_first():
+    def beyond(share: float, **rim: int) -> SensorFit:
+        return replace(on_the_rim(visible=60, **rim), remainder=Remainder(share, at_first=0.1))
+
+    assert judge([beyond(0.34)], (), SHAPE, 0.0, SETTINGS) == (Status.TRACKING, ())
+    status, reasons = judge([beyond(0.4)], (), SHAPE, 0.0, SETTINGS)
+    assert status == Status.DEGRADED
+    assert reasons[0].startswith("30% more of the measured surface continues beyond the mesh than at first")
+    assert judge([beyond(0.4, covered=9, uncovered=8)], (), SHAPE, 0.0, SETTINGS) == (Status.TRACKING, ())
+    assert judge([beyond(float("nan"))], (), SHAPE, 0.0, SETTINGS) == (Status.TRACKING, ())
+    assert judge([beyond(0.4), beyond(0.1)], (), SHAPE, 0.0, SETTINGS) == (Status.TRACKING, ())
+
+
+def test_every_reason_says_what_to_do():
+    folded = ShapeQuality(stretch=0.1, folded_share=0.1, deviation_m=1e-3)
+    off = [replace(on_the_rim(visible=60, outside=30), inliers=0, occluded=99_000, remainder=Remainder(0.9, 0.0))]
+    status, lost = judge(off, (), folded, 3.0, SETTINGS)
+    assert status == Status.LOST
+    assert "it is looked for again" in lost[0]
+    _, degraded = judge([fit(0.5)], (), SHAPE, 0.0, SETTINGS)
+    for reason in (*lost, *degraded):
+        assert len(reason.partition(" – ")[2]) > 20
 
 
 def on_the_rim(**rim: int) -> SensorFit:
@@ -86,7 +152,7 @@ def test_an_estimate_that_the_motion_prior_has_held_back_is_degraded():
 
 def test_a_folded_mesh_and_one_that_nothing_holds_are_degraded():
     folded = ShapeQuality(stretch=0.1, folded_share=0.1, deviation_m=1e-3)
-    assert judge([fit(1.0)], (), folded, 0.0, SETTINGS)[1] == (
+    assert facts(judge([fit(1.0)], (), folded, 0.0, SETTINGS)[1]) == (
         "10% of the faces are folded: the model cannot follow the shape",
     )
     loose = ShapeQuality(stretch=0.01, folded_share=0.0, deviation_m=0.02)

@@ -11,7 +11,8 @@ from abs_service.tracker.estimate import Estimate, Status
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.optimizers.base import Stop
 from abs_service.tracker.shape_quality import ShapeQuality
-from abs_service.tracker.terms.base import RimFit, SensorFit
+from abs_service.tracker.terms.base import Remainder, RimFit, SensorFit
+from abs_service.tracker.terms.vertex_counts import VertexCounts
 from abs_service.wire import estimate_messages
 from abs_service.wire.estimate_messages import Effort, Identity
 
@@ -32,7 +33,20 @@ ESTIMATE = Estimate(
     evaluations=45,
     budget=1000,
     inlier_share=0.9,
-    fits=(SensorFit("tof", 280, 10, 270, 260, 1.5, 1.1, RimFit(visible=60, outside=5, inside=3, occluded=2)),),
+    fits=(
+        SensorFit(
+            "tof",
+            280,
+            10,
+            270,
+            260,
+            1.5,
+            1.1,
+            RimFit(visible=60, outside=5, inside=3, occluded=2),
+            VertexCounts(400, 200, 50, 40, 30, 20, 10),
+            Remainder(0.25, 0.125),
+        ),
+    ),
     shape=ShapeQuality(stretch=0.02, folded_share=0.01, deviation_m=1.5e-3),
     sources={"tof": Source(42, 10**9, 25_000)},
     missing=("color",),
@@ -76,6 +90,11 @@ def test_what_the_status_is_judged_by_is_published():
     state = estimate_messages.state(Header(), ESTIMATE, IDENTITY, Effort(1.0, 24.0, 2.0, 0.5, 0, {}))
     tof = state.sensors[0]
     assert (tof.rim_visible, tof.rim_outside, tof.rim_inside, tof.rim_occluded) == (60, 5, 3, 2)
+    shares = (tof.agreeing_share, tof.disagreeing_share, tof.no_return_share)
+    assert shares == pytest.approx((0.5, 0.125, 0.1))
+    hidden = (tof.occluder_share, tof.self_occluded_share, tof.outside_share)
+    assert hidden == pytest.approx((0.075, 0.05, 0.025))
+    assert (tof.unexplained_share, tof.unexplained_at_first) == (0.25, 0.125)
     assert (state.stretch, state.folded_share, state.deviation_m) == (0.02, 0.01, 1.5e-3)
 
 

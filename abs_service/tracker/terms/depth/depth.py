@@ -12,6 +12,7 @@ from abs_service.tracker.synthesis.base import Synthesis, Synthesizer
 from abs_service.tracker.synthesis.window import WHOLE, Bordered, Placed, Window, corner, within
 from abs_service.tracker.terms.base import Bounds, SensorFit, facing, summarize
 from abs_service.tracker.terms.depth.background import Background, dropouts
+from abs_service.tracker.terms.depth.continuation import Continuation, NoContinuation
 from abs_service.tracker.terms.depth.depth_cost import (
     FREE_SCALE_M,
     depth_cost,
@@ -25,6 +26,7 @@ from abs_service.tracker.terms.depth.outline import NoOutline, Outline
 from abs_service.tracker.terms.depth.visibility import Visibility, classify
 from abs_service.tracker.terms.gradients import color_rows, depth_rows
 from abs_service.tracker.terms.linearization import NO_ROWS, PointLinearization, Together
+from abs_service.tracker.terms.vertex_counts import Sight
 from calib import pose
 from calib.camera import Camera
 from calib.noise.base import DepthNoise, write_texture
@@ -52,6 +54,7 @@ class DepthTerm:
         noise: DepthNoise,
         bounds: Bounds,
         outline: Callable[[Camera], Outline] = lambda camera: NoOutline(),
+        continuation: Callable[[Camera], Continuation] = lambda camera: NoContinuation(),
     ):
         self.sensor = sensor
         self._noise = noise
@@ -59,14 +62,15 @@ class DepthTerm:
         self._synthesizer = synthesizer
         self._view = synthesizer.view(sensor, np.zeros((vertices, 0), np.float32))
         self._outline = outline(self._view.camera)
+        self._continuation = continuation(self._view.camera)
         self._background = Background()
         self._missing = np.zeros((1, vertices), np.float32)
         # Cost of no measurement, unbounded, so that leaving the image does not lower the cost.
         beyond = np.array([0, 0, 0, 0, 0, 0, bounds.outlier - bounds.inlier, 0], np.float32)
         self._image = Bordered(np.array([0, 0, 0, 0, 0, 0, bounds.uniform, 0], np.float32), beyond)
         self._texture = np.zeros((0, 8), np.float32)
-        self._images = Placed(np.bool_), Placed(np.bool_), Placed(np.float32)
-        self._obscured = np.zeros(0, np.bool_)
+        self._images = Placed(np.bool_), Placed(np.bool_), Placed(np.float32), Placed(np.bool_)
+        self._lost = self._covered = np.zeros(0, np.bool_)
         self._doubtful = np.zeros(0, np.bool_)
         self._free_m = np.zeros((0, 0), np.float32)
         self._window = WHOLE
@@ -89,6 +93,7 @@ class DepthTerm:
         empty = self._background.observe(missing & ~single, np.isfinite(expected), window, (height, width))
         seen = classify(distance, expected, self._view.camera.fx, empty, single)
         doubtful = self._outline.observe(distance, seen, expected, predicted, window)
+        self._continuation.observe(seen.object, window)
         self._window, self._distance, self._foreground = window, distance, seen.foreground
         self._place(seen, doubtful, (height, width))
         self._explain_pixels(texture, seen, doubtful, predicted)
@@ -96,10 +101,11 @@ class DepthTerm:
 
     def _place(self, seen: Visibility, doubtful: NDArray[np.bool_], shape: tuple[int, int]) -> None:
         """Puts what the window shows where samples find it: into images (height + 2, width + 2) of a shape."""
-        obscured, free_m = seen.foreground | seen.hole | seen.dropout, np.where(doubtful, np.float32(0), seen.free_m)
-        self._obscured = self._images[0].put(self._window, obscured, *shape).ravel()
+        lost, free_m = seen.hole | seen.dropout, np.where(doubtful, np.float32(0), seen.free_m)
+        self._lost = self._images[0].put(self._window, lost, *shape).ravel()
         self._doubtful = self._images[1].put(self._window, doubtful, *shape).ravel()
         self._free_m = self._images[2].put(self._window, free_m, *shape)
+        self._covered = self._images[3].put(self._window, seen.foreground, *shape).ravel()
 
     def _render(self, image: DepthImage, window: Window) -> NDArray[np.float32]:
         """The noise model over a window of an image (height + 2, width + 2, 8)."""
@@ -184,12 +190,14 @@ class DepthTerm:
         residual, _, cost = self._residuals(seen)
         measured, pixel = cost < np.inf, seen.pixel[0]
         free = (self._free_m.ravel()[pixel] > 0) & (pixel > 0)
-        hidden = ((pixel < 0) & facing(self._view, surface)) | self._obscured[pixel]
+        masks = self._lost[pixel], self._covered[pixel], self._doubtful[pixel]
+        sight = Sight.of(pixel, facing(self._view, surface), *masks)
         mean = -float(self._measured_cost(surface, seen)[0]) / residual.size
         size = np.where(free, np.inf, np.abs(residual))
-        visible = (pixel > 0) & ~(hidden | self._doubtful[pixel])
         return replace(
-            summarize(self.sensor, visible, hidden, measured | free, size, mean), rim=self._outline.fit(surface)
+            summarize(self.sensor, sight, measured | free, size, mean),
+            rim=self._outline.fit(surface),
+            remainder=self._continuation.remainder(surface),
         )
 
     def misfit(self, surface: Surface) -> NDArray[np.float64]:
@@ -206,7 +214,7 @@ class DepthTerm:
         deviation = 1 / np.maximum(inverse, 1e-9)
         signed = np.clip(residual * deviation, -LARGEST_MISFIT_M, LARGEST_MISFIT_M)
         free = self._free_m.ravel()[pixel].astype(np.float64)
-        usable = (seen.pixel[0] > 0) & ~(self._obscured[pixel] | self._doubtful[pixel])
+        usable = (seen.pixel[0] > 0) & ~(self._lost[pixel] | self._covered[pixel] | self._doubtful[pixel])
         measured = cost < np.inf
         return np.stack([np.where(measured, signed, free), np.where(measured, deviation, 0.0)]) * usable
 

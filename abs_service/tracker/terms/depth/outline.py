@@ -5,6 +5,7 @@ between the pixels on the object and those beside it. Which stretches of the rim
 image (`rim_classes`).
 """
 
+from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
@@ -28,6 +29,9 @@ UNJUDGED_DEVIATIONS = 3.0
 
 #: An outer vertex is hidden if the mesh's own surface lies so far in front of it [m].
 HIDDEN_BEHIND_M = 0.01
+
+#: Something hides an edge in the first image if it is in front of a point so many steps beyond it.
+_HIDING_STEPS = (0.5, 1.0, 1.5, LARGEST_GAP_STEPS)
 
 #: A free edge is off the outline if it is farther from it than so many pixels, and than the bound of its cost.
 OFF_PX = 3.0
@@ -146,7 +150,9 @@ class RimOutline:
         self._corner = np.add(corner(window), corner(part))[::-1].astype(np.float32)
         if not self._begun:
             points, values, gradients = self._locate(predicted)
-            self.classes, self._beyond = classify_rim(self._camera, self._rim, predicted, points, values, gradients)
+            unknown = np.isnan(self._beyond_by(predicted, np.arange(len(values)), _HIDING_STEPS))
+            measured = points, values, gradients, np.any(unknown, axis=0)
+            self.classes, self._beyond = classify_rim(self._camera, self._rim, predicted, *measured)
             self._begun = True
         free = np.flatnonzero(self.classes == RimClass.FREE)
         visible = free[~self._is_hidden(free, expected, predicted, window)]
@@ -186,9 +192,7 @@ class RimOutline:
         pixel_m = np.linalg.norm(points - self._camera.center, axis=1) / self._camera.fx
         off_m = np.where(off, np.maximum(away, -far), 0.0)[known] * pixel_m[known]
         covered = np.flatnonzero(self.classes == RimClass.OCCLUDED)
-        vertices = surface.vertices[0].T.astype(np.float64)
-        outer, inner = vertices[self._rim.outer[covered]], vertices[self._rim.inner[covered]]
-        beyond = self._inside_at(outer + LARGEST_GAP_STEPS * (outer - inner))
+        beyond = self._beyond_by(surface, covered, (LARGEST_GAP_STEPS,))
         return RimFit(
             visible=int(np.count_nonzero(known)),
             outside=int(np.count_nonzero(away < -far)),
@@ -198,6 +202,12 @@ class RimOutline:
             covered=len(covered),
             uncovered=int(np.count_nonzero(beyond > 0)),
         )
+
+    def _beyond_by(self, surface: Surface, which: NDArray[np.intp], steps: Sequence[float]) -> NDArray[np.float64]:
+        """Distances inside the outline (steps, m) some steps beyond outer vertices (m,), see `_inside_at`."""
+        vertices = surface.vertices[0].T.astype(np.float64)
+        outer, inner = vertices[self._rim.outer[which]], vertices[self._rim.inner[which]]
+        return np.stack([self._inside_at(outer + by * (outer - inner)) for by in steps])
 
     def _inside_at(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Distance inside the outline (k,) of points (k, 3) [px]: −∞ far outside, NaN if unknown."""

@@ -37,6 +37,7 @@ def classify_rim(
     points: NDArray[np.float32],
     inside: NDArray[np.float64],
     gradients: NDArray[np.float64],
+    hidden: NDArray[np.bool_],
 ) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
     """`RimClass` (k,) of the outer vertices, and the gap (k,) between them and the end of the object.
 
@@ -50,6 +51,7 @@ def classify_rim(
         points: outermost vertices (k, 3) [m].
         inside: their distances inside the outline (k,) [px], huge where unknown.
         gradients: image gradients of these distances (k, 2).
+        hidden: True (k,) if it is unknown whether the object continues beyond them.
     """
     inner = surface.vertices[0].T[rim.inner].astype(np.float64)
     # Extrapolated to the end of the surface, which lies about as far outside the outer vertex as the inner one inside.
@@ -59,7 +61,8 @@ def classify_rim(
     with np.errstate(divide="ignore", invalid="ignore"):
         beyond = np.where(per_step > 0, inside / per_step, np.inf)
     classes = np.full(len(beyond), RimClass.FREE, np.uint8)
-    classes[~(beyond <= LARGEST_GAP_STEPS)] = RimClass.CONTACT
+    goes_on = ~(beyond <= LARGEST_GAP_STEPS)
+    classes[goes_on] = np.where(hidden, RimClass.OCCLUDED, RimClass.CONTACT)[goes_on]
     classes[end_cosine < MIN_COSINE] = RimClass.SILHOUETTE
     classes[inside > camera.width + camera.height] = RimClass.OCCLUDED
     last = np.array([camera.width, camera.height]) - 1

@@ -28,6 +28,7 @@ from abs_service.tracker.terms.photometric.texture_registration_noise import (
     NO_WIDENING,
     TextureRegistrationNoise,
 )
+from abs_service.tracker.terms.vertex_counts import Sight
 from calib.noise.base import LOG_SQRT_2PI, ImageNoise
 
 #: The texel of no measurement.
@@ -126,11 +127,10 @@ class ChannelTerm:
         residual = self._residuals(surface)[0]
         seen = self._view.synthesize(surface)
         pixel, known = seen.pixel[0], np.isfinite(seen.attributes[0]).all(axis=0)
-        hidden = ((pixel < 0) & facing(self._view, surface)) | np.isinf(self._texture[pixel, VALUE])
+        hidden = np.isinf(self._texture[pixel, VALUE])
+        sight = Sight.of(pixel, facing(self._view, surface), np.zeros_like(hidden), hidden, ~known)
         mean = -float(self.cost(surface)[0]) / len(residual)
-        return summarize(
-            self.sensor, (pixel > 0) & known & ~hidden, hidden, np.isfinite(residual), np.abs(residual), mean
-        )
+        return summarize(self.sensor, sight, np.isfinite(residual), np.abs(residual), mean)
 
     def misfit(self, surface: Surface) -> NDArray[np.float64]:
         """Zero: brightness carries no distance."""

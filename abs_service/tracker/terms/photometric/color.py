@@ -15,6 +15,7 @@ from abs_service.tracker.terms.photometric.texture_registration_noise import (
     NO_REGISTRATION_NOISE,
     TextureRegistrationNoise,
 )
+from abs_service.tracker.terms.vertex_counts import Sight
 from calib.jit import kernel, prange
 from calib.noise.base import LOG_SQRT_2PI
 from calib.noise.images.color import GaussianColor
@@ -107,10 +108,11 @@ class ColorTerm:
         residual, measured = self._residuals(surface)
         seen = self._view.synthesize(surface)
         pixel, known = seen.pixel[0], np.isfinite(seen.attributes[0]).all(axis=0)
-        hidden = ((pixel < 0) & facing(self._view, surface)) | np.isinf(self._texture[pixel, 0])
+        hidden = np.isinf(self._texture[pixel, 0])
+        sight = Sight.of(pixel, facing(self._view, surface), np.zeros_like(hidden), hidden, ~known)
         mean = -float(self.cost(surface)[0]) / len(residual)
         size = np.sqrt(np.mean(residual**2, axis=1))
-        return summarize(self.sensor, (pixel > 0) & known & ~hidden, hidden, measured, size, mean, channels=3)
+        return summarize(self.sensor, sight, measured, size, mean, channels=3)
 
     def misfit(self, surface: Surface) -> NDArray[np.float64]:
         """Zero: colours carry no distance."""

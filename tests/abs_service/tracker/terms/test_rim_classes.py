@@ -41,6 +41,25 @@ def test_an_edge_on_a_table_or_cut_by_a_mask_is_in_contact():
     assert here.visible == np.count_nonzero(found.classes == RimClass.FREE)
 
 
+@pytest.mark.parametrize("beyond", [0.002, 0.012, 0.025])
+def test_an_edge_up_to_two_cells_before_an_occluder_is_occluded_until_that_leaves(beyond: float):
+    """The sheet goes on to the right, where something is in front of it; the mesh ends a little before that."""
+    larger = Mesh(MESH.vertices * (1.3, 1, 1), MESH.faces, MESH.colors, MESH.chart)
+    rays = CAMERA.unproject(np.ones((CAMERA.height, CAMERA.width)))
+    covered = picture(larger)
+    covered[rays[..., 0] / rays[..., 2] > 0.15 + beyond] = 0.8
+    found = outline(covered)
+    right = MESH.vertices[Rim.of(MESH).outer, 0] > 0.14
+    assert np.mean(found.classes[right] == RimClass.OCCLUDED) > 0.8  # but for the corners
+    assert not np.any(found.classes[~right] == RimClass.OCCLUDED)
+    hidden = found.fit(moved(MESH, 0.0))
+    look(found, picture(larger))
+    seen = found.fit(moved(MESH, 0.0))
+    assert seen.covered == hidden.covered > 8
+    assert hidden.uncovered == 0
+    assert seen.uncovered >= 0.9 * hidden.covered  # a corner's own continuation is beside the sheet
+
+
 def test_an_edge_at_the_border_of_the_image_may_continue_beyond_it():
     wide = sheet(13, 19, flat, (0.62, 0.2))
     found = classes(picture(wide), wide)
