@@ -88,9 +88,8 @@ class Tracker:
     ):
         if color is None and color_noise is not None:
             raise ArgumentError("color_noise is given without the camera: color=Camera(…)")
-        noise = noise_models.StructuredLight() if noise is None else noise
-        sensor = {"noise": noise, "texture": texture, "range_m": range_m}
-        sensor |= {"outlier_share": outlier_share, "no_return": no_return}
+        sensor = {"noise": noise_models.StructuredLight() if noise is None else noise, "texture": texture}
+        sensor |= {"range_m": range_m, "outlier_share": outlier_share, "no_return": no_return}
         parts = {"model": model, "region": region, "template": template, "synthesis": synthesis, "objective": objective}
         parts |= {"optimizer": optimizer, "priors": priors, "vertex_offsets": vertex_offsets, "status": status}
         parts |= {"reinitialization": reinitialization, "budget_evaluations": budget_evaluations}

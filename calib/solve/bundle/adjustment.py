@@ -16,9 +16,8 @@ from scipy import linalg, sparse
 from scipy.optimize import least_squares
 from scipy.sparse.linalg import aslinearoperator
 
-from calib.solve.bundle import robust, uncertainty
-from calib.solve.bundle.blocks import Planes
-from calib.solve.bundle.equations import Equations, Group
+from calib.solve.bundle import robust, uncertainty, variance_components
+from calib.solve.bundle.equations import Equations
 from calib.solve.bundle.observability import require_determined, require_touched
 from calib.solve.bundle.parameters.layout import Layout
 from calib.solve.bundle.parameters.state import State
@@ -92,7 +91,7 @@ class Adjustment:
     def noise(self) -> NDArray[np.float64]:
         """Covariance of the sensors' parameters (k, k), if noise were the only error and no pose were repeated."""
         return uncertainty.noise_covariance(
-            self._pose_information, _covariance_inflation(self.equations, self.residuals)
+            self._pose_information, variance_components.covariance_inflation(self.equations, self.residuals)
         )
 
     @cached_property
@@ -209,16 +208,7 @@ def _covariance(equations: Equations) -> tuple[NDArray[np.float64], NDArray[np.f
     curvature = require_determined(_normal(equations.jacobian(zero)), equations.layout.names)
     size = np.sqrt(np.diag(curvature))
     inverse = linalg.inv(curvature / np.outer(size, size)) / np.outer(size, size)
-    return _covariance_inflation(equations, residuals) * (inverse + inverse.T) / 2, residuals
-
-
-def _covariance_inflation(equations: Equations, residuals: NDArray[np.float64]) -> float:
-    """Inflation of the covariance by the robust loss: mean over the groups, each scaled to unit deviation."""
-    unit = []
-    for rows in equations.slices():
-        own = residuals[rows]
-        unit.append(own / max(robust.scale(own, own.size), 1e-12))
-    return robust.covariance_inflation(np.concatenate(unit))
+    return variance_components.covariance_inflation(equations, residuals) * (inverse + inverse.T) / 2, residuals
 
 
 def _updated_factors(solved: Adjustment) -> tuple[float, ...]:
@@ -232,26 +222,9 @@ def _updated_factors(solved: Adjustment) -> tuple[float, ...]:
         redundancy = own.size - taken
         grown = 1.0
         if redundancy > 0.2 * own.size:
-            grown = robust.scale(own, redundancy) * _correlation_inflation(group, own)
+            grown = robust.scale(own, redundancy) * variance_components.correlation_inflation(group, own)
         found.append(max(factor * grown, MIN_FACTOR))
     return tuple(found)
-
-
-def _correlation_inflation(group: Group, residuals: NDArray[np.float64]) -> float:
-    """Inflation of the deviation by errors that the distances of a view have in common.
-
-    Errors of neighbouring pixels of a depth sensor are correlated, so a thousand distances carry less information than
-    a thousand independent ones. The inflation follows from the scatter of the views' means.
-    """
-    if not isinstance(group.measured, Planes):
-        return 1.0
-    views = group.views_of_rows
-    counts = np.bincount(views)
-    unit = residuals / max(float(np.sqrt(np.mean(residuals**2))), 1e-12)
-    clipped = np.clip(unit, -robust.OUTLIER, robust.OUTLIER)
-    excess = float(np.mean(np.bincount(views, clipped) ** 2 / np.maximum(counts, 1)))
-    chance = 1 + 3 * np.sqrt(2 / len(counts))
-    return float(np.sqrt(excess)) if excess > chance else 1.0
 
 
 def _normal(jacobian: sparse.csr_array) -> NDArray[np.float64]:
@@ -260,9 +233,3 @@ def _normal(jacobian: sparse.csr_array) -> NDArray[np.float64]:
 
 def _rms(residuals: NDArray[np.float64]) -> float:
     return float(np.sqrt(np.mean(robust.influence(residuals) ** 2)))
-
-
-def rescale(equations: Equations, factors: tuple[float, ...]) -> Equations:
-    """Equations with the deviations of every group scaled."""
-    groups = [group.rescaled(factor) for group, factor in zip(equations.groups, factors, strict=True)]
-    return replace(equations, groups=groups)

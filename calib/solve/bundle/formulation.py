@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 
 from calib.board.views import CornerView, PlaneView
 from calib.solve.bundle import motion
-from calib.solve.bundle.adjustment import rescale
 from calib.solve.bundle.blocks import Corners, Planes
 from calib.solve.bundle.equations import Equations, Group
 from calib.solve.bundle.parameters.layout import Layout
 from calib.solve.bundle.parameters.state import State
 from calib.solve.bundle.tasks import Task
+from calib.solve.bundle.variance_components import rescale
 
 
 @dataclass(frozen=True)
