@@ -1,7 +1,4 @@
-"""Times of the frames of a case, in one pass.
-
-The number of threads is that of a process, so every number has a process of its own, which is this module as a program.
-"""
+"""Times of the frames of a case, in one pass."""
 
 import json
 import os
@@ -9,14 +6,14 @@ import subprocess
 import sys
 import time
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from abs_service.tracking.session import TrackingSession
 from calib import jit
-from evaluation.method.rates.cases import Case, cases
+from evaluation.method.rates.cases import Case
 from evaluation.method.rates.clocked import Watched
 from evaluation.sequences import UntrackedError, demo_plan, demo_rig, expose, simulate
 
@@ -71,13 +68,9 @@ def measure(case: Case, frames: int) -> Times:
 
 
 def measured(threads: int, frames: int, scale: float) -> Mapping[str, Times]:
-    """Times of all cases by part, measured in a process whose kernels use so many threads."""
-    command = [sys.executable, "-m", __name__, str(frames), str(scale)]
+    """Times of all cases by part, from a process of its own: the number of threads is that of a process."""
+    command = [sys.executable, "-m", "evaluation.method.rates", str(frames), str(scale)]
     environment = os.environ | {jit.THREADS: str(threads)}
     printed = subprocess.run(command, env=environment, check=True, stdout=subprocess.PIPE, text=True).stdout
     found: dict[str, dict[str, Any]] = json.loads(printed)
     return {part: Times(**times) for part, times in found.items()}
-
-
-if __name__ == "__main__":
-    print(json.dumps({one.part: asdict(measure(one, int(sys.argv[1]))) for one in cases(float(sys.argv[2]))}))

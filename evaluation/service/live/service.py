@@ -41,6 +41,10 @@ class Service:
         """Numbers of the processes that run, by the command of each: run, capture, track, record."""
         return {"run": self._process.pid, **proc.children(self._process.pid)}
 
+    def every_process(self) -> list[tuple[str, int]]:
+        """All processes that run, several of one command included: command and number of each."""
+        return [("run", self._process.pid), *proc.every_child(self._process.pid)]
+
     def check(self) -> None:
         """Checks that the service runs.
 
