@@ -25,6 +25,9 @@ from evaluation.service.live.subscriber import ReceivedEstimate, Subscriber, cou
 #: Time that the processes have to get ready, kernels in the cache, and to settle once frames come [s].
 START_S, SETTLE_S = 20.0, 3.0
 
+#: How much later than the first frames the first estimate may be, and the recording still be long enough [s].
+LATE_S = 10.0
+
 #: Time until every component has published its health once more [s].
 HEALTH_S = 1.5
 
@@ -60,7 +63,7 @@ class Run:
     @property
     def exposures(self) -> int:
         """Exposures that the recording has to have."""
-        return round((self.duration_s + 2 * SETTLE_S) * self.rate_hz) if self.duration_s else 0
+        return round((self.duration_s + SETTLE_S + LATE_S) * self.rate_hz) if self.duration_s else 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,6 +120,7 @@ def observe(take: Path, head: str, run: Run, progress: Callable[[str], None]) ->
             with _busy(run.busy):
                 time.sleep(SETTLE_S)
                 begin_ns, cores = time.monotonic_ns(), _cores(service, run.duration_s)
+                service.check()
             end_ns = time.monotonic_ns()
             time.sleep(HEALTH_S)
             seen = [one for one in subscriber.arrivals if begin_ns <= one.t_ns < end_ns]
@@ -135,15 +139,22 @@ def _busy(programs: int) -> Iterator[None]:
 
 
 def _cores(service: Service, duration_s: float) -> Mapping[str, float]:
-    """CPU time per time by command, from now on."""
+    """CPU time per time by command, from now on; NaN if one of its processes ended meanwhile."""
     processes, begin_s = service.every_process(), time.monotonic()
-    before = {pid: proc.usage(pid).cpu_s for _, pid in processes}
+    before = {pid: _cpu_s(pid) for _, pid in processes}
     time.sleep(duration_s)
     took_s = time.monotonic() - begin_s
     cores: dict[str, float] = {}
     for command, pid in processes:
-        cores[command] = cores.get(command, 0.0) + (proc.usage(pid).cpu_s - before[pid]) / took_s
+        cores[command] = cores.get(command, 0.0) + (_cpu_s(pid) - before[pid]) / took_s
     return cores
+
+
+def _cpu_s(pid: int) -> float:
+    try:
+        return proc.usage(pid).cpu_s
+    except OSError:
+        return np.nan
 
 
 def _counted(subscriber: Subscriber, until_ns: int) -> Counter[str]:
@@ -158,10 +169,9 @@ def _observed(
     frames: Mapping[int, TrackedFrame],
 ) -> Observed:
     numbers = [one.sensors[head] for one in seen if head in one.sensors]
-    took_s = (seen[-1].t_ns - seen[0].t_ns) * 1e-9 if len(seen) > 1 else np.inf
     return Observed(
         np.array([one.age_ms for one in seen]),
-        (len(seen) - 1) / took_s,
+        (len(seen) - 1) / (seen[-1].t_ns - seen[0].t_ns) * 1e9 if len(seen) > 1 else 0.0,
         sum(one.skipped for one in seen),
         len(set(range(numbers[0], numbers[-1] + 1)).difference(numbers)) if numbers else 0,
         losses,

@@ -1,7 +1,7 @@
 """How cost grows: by vertices, control points, pixels, sensors, candidates and trackers.
 
 Frames are those of the simulated sheet while it moves, one tracker for each number, all in turn. Trackers are processes
-of the service on a recording of the rig of `frame_budget`, played at 10 Hz so that they keep up.
+of the service on a recording of the rig of `frame_budget`, played at 3 Hz so that they keep up.
 
 Statistic: processor time of a frame of the tracker's thread, median over the frames in one pass; of the service,
 processor time of all its trackers by the number of exposures. R² of a law with two parameters, fitted by least squares;
@@ -43,7 +43,7 @@ INTERVAL_MS = 1e3 / RATE_HZ
 DETERMINATION = 0.98
 
 #: The depth head of the trackers' rig, and its rate as a share of its own.
-HEAD, SPEED = "structured_light", 1 / 3
+HEAD, SPEED = "structured_light", 0.1
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,7 @@ def _overview(laws: Mapping[str, Law]) -> Section:
         Column("by"), Column("law"), Column("R²", format=".4f"),
         Column(f"reaches {INTERVAL_MS:.0f} ms at", format=".3g"),
     )  # fmt: skip
-    rows = tuple((name, str(law), law.determination, law.wall(INTERVAL_MS)) for name, law in laws.items())
+    rows = tuple((name, law.in_words(), law.determination, law.wall(INTERVAL_MS)) for name, law in laws.items())
     text = "A wall beyond the largest number that was measured is an extrapolation."
     return Section("Laws", (Table("Processor time of a frame; of all trackers together", columns, rows), text))
 
@@ -145,4 +145,4 @@ def _drawn(unit: str, numbers: Sequence[float], times: Sequence[float], law: Law
     axes_.plot(line, [law.time(one) for one in line], color="0.6")
     axes_.plot(numbers, times, "o")
     axes_.set(xlabel=unit, ylabel="processor time / ms", xlim=(0, None), ylim=(0, None))
-    return drawing(figure, f"{law}, R² = {law.determination:.4f}", f"Times by {unit}, with the law")
+    return drawing(figure, f"{law.in_words()}, R² = {law.determination:.4f}", f"Times by {unit}, with the law")

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from abs_service.report.content import Column, Table
 from evaluation.service.frame_budget.rig import EXPOSURE_BYTES, RATE_HZ
 from evaluation.service.growth.laws import Law
@@ -34,9 +36,9 @@ class Costs:
         """Cores that a rig with so many trackers takes."""
         return (self.capture + self.run + self.record + self.trackers.time(trackers)) * 1e-3 * rate_hz
 
-    def most_trackers(self, cores: float, rate_hz: float = RATE_HZ) -> int:
+    def most_trackers(self, cores: float, rate_hz: float = RATE_HZ) -> float:
         """Trackers of one rig that so many cores carry."""
-        return int(self.trackers.wall(cores / rate_hz * 1e3 - self.capture - self.run - self.record))
+        return float(np.floor(self.trackers.wall(cores / rate_hz * 1e3 - self.capture - self.run - self.record)))
 
 
 def table(costs: Costs) -> Table:

@@ -108,7 +108,7 @@ def findings(
         *_complete(seen, whole - before),
         at_most("Age at publication, p50", float(np.percentile(published_ms, 50)), P50_MS, "ms"),
         at_most("Age at publication, p99", float(np.percentile(published_ms, 99)), P99_MS, "ms"),
-        *_start_goals(help_s, starts, cold),
+        *start_goals(help_s, starts, cold),
         *(memory_goal(name, one) for name, one in growth.items() if settings.duration_s - settings.warm_up_s >= MIN_S),
     )
     ages_ms = {"publication": published_ms, "arrival at the subscriber": arrived_ms}
@@ -141,8 +141,14 @@ def _complete(seen: ObservedRun, counted: Mapping[str, int]) -> tuple[Goal, ...]
     )
 
 
-def _start_goals(help_s: Sequence[float], starts: Sequence[StartTimes], cold: Sequence[StartTimes]) -> tuple[Goal, ...]:
-    """Goals on the time until something is there."""
+def start_goals(help_s: Sequence[float], starts: Sequence[StartTimes], cold: Sequence[StartTimes]) -> tuple[Goal, ...]:
+    """Goals on the time until something is there.
+
+    Args:
+        help_s: durations of `--help` [s].
+        starts: with the kernels in the cache.
+        cold: with an empty cache.
+    """
 
     def tracking_s(some: Sequence[StartTimes]) -> float:
         return float(np.median([one.tracking_s for one in some]))

@@ -22,12 +22,18 @@ def test_a_law_is_found_that_is_true(power: float) -> None:
 
 
 def test_a_law_of_the_wrong_form_explains_less() -> None:
-    assert fit(NUMBERS, [one**3 for one in NUMBERS], 1.0).determination < 0.9
+    assert fit(NUMBERS, [one**3 for one in NUMBERS], 1.0).determination < growth.DETERMINATION
 
 
 def test_there_is_no_wall_where_nothing_grows() -> None:
     assert Law(1.0, 3.0, 0.0, 1.0).wall(33.0) == math.inf
     assert Law(1.0, 40.0, 1.0, 1.0).wall(33.0) == 0
+
+
+def test_what_could_not_be_measured_has_no_law() -> None:
+    law = fit(NUMBERS, [1.0, 2.0, math.nan, 4.0])
+    assert math.isnan(law.determination)
+    assert any(math.isnan(float(row[1] or 0)) for row in hosts.table(Costs(5.0, 1.0, 4.0, law)).rows)
 
 
 def test_larger_hosts_carry_what_the_costs_say() -> None:
