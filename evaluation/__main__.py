@@ -159,7 +159,7 @@ def _folder(out: Path, name: str) -> Path:
 
 
 def _origin(names: Sequence[str], arguments: argparse.Namespace) -> provenance.Provenance:
-    """Where a report of these experiments comes from."""
+    """Provenance of a report of these experiments."""
     words = [*names, *(["--quick"] if arguments.quick else []), "--seed", str(arguments.seed)]
     words += ["--data", str(arguments.data)] if arguments.data is not None else []
     words += [word for pair in arguments.set for word in ("--set", pair)]

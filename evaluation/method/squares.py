@@ -1,4 +1,4 @@
-"""Why the likelihood gains what it gains, or nothing, against squares with their default weights on the demo's sheet.
+"""The likelihood against squares with their default weights on the demo's sheet, and what explains the difference.
 
 The default weights are those of σ = 10 mm and 15.8 levels, where the demo's sensors have about 4 mm and 2.5 levels: the
 priors count more beside them. If that is what squares owe their error to, a likelihood whose σ are as large, and vary

@@ -85,7 +85,7 @@ def recorded(folder: Path, head: str) -> dict[int, TrackedFrame]:
 def _places(
     states: dict[int, DeformationState], meshes: dict[int, DeformedMesh], topologies: dict[int, MeshTopology]
 ) -> dict[str, Callable[[bytes], None]]:
-    """What takes the messages of a topic."""
+    """Functions that take the messages of a topic, by topic."""
 
     def take_state(data: bytes) -> None:
         state = DeformationState.FromString(data)

@@ -37,7 +37,7 @@ _BUSY = "while True: pass"
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """How the service runs on a recording.
+    """A way to run the service on a recording.
 
     Attributes:
         name: what it is called in tables.

@@ -66,7 +66,7 @@ def _alone(seen: Observed, replay: Mapping[int, TrackedFrame], truth: Truth) -> 
 
 
 def section(seen: Mapping[str, Observed]) -> Section:
-    """What came of the runs."""
+    """The table of the runs."""
     columns = (
         Column("run"), Column("estimates", "Hz", ".1f"), Column("age, p50", "ms", ".1f"), Column("p99", "ms", ".1f"),
         Column("passed over"), Column("in no estimate"), Column("of these counted by nobody"),

@@ -1,4 +1,4 @@
-"""How cost grows: by vertices, control points, pixels, sensors, candidates and trackers.
+"""Growth of cost: by vertices, control points, pixels, sensors, candidates and trackers.
 
 Frames are those of the simulated sheet while it moves, one tracker for each number, all in turn. Trackers are processes
 of the service on a recording of the rig of `frame_budget`, played at 3 Hz so that they keep up.

@@ -1,4 +1,4 @@
-"""What a frame of one tracker costs, by vertices, control points, pixels, sensors and candidates.
+"""Cost of a frame of one tracker, by vertices, control points, pixels, sensors and candidates.
 
 All trackers of an axis take each exposure in turn, so that a neighbour on the machine slows all of them alike.
 """
@@ -96,7 +96,7 @@ def axes() -> tuple[Axis, ...]:
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """What frames with a number of something cost.
+    """Cost of the frames with a number of something.
 
     Attributes:
         number: of the unit.

@@ -1,4 +1,4 @@
-"""What larger set-ups would do, by the measured costs: extrapolations, nothing here is measured."""
+"""Loads of larger set-ups by the measured costs: extrapolations, nothing here is measured."""
 
 from dataclasses import dataclass
 
