@@ -1,18 +1,20 @@
 """Command line of the evaluation: runs experiments and writes a report of each.
 
-  python -m evaluation geometries --out results            one experiment in full
-  python -m evaluation geometries --out results --quick    the same in seconds, on fewer and shorter sequences
-  python -m evaluation all --out results --quick           every experiment
-  python -m evaluation list                                names and titles of the experiments
-  python -m evaluation recordings --out results --data D   an experiment on recordings that are not in the repository
-  python -m evaluation geometries --out results --set frames=100 --set seeds=1    changed settings
+  python -m evaluation geometries            one experiment in full
+  python -m evaluation geometries --quick    the same in seconds, on fewer and shorter sequences
+  python -m evaluation peers trust           several, and one report of them
+  python -m evaluation all --quick           every experiment
+  python -m evaluation list                  names and titles of the experiments
+  python -m evaluation recordings --data D   an experiment on recordings that are not in the repository
+  python -m evaluation geometries --set frames=100 --set seeds=1    changed settings
 
-Writes OUT/EXPERIMENT/report.html with tables and pictures, and report.json with the same numbers. Equal seeds give
-equal numbers, except for measured times.
+Writes OUT/EXPERIMENT/report.html with tables and pictures, and report.json with the same numbers; of several
+experiments also OUT/report.html and OUT/report.json with the goals, tables and pictures of all. Equal seeds give equal
+numbers, except for measured times.
 
 The exit code is 0 if all experiments ran, 1 if a required goal is missed, 2 if an experiment cannot run here. Other
-missed goals are printed and leave the exit code unchanged; --json lists all goals. `all` skips an experiment that lacks
-data or packages, with a message.
+missed goals are printed and leave the exit code unchanged; --json lists all goals. An experiment that lacks data or
+packages is skipped, with a message; for `all` this leaves the exit code unchanged.
 """
 
 import argparse
@@ -33,6 +35,7 @@ from abs_service.report import page, provenance
 from abs_service.report.content import Report, to_json
 from abs_service.supervision.exit_codes import Exit, is_for_user
 from evaluation import experiment
+from evaluation.joint_report import joined
 
 #: Packages of `evaluation` whose modules with a TITLE are experiments.
 GROUPS = ("paper", "inputs", "method", "calibration", "service")
@@ -62,8 +65,10 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the arguments."""
-    parser.add_argument("experiment", metavar="EXPERIMENT", help="name of an experiment, all, or list")
-    parser.add_argument("--out", metavar="DIR", type=Path, help="folder for the reports")
+    parser.add_argument("experiments", metavar="EXPERIMENT", nargs="+", help="names of experiments, all, or list")
+    parser.add_argument(
+        "--out", metavar="DIR", type=Path, default=Path("results"), help="folder for the reports (default: results)"
+    )
     parser.add_argument(
         "--quick", action="store_true", help="seconds instead of minutes, on fewer and shorter sequences"
     )
@@ -80,23 +85,28 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Runs the experiments, writes their reports and prints their goals."""
     known = available()
-    if arguments.experiment == "list":
+    if "list" in arguments.experiments:
         print("\n".join(f"{name:<18} {known[name].TITLE}" for name in known))
         return Exit.OK
-    selected = list(known) if arguments.experiment == "all" else [arguments.experiment]
+    takes_all = "all" in arguments.experiments
+    selected = list(known if takes_all else dict.fromkeys(arguments.experiments))
     _check(arguments, selected, known)
-    worst = Exit.OK
+    made: dict[str, Report] = {}
+    missing: dict[str, str] = {}
     for name in selected:
         try:
-            report = _measure(name, known[name], arguments)
+            made[name] = _measure(name, known[name], arguments)
         except experiment.UnavailableError as error:
-            if arguments.experiment != "all":
-                raise
+            missing[name] = f"not run: {error}"
             print(f"{name}: skipped: {error}", file=sys.stderr)
             continue
-        _print(report, name, page.write(report, _folder(arguments.out, name) / "report"), arguments.json)
-        worst = max(worst, report.exit_code or Exit.OK)
-    return worst
+        _print(made[name], name, page.write(made[name], _folder(arguments.out, name) / "report"), arguments.json)
+    if len(selected) > 1 and made:
+        joint = joined(made, missing, _origin(arguments.experiments, arguments))
+        written = page.write(joint, arguments.out / "report")
+        print(f"All of them: {written[0]}", file=sys.stderr if arguments.json else sys.stdout)
+    worst = max((report.exit_code or Exit.OK for report in made.values()), default=Exit.OK)
+    return worst if takes_all or not missing else Exit.USER
 
 
 def available() -> dict[str, Any]:
@@ -115,10 +125,8 @@ def _check(arguments: argparse.Namespace, selected: Sequence[str], known: dict[s
     if unknown := [name for name in selected if name not in known]:
         titles = "\n".join(f"  {name:<18} {one.TITLE}" for name, one in known.items())
         raise EvaluateOptionError(f'there is no experiment "{unknown[0]}"; available are all and:\n{titles}')
-    if arguments.out is None:
-        raise EvaluateOptionError("--out DIR is required: the folder for the reports")
-    if arguments.set and arguments.experiment == "all":
-        raise EvaluateOptionError("--set changes the settings of one experiment and cannot be used with all")
+    if arguments.set and len(selected) > 1:
+        raise EvaluateOptionError("--set changes the settings of one experiment and cannot be used with several")
     if arguments.data is not None and not arguments.data.is_dir():
         raise EvaluateOptionError(f"--data {arguments.data}: there is no such folder")
 
@@ -150,12 +158,17 @@ def _folder(out: Path, name: str) -> Path:
     return out / name
 
 
-def _measure(name: str, chosen: Any, arguments: argparse.Namespace) -> Report:
-    """Runs one experiment."""
-    words = [name, *(["--quick"] if arguments.quick else []), "--seed", str(arguments.seed)]
+def _origin(names: Sequence[str], arguments: argparse.Namespace) -> provenance.Provenance:
+    """Provenance of a report of these experiments."""
+    words = [*names, *(["--quick"] if arguments.quick else []), "--seed", str(arguments.seed)]
     words += ["--data", str(arguments.data)] if arguments.data is not None else []
     words += [word for pair in arguments.set for word in ("--set", pair)]
-    origin = provenance.trace([*words, "--out", str(arguments.out)], [], program="python -m evaluation")
+    return provenance.trace([*words, "--out", str(arguments.out)], [], program="python -m evaluation")
+
+
+def _measure(name: str, chosen: Any, arguments: argparse.Namespace) -> Report:
+    """Runs one experiment."""
+    origin = _origin([name], arguments)
     settings = _settings(chosen.QUICK if arguments.quick else chosen.Settings(), arguments.set)
     start_s = time.monotonic()
     with Console(stderr=True).status(name) as status:

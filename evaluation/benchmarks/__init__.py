@@ -1,1 +1,1 @@
-"""Benchmarks of kernels and frame rates."""
+"""Benchmarks of kernels and of parts of a frame."""

@@ -16,7 +16,7 @@ from abs_service.tracker.synthesis.sparse import Sparse
 from abs_service.tracker.terms.linearization import Linearization
 from abs_service.tracking.observer import Observer
 from abs_service.tracking.session import TrackingSession
-from evaluation.benchmarks import rates
+from evaluation.method.rates.measuring import APPROACH, FIRST
 from tests.abs_service.tracker.models.differences import central_differences
 from tests.abs_service.tracker.scenes import sheet
 from tests.abs_service.tracking.driving import default_plan, frame_set, rig_of, simulate
@@ -76,9 +76,9 @@ def test_per_frame_search_metric(benchmark):
 def test_whole_frame(benchmark, vertices):
     """From a frame set to an estimate with the default plan, `hybrid`, while the sheet moves and bends."""
     tracking = TrackingSession(RIG, default_plan(vertices=vertices))
-    for k in rates.APPROACH:
+    for k in APPROACH:
         tracking.track(frame_set(SIMULATION.expose(k)[0], k), lambda: True)
-    exposures = [frame_set(SIMULATION.expose(k)[0], k) for k in range(rates.FIRST, rates.FIRST + 20)]
+    exposures = [frame_set(SIMULATION.expose(k)[0], k) for k in range(FIRST, FIRST + 20)]
     following = iter(exposures)
     benchmark.pedantic(
         lambda: tracking.track(next(following), lambda: True), rounds=1 if benchmark.disabled else len(exposures)

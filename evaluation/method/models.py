@@ -4,11 +4,14 @@ Everything is as in the demo's configuration except the model, the search (`cma`
 likelihood, with or without texture registration noise, or squares with default weights. Means over the frames of a
 sequence, then mean and standard deviation over the seeds.
 
-Goal: 95 % of the frames are TRACKING in every case; errors are reported without a goal.
+Goals: 95 % of the frames are TRACKING in every case. Since 2026-11-25, on the sheet the likelihood beats squares with
+their default weights: the upper end of the 95 % interval of the difference of the vertex errors, over the seeds, is not
+above 0. Until then errors had no goal; it was known that 4 × 4 control points would meet this one, and that the default
+model has 0.39 mm either way. `squares` asks why.
 Seeds: five sequences, with the context's seed + 1 to + 5.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -20,7 +23,8 @@ from abs_service.tracker.models import flexpad, gravity, nurbs, posed, rigid
 from abs_service.tracker.objectives import euclidean, likelihood
 from abs_service.tracker.optimizers import cma, hybrid
 from abs_service.tracking.plan import ModelSettings, ObjectiveSettings, OptimizerSettings
-from evaluation.experiment import Context, Findings, at_least
+from evaluation.experiment import Context, Findings, Goal, at_least, at_most
+from evaluation.paired import upper_end
 from evaluation.sequences import SMALL, demo_plan, demo_rig, expose, simulate, track
 
 TITLE = "Deformation models on the demo's sheet, strip and board"
@@ -110,8 +114,18 @@ def run(settings: Settings, context: Context) -> Findings:
         rows.append(_row(case, results))
         tracked.append(float(np.mean([one.tracked for one in results])))
         values[name] = {key: [getattr(one, key) for one in results] for key in Result.__dataclass_fields__}
-    goal = at_least("Share of the frames that are TRACKING, the lowest of all cases", min(tracked), 0.95)
-    return Findings((goal,), (Section("Errors", (Table("Every model", _COLUMNS, tuple(rows)),)),), values)
+    goals = (
+        at_least("Share of the frames that are TRACKING, the lowest of all cases", min(tracked), 0.95),
+        *(_against_squares(name, values) for name in ("nurbs by default, hybrid", "nurbs, 4 × 4, hybrid")),
+    )
+    return Findings(goals, (Section("Errors", (Table("Every model", _COLUMNS, tuple(rows)),)),), values)
+
+
+def _against_squares(name: str, values: Mapping[str, Mapping[str, Sequence[float]]]) -> Goal:
+    """Goal on what the likelihood gains on the sheet."""
+    errors = (values[f"sheet, {one}"]["vertex_mm"] for one in (name, f"{name}, squares"))
+    title = f"Vertex error of the likelihood − squares with default weights, {name}, upper end of the 95 % interval"
+    return at_most(title, upper_end(*errors), 0.0, "mm")
 
 
 def measure(case: Case, seed: int, frames: int) -> Result:

@@ -16,6 +16,7 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from evaluation.benchmarks.kernels import POPULATION, VERTICES, Case, nurbs_of, seconds, whole
+from evaluation.service.growth.laws import fit
 from tests.abs_service.tracker.scenes import flat, sheet
 
 ROUNDS = 150
@@ -54,13 +55,13 @@ def measured(cases: dict[int, Case]) -> tuple[NDArray[np.float64], NDArray[np.fl
 def draw(axes: Axes, label: str, cases: dict[int, Case]) -> str:
     """Plots a measurement with its line; says what the line is."""
     numbers, times = measured(cases)
-    slope, start = np.polyfit(numbers, times, 1)
-    share = 1 - np.sum((times - start - slope * numbers) ** 2) / np.sum((times - times.mean()) ** 2)
-    axes.plot(numbers, start + slope * numbers, color="0.6")
+    law = fit(numbers.tolist(), times.tolist())
+    axes.plot(numbers, law.start + law.each * numbers, color="0.6")
     axes.plot(numbers, times, "o")
     axes.set(xlabel=label, ylabel="µs", xlim=(0, None), ylim=(0, None))
-    axes.set_title(f"{start:.0f} µs + {slope:.3g} µs each, R² = {share:.4f}", fontsize="medium")
-    return f"{label}: {start:.1f} µs + {slope:.4g} µs each, R² {share:.5f}"
+    title = f"{law.start:.0f} µs + {law.each:.3g} µs each, R² = {law.determination:.4f}"
+    axes.set_title(title, fontsize="medium")
+    return f"{label}: {title}"
 
 
 def main() -> None:

@@ -112,9 +112,11 @@ def test_settings_that_cannot_be_are_named(experiment, given: str, said: str, tm
     assert said in capsys.readouterr().err
 
 
-def test_all_have_settings_of_their_own(experiment, tmp_path: Path, capsys) -> None:
+@pytest.mark.parametrize("given", [["all"], ["good", "other"]])
+def test_all_have_settings_of_their_own(experiment, given: list[str], tmp_path: Path, capsys) -> None:
     experiment("good", found(2.5))
-    assert __main__.main(["all", "--out", str(tmp_path), "--set", "frames=3"]) == Exit.USER
+    experiment("other", found(2.5))
+    assert __main__.main([*given, "--out", str(tmp_path), "--set", "frames=3"]) == Exit.USER
     assert "--set" in capsys.readouterr().err
 
 
@@ -136,7 +138,30 @@ def test_what_lacks_its_data_is_an_error_alone_and_passed_over_with_others(exper
     assert "X: good" in said.out
 
 
-@pytest.mark.parametrize("given", [[], ["--out", "x", "--data", "not a folder"], ["--out", "a file"]])
+def test_several_experiments_make_one_report_with_all_goals(experiment, tmp_path: Path, capsys) -> None:
+    experiment("first", found(2.5))
+    experiment("second", found(1.5))
+    experiment("bare", unavailable)
+    assert __main__.main(["second", "first", "--out", str(tmp_path)]) == Exit.OK
+    report = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
+    assert [(one["about"], one["level"]) for one in report["verdicts"]] == [("second:", "missed"), ("first:", "met")]
+    assert [section["title"] for section in report["sections"][1::2]] == ["second: Evidence", "first: Evidence"]
+    assert report["values"]["first"]["ratios"] == [2.5]
+    assert "second first" in report["provenance"]["command"]
+    assert str(tmp_path / "report.html") in capsys.readouterr().out
+    assert (tmp_path / "first" / "report.html").exists()
+
+
+def test_one_that_cannot_run_is_open_in_the_report_of_several(experiment, tmp_path: Path) -> None:
+    experiment("good", found(2.5))
+    experiment("bare", unavailable)
+    assert __main__.main(["bare", "good", "--out", str(tmp_path)]) == Exit.USER
+    report = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
+    assert report["verdict"] == "open"
+    assert (report["verdicts"][-1]["about"], report["verdicts"][-1]["text"]) == ("bare:", "not run: needs --data DIR")
+
+
+@pytest.mark.parametrize("given", [["--out", "x", "--data", "not a folder"], ["--out", "a file"]])
 def test_folders_that_cannot_be_are_named(
     experiment, given: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys
 ) -> None:

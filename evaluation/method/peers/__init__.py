@@ -1,8 +1,10 @@
-"""Against peers: the same sequences for our trackers, for point-set registrations and for a plain Gauss–Newton fit.
+"""Against peers: the same sequences for our trackers, for point-set registrations and for a compiled Gauss–Newton fit.
 
 Statistic: mean distance of the vertices from their own material (vertex error) and from the surface, over the frames of
-a sequence; mean and standard deviation over the seeds; processor time of a frame, median; sheets lost after leaps.
-Goals: in `_goals`.
+a sequence; mean and standard deviation over the seeds; processor time of single frames in one pass, median and 95th
+percentile; ratios to Gauss–Newton in the same run; sheets lost after leaps.
+Goals: in `_goals`. Until 2026-11-25, Gauss–Newton was plain NumPy with six steps in every frame, and the goal for the
+time was a median of 4 ms; it was met, with 3.5 ms. The other goals on errors and losses are the same since.
 Seeds: three sequences of every scene, [context's seed, 0 to 2], chosen before and judged; three others, 3 to 5, are
 reported beside them for the trackers in `REPEATED` and judge nothing.
 """
@@ -13,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from abs_service.tracker.optimizers import hybrid
 from evaluation.experiment import Context, Findings, Goal, at_most
 from evaluation.method.peers import competitors, report
 from evaluation.method.peers.competitors import SheetTracker
@@ -26,12 +29,15 @@ __all__ = ["QUICK", "TITLE", "Settings", "run"]
 TITLE = "Against peers: time, vertex and surface error on the same sequences"
 
 #: The row that goals are about, the competitors' row that is the hardest to beat, and the fastest point-set method.
-BEST, GAUSS_NEWTON = "hybrid, NURBS by default", "Gauss–Newton, NumPy"
+BEST, GAUSS_NEWTON = "hybrid, NURBS by default", "Gauss–Newton, compiled"
 FASTEST, RIGID = "rustcpd, rank 60, k 10, f32", "Open3D, rigid ICP"
-MASKED = "Gauss–Newton, hole masked"
+MASKED, ALWAYS_SIX = "Gauss–Newton, compiled, hole masked", "Gauss–Newton, compiled, always six steps"
 
 #: Trackers that follow the sequences of other seeds as well.
-REPEATED = (BEST, GAUSS_NEWTON, MASKED, FASTEST, RIGID)
+REPEATED = (BEST, GAUSS_NEWTON, ALWAYS_SIX, MASKED, FASTEST, RIGID)
+
+#: Steps in a frame and tolerance: the stop rule of our descent, and the six steps of the comparisons before.
+STOP_RULE, SIX_STEPS = (hybrid.Settings().steps, hybrid.Settings().tolerance), (6, 0.0)
 
 #: Frames until a sheet that leapt has to be found again; the leap is after the third.
 LEAP_FRAMES = 20
@@ -128,16 +134,19 @@ def _ours(name: str) -> TrackerFactory:
 def _makers(settings: Settings, scene: SheetScene, first: bool) -> dict[str, TrackerFactory]:
     """Trackers of a scene: all in the first, elsewhere those of the goals, the fastest competitor and the rigid one."""
     ours = {name: _ours(name) for name in settings.own_trackers if first or name == BEST}
-    newton = {GAUSS_NEWTON: with_template(lambda vertices: GaussNewton(vertices, scene.sigma))}
+    newton = {
+        GAUSS_NEWTON: with_template(lambda vertices: GaussNewton(vertices, scene.sigma, *STOP_RULE)),
+        ALWAYS_SIX: with_template(lambda vertices: GaussNewton(vertices, scene.sigma, *SIX_STEPS)),
+    }
     if any(scene.hole):
-        newton[MASKED] = with_template(lambda vertices: GaussNewton(vertices, scene.sigma, knows_hole=True))
+        newton[MASKED] = with_template(lambda vertices: GaussNewton(vertices, scene.sigma, *STOP_RULE, knows_hole=True))
     others = competitors.installed([name for name in settings.peers if first or name in (FASTEST, RIGID)])
     still = {"none: the first pose": with_template(competitors.NoTracking)}
     return ours | newton | {name: with_template(make) for name, make in others.items()} | still
 
 
 def _leapers(settings: Settings) -> dict[str, TrackerFactory]:
-    newton = with_template(lambda vertices: GaussNewton(vertices, 5e-3))
+    newton = with_template(lambda vertices: GaussNewton(vertices, 5e-3, *STOP_RULE))
     return {name: _ours(name) for name in settings.leapers} | {GAUSS_NEWTON: newton}
 
 
@@ -170,16 +179,22 @@ def _goals(
     found: Mapping[str, Mapping[str, Sequence[TrackedRun]]], leapt: Mapping[str, Sequence[TrackedRun]]
 ) -> tuple[Goal, ...]:
     best = {name: rows[BEST] for name, rows in found.items()}
+    newton = found["5 mm"][GAUSS_NEWTON]
 
     def mean(scene: str, what: str) -> float:
         return float(np.mean([getattr(one, what).mean() for one in best[scene]]))
 
+    def ms(runs: Sequence[TrackedRun], share: float) -> float:
+        return float(np.quantile(np.concatenate([one.cpu_ms for one in runs]), share))
+
+    error_mm = float(np.mean([one.vertex_mm.mean() for one in newton]))
     lost = [one.lost for one in leapt[GAUSS_NEWTON]]
     both = sum(here.lost for here, there in zip(leapt[BEST], lost) if there)
     return (
-        at_most(
-            f"Time a frame, {BEST}, median", np.median(np.concatenate([one.cpu_ms for one in best["5 mm"]])), 4, "ms"
-        ),
+        at_most(f"Time of a frame, {BEST}, median", ms(best["5 mm"], 0.5), 3, "ms"),
+        at_most(f"Time of a frame, {BEST}, 95th percentile", ms(best["5 mm"], 0.95), 4, "ms"),
+        at_most("Median time by that of compiled Gauss–Newton", ms(best["5 mm"], 0.5) / ms(newton, 0.5), 0.5),
+        at_most("Vertex error by that of compiled Gauss–Newton", mean("5 mm", "vertex_mm") / error_mm, 0.5),
         at_most("Vertex error at 5 mm noise", mean("5 mm", "vertex_mm"), 1.1, "mm"),
         at_most("Surface error at 5 mm noise", mean("5 mm", "surface_mm"), 0.7, "mm"),
         at_most("Vertex error at 15 mm noise", mean("15 mm", "vertex_mm"), 3.5, "mm"),

@@ -2,7 +2,7 @@
 
 import hashlib
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,12 +14,13 @@ from abs_service import wiring
 from abs_service.bus import keys
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.commands.recordings import replay
-from abs_service.tracker.estimate import Status
+from abs_service.tracker.estimate import Estimate, Status
 from abs_service.tracking.session import TrackingSession
 from abs_service.wire import estimate_messages
 from abs_service.wire.estimate_messages import Effort, Identity
 from drivers.contract.frame import Frame, FrameSet
 from drivers.replay import Recording
+from evaluation.service.frame_budget.errors import TrackedFrame
 from evaluation.service.frame_budget.rig import TRACKER
 from evaluation.service.frame_budget.stages import COPY, ENCODE, READ, SEAMS
 from evaluation.service.frame_budget.stopwatch import Stopwatch
@@ -37,12 +38,14 @@ class Pass:
         cpu_ms: CPU time of every stage (n,) [ms], by name; empty if the stages were not watched.
         tracking: share of the frames that are TRACKING.
         thetas: hash of Θ of all frames.
+        frames: estimates by exposure of the first depth image.
     """
 
     frame_ms: NDArray[np.float64]
     cpu_ms: dict[str, NDArray[np.float64]]
     tracking: float
     thetas: str
+    frames: Mapping[int, TrackedFrame]
 
 
 def run_through(take: Path, is_watched: bool) -> Pass:
@@ -72,6 +75,7 @@ def run_through(take: Path, is_watched: bool) -> Pass:
         _by_stage(watch) if is_watched else {},
         process.tracked / len(process.took_ns),
         process.thetas.hexdigest(),
+        process.frames,
     )
 
 
@@ -82,9 +86,11 @@ class _Process:
         self.took_ns: list[int] = []
         self.tracked = 0
         self.thetas = hashlib.sha256()
+        self.frames: dict[int, TrackedFrame] = {}
         self._tracking = tracking
         self._headers = headers
         self._watch = watch
+        self._version, self._made = -1, 0
         self._identity = Identity(TRACKER, "nurbs", "", "", 1)
 
     def take(self, frames: FrameSet, begin_ns: int) -> None:
@@ -95,7 +101,16 @@ class _Process:
             estimate_messages.mesh(header, estimate, self._identity).SerializeToString()
         self.took_ns.append(time.monotonic_ns() - begin_ns)
         self.tracked += estimate.status == Status.TRACKING
+        self._keep(next(frame.seq for frame in frames.frames.values() if frame.stream == "depth"), estimate)
         self.thetas.update(np.ascontiguousarray(estimate.theta).tobytes())
+
+    def _keep(self, k: int, estimate: Estimate) -> None:
+        if self._tracking.mesh is None:
+            return
+        if self._tracking.mesh_version != self._version:
+            self._version, self._made = self._tracking.mesh_version, k
+        is_tracking, rest = estimate.status == Status.TRACKING, self._tracking.mesh.vertices
+        self.frames[k] = TrackedFrame(is_tracking, estimate.vertices, rest, self._made)
 
 
 def _frames(recording: Recording, watch: Stopwatch) -> Iterator[Frame]:

@@ -1,6 +1,6 @@
 """A rig of today: its configuration, and a recording of it as its recorder makes one, from the simulated device."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -23,6 +23,8 @@ NAME, TRACKER = "today", "sheet"
 RATE_HZ = 30.0
 #: Largest size of an exposure: two depth images and one in colour [bytes].
 EXPOSURE_BYTES = 2 * 2 * 640 * 480 + 3 * 1280 * 720
+#: What the service's recorder keeps on disk of what it writes [bytes].
+KEPT_BYTES = 4_000_000_000
 #: Beginning of the recorded time, host and wall clock [ns].
 _BEGIN_NS = 1_700_000_000_000_000_000
 
@@ -42,25 +44,36 @@ def address(head: str, seed: int) -> str:
     return f"simulated://sheet?seed={seed}&rate={RATE_HZ:g}&sensors={head},color&{head}=640x480&color=1280x720"
 
 
-def configuration(head: str, uri: str) -> str:
-    """TOML of the demo's tracker with 600 vertices and 6 × 6 control points, on a depth head and a colour camera."""
+def configuration(head: str, uris: Sequence[str], trackers: int = 1) -> str:
+    """TOML of trackers like the demo's with 600 vertices and 6 × 6 control points, on one or more cameras.
+
+    Args:
+        head: the depth head of every camera.
+        uris: of the cameras; all are where the first one is.
+        trackers: number of equal ones, each on all cameras.
+    """
     rig = demo_table(NAME)
-    rig["devices"] = {"camera": {"uri": uri}}
+    noises = {head: NOISES[head], "color": rig["sensors"]["color"]["noise"]}
+    rig["devices"] = {f"camera{k}": {"uri": uri} for k, uri in enumerate(uris)}
     rig["sensors"] = {
-        head: {"device": "camera", "noise": NOISES[head]},
-        "color": {"device": "camera", "noise": rig["sensors"]["color"]["noise"]},
+        (name if k == 0 else f"{name}{k}"): {"device": f"camera{k}", "head": name, "noise": noise}
+        for k in range(len(uris))
+        for name, noise in noises.items()
     }
-    rig["synchronisation"]["reference"] = f"{head}/depth"
+    # Cameras that nobody triggers are apart by up to half of their interval.
+    rig["synchronisation"] = {"reference": f"{head}/depth", "tolerance_ms": 12.0 if len(uris) == 1 else 17.0}
+    rig["record"] |= {"estimates": True, "rotate_bytes": 1_000_000_000, "retain_bytes": KEPT_BYTES}
     tracker = rig["trackers"][TRACKER]
-    tracker["sensors"] = [head, "color"]
+    tracker["sensors"] = list(rig["sensors"])
     tracker["model"]["control_points"] = [6, 6]
     tracker["mesh"]["vertices"] = 600
+    rig["trackers"] = {(TRACKER if k == 0 else f"{TRACKER}{k}"): tracker for k in range(trackers)}
     return tomli_w.dumps(rig)
 
 
-def replayed(take: Path, delay_s: float) -> str:
-    """Address of a recording as a live device."""
-    return f"replay://{quote(str(take))}?delay={delay_s:g}"
+def replayed(take: Path, delay_s: float, speed: float = 1.0) -> str:
+    """Address of a recording as a live device, at a multiple of its own speed."""
+    return f"replay://{quote(str(take))}?delay={delay_s:g}&speed={speed:g}"
 
 
 def write_take(path: Path, head: str, seed: int, exposures: int, progress: Callable[[str], None]) -> Path:
@@ -68,7 +81,7 @@ def write_take(path: Path, head: str, seed: int, exposures: int, progress: Calla
     simulation = parse(address(head, seed)).build()
     with path.open("wb") as stream:
         file = McapFile(stream, Compression.LZ4)
-        file.attach("rig.toml", "text/toml", configuration(head, address(head, seed)).encode(), _BEGIN_NS)
+        file.attach("rig.toml", "text/toml", configuration(head, [address(head, seed)]).encode(), _BEGIN_NS)
         for name, one in simulation.heads.items():
             _write_camera(file, name, one.camera)
         for k in range(exposures):

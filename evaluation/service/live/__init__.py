@@ -3,9 +3,12 @@
 Observed are the messages on the bus, the operating system's statistics and the finished recording.
 
 Statistic: losses; percentiles of the ages of all estimates; the slope of each process's memory, with its interval of
-95 % confidence; the quickest of the starts.
+95 % confidence; median time from the start to the first TRACKING, with the kernels in the cache and with an empty one;
+median time of `--help`.
 Goals: no loss; the bounds below. Memory meets its goal if the interval's upper end is below the bound: what cannot be
-told from growth is missed. Until 2026-11-23 it was the lower end, which a noisy measurement always met.
+told from growth is missed. Until 2026-11-23 it was the lower end, which a noisy measurement always met. Until
+2026-11-25 start and help were the quickest of several, with bounds of 5 and 0.5 s that 2.4 and 0.06 s met, and no start
+was cold.
 Seeds: one run with the context's seed.
 """
 
@@ -25,8 +28,11 @@ from evaluation.service.live.trend import Trend, rolling_minimum, trend
 
 TITLE = "End to end: losses, ages, processors, memory and start"
 
-#: Bounds of the goals: median and 99th percentile of the age [ms], start and help [s], growth of memory [MB/min].
-P50_MS, P99_MS, START_S, HELP_S, GROWTH_MB_MIN = 40.0, 66.0, 5.0, 0.5, 0.3
+#: Bounds of the goals: median and 99th percentile of the age [ms], growth of memory [MB/min].
+P50_MS, P99_MS, GROWTH_MB_MIN = 40.0, 66.0, 0.3
+
+#: Those of the start with kernels in the cache and with an empty cache, and of help [s].
+START_S, COLD_START_S, HELP_S = 2.0, 15.0, 0.1
 
 #: The recorder holds the index of a file until the next one begins, at this rate after two minutes; with a margin [s].
 FILE_S = 150.0
@@ -41,6 +47,7 @@ class Settings:
 
     Attributes:
         starts: number of starts that are timed; each warms the caches for the next.
+        cold_starts: number of starts that are timed with an empty cache of kernels.
         help_runs: number of timed runs of `--help`.
         settle_s: time after the first TRACKING that is not observed [s].
         duration_s: observed time [s].
@@ -49,6 +56,7 @@ class Settings:
     """
 
     starts: int = 3
+    cold_starts: int = 1
     help_runs: int = 5
     settle_s: float = 5.0
     duration_s: float = 600.0
@@ -56,7 +64,7 @@ class Settings:
     sample_s: float = 1.0
 
 
-QUICK = Settings(starts=0, help_runs=2, settle_s=2.0, duration_s=20.0, warm_up_s=5.0, sample_s=0.25)
+QUICK = Settings(starts=0, cold_starts=0, help_runs=2, settle_s=2.0, duration_s=20.0, warm_up_s=5.0, sample_s=0.25)
 
 
 def run(settings: Settings, context: Context) -> Findings:
@@ -66,19 +74,30 @@ def run(settings: Settings, context: Context) -> Findings:
     for number in range(settings.starts):
         context.progress(f"start {number + 1} of {settings.starts}")
         starts.append(measurement.started(context.seed))
+    cold: list[StartTimes] = []
+    for number in range(settings.cold_starts):
+        context.progress(f"cold start {number + 1} of {settings.cold_starts}")
+        cold.append(measurement.started_cold(context.seed))
     seen = measurement.watched(
         context.seed, settings.settle_s, settings.duration_s, settings.sample_s, context.progress
     )
-    return findings(settings, help_s, (*starts, seen.start), seen)
+    return findings(settings, help_s, (*starts, seen.start), cold, seen)
 
 
-def findings(settings: Settings, help_s: Sequence[float], starts: Sequence[StartTimes], seen: ObservedRun) -> Findings:
+def findings(
+    settings: Settings,
+    help_s: Sequence[float],
+    starts: Sequence[StartTimes],
+    cold: Sequence[StartTimes],
+    seen: ObservedRun,
+) -> Findings:
     """Findings of all measurements.
 
     Args:
         settings: how long was watched.
         help_s: durations of `--help` [s].
-        starts: times of each start.
+        starts: times of each start with the kernels in the cache.
+        cold: those of each with an empty cache.
         seen: the observed run.
     """
     published_ms = np.array([one.age_ms for one in seen.arrivals])
@@ -89,8 +108,7 @@ def findings(settings: Settings, help_s: Sequence[float], starts: Sequence[Start
         *_complete(seen, whole - before),
         at_most("Age at publication, p50", float(np.percentile(published_ms, 50)), P50_MS, "ms"),
         at_most("Age at publication, p99", float(np.percentile(published_ms, 99)), P99_MS, "ms"),
-        at_most("Start to the first estimate, the quickest", min(one.first_s for one in starts), START_S, "s"),
-        at_most("--help, the quickest", min(help_s), HELP_S, "s"),
+        *start_goals(help_s, starts, cold),
         *(memory_goal(name, one) for name, one in growth.items() if settings.duration_s - settings.warm_up_s >= MIN_S),
     )
     ages_ms = {"publication": published_ms, "arrival at the subscriber": arrived_ms}
@@ -107,7 +125,7 @@ def findings(settings: Settings, help_s: Sequence[float], starts: Sequence[Start
                 _drawn_memory(seen),
             ),
         ),
-        Section("Start", (tables.starts(starts, help_s),)),
+        Section("Start", (tables.starts(starts, cold, help_s),)),
     )
     return Findings(goals, sections, _values(seen, whole - before, whole))
 
@@ -121,6 +139,25 @@ def _complete(seen: ObservedRun, counted: Mapping[str, int]) -> tuple[Goal, ...]
         at_most("Messages missing in the recording", sum(losses.unrecorded(seen).values()), 0),
         at_most("Losses that the components counted", sum(counted.values()), 0),
     )
+
+
+def start_goals(help_s: Sequence[float], starts: Sequence[StartTimes], cold: Sequence[StartTimes]) -> tuple[Goal, ...]:
+    """Goals on the time until something is there.
+
+    Args:
+        help_s: durations of `--help` [s].
+        starts: with the kernels in the cache.
+        cold: with an empty cache.
+    """
+
+    def tracking_s(some: Sequence[StartTimes]) -> float:
+        return float(np.median([one.tracking_s for one in some]))
+
+    warm = at_most("Start to the first TRACKING, kernels in the cache, median", tracking_s(starts), START_S, "s")
+    help_goal = at_most("--help, median", float(np.median(help_s)), HELP_S, "s")
+    if not cold:
+        return warm, help_goal
+    return warm, at_most("The same with an empty cache, median", tracking_s(cold), COLD_START_S, "s"), help_goal
 
 
 def _growth(seen: ObservedRun, process: str, from_s: float) -> Trend:

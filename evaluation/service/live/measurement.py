@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,8 @@ from evaluation.service.live.subscriber import ReceivedEstimate, Subscriber, cou
 
 #: The first start on a machine compiles the kernels [s].
 START_TIMEOUT_S = 180.0
+#: Numba's environment variable for the folder of its cache.
+CACHE = "NUMBA_CACHE_DIR"
 #: Data rate of the recording, which is noise and cannot be compressed [bytes/s].
 RECORDED_BYTES_S = 35_000_000
 
@@ -79,6 +82,13 @@ def help_s(times: int) -> tuple[float, ...]:
 def started(seed: int) -> StartTimes:
     """Starts the service, waits until it tracks and ends it."""
     with _running(seed, 0.0) as (service, subscriber, _):
+        return _await_tracking(service, subscriber)
+
+
+def started_cold(seed: int) -> StartTimes:
+    """The same with an empty cache of kernels, as at the first start on a machine."""
+    with tempfile.TemporaryDirectory(prefix="abs-cache-") as cache, _running(seed, 0.0, {CACHE: cache}) as running:
+        service, subscriber, _ = running
         return _await_tracking(service, subscriber)
 
 
@@ -152,7 +162,9 @@ def _await_tracking(service: Service, subscriber: Subscriber) -> StartTimes:
 
 
 @contextmanager
-def _running(seed: int, duration_s: float) -> Iterator[tuple[Service, Subscriber, Path]]:
+def _running(
+    seed: int, duration_s: float, environment: Mapping[str, str] = MappingProxyType({})
+) -> Iterator[tuple[Service, Subscriber, Path]]:
     """The running service, a subscriber, and the folder of the recordings; all are removed afterwards."""
     with tempfile.TemporaryDirectory(prefix="abs-live-") as name:
         folder = Path(name)
@@ -163,5 +175,5 @@ def _running(seed: int, duration_s: float) -> Iterator[tuple[Service, Subscriber
                 "or name another folder for temporary files with TMPDIR"
             )
         rig = write_rig(folder, seed)
-        with Service(rig) as service, Subscriber(endpoint_of(rig), NAME, TRACKER) as subscriber:
+        with Service(rig, environment) as service, Subscriber(endpoint_of(rig), NAME, TRACKER) as subscriber:
             yield service, subscriber, folder / "takes"

@@ -61,15 +61,19 @@ def machine() -> Machine:
 def children(pid: int) -> Mapping[str, int]:
     """Process numbers of the commands of `abs-service` that a process has started, by command: the oldest of each.
 
-    A younger one is a recorder that waits.
+    A younger one is a recorder that waits, or another tracker.
     """
-    listed = Path(f"/proc/{pid}/task/{pid}/children").read_text(encoding="utf-8").split()
     found: dict[str, int] = {}
-    for child in map(int, listed):
-        command = _command(Path(f"/proc/{child}/cmdline").read_bytes().decode().split("\0"))
-        if command:
-            found.setdefault(command, child)
+    for command, child in every_child(pid):
+        found.setdefault(command, child)
     return found
+
+
+def every_child(pid: int) -> list[tuple[str, int]]:
+    """Commands of `abs-service` that a process has started, each with its process number, the oldest first."""
+    listed = Path(f"/proc/{pid}/task/{pid}/children").read_text(encoding="utf-8").split()
+    words = ((Path(f"/proc/{child}/cmdline").read_bytes().decode().split("\0"), int(child)) for child in listed)
+    return [(command, child) for line, child in words if (command := _command(line))]
 
 
 def is_running(pid: int) -> bool:

@@ -93,11 +93,13 @@ def machine(seen: ObservedRun) -> Table:
     return Table("All processors of the machine", columns, rows)
 
 
-def starts(starts: Sequence[StartTimes], help_s: Sequence[float]) -> Table:
-    """Times from a command to its first effect."""
+def starts(starts: Sequence[StartTimes], cold: Sequence[StartTimes], help_s: Sequence[float]) -> Table:
+    """Times from a command to its first effect; `cold` are starts with an empty cache of kernels."""
     numbers_s = {
         "start to the first estimate": [one.first_s for one in starts],
         "start to the first TRACKING": [one.tracking_s for one in starts],
+        "empty cache, to the first estimate": [one.first_s for one in cold],
+        "empty cache, to the first TRACKING": [one.tracking_s for one in cold],
         "--help": list(help_s),
     }
     columns = (
@@ -106,6 +108,8 @@ def starts(starts: Sequence[StartTimes], help_s: Sequence[float]) -> Table:
         *(Column(name, "s", ".2f") for name in ("quickest", "median", "slowest")),
     )
     rows = tuple(
-        (name, float(len(some)), min(some), float(np.median(some)), max(some)) for name, some in numbers_s.items()
+        (name, float(len(some)), min(some), float(np.median(some)), max(some))
+        for name, some in numbers_s.items()
+        if some
     )
     return Table("From the command to its first effect", columns, rows)

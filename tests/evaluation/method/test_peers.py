@@ -1,5 +1,7 @@
 """The comparison with peers: scene, baseline, and our trackers on a short sequence."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,20 @@ from evaluation.method.peers.competitors import KNOWN, NoTracking, installed
 from evaluation.method.peers.gauss_newton import GaussNewton
 from evaluation.method.peers.measuring import track_frames, with_template
 from evaluation.method.peers.own_trackers import SETUPS, OwnTracker
-from evaluation.scenes.bent_sheet import CAMERA, SIZE, SheetScene, SheetState, places, render_frames, spin, swing
+from evaluation.scenes.bent_sheet import (
+    CAMERA,
+    SIDE,
+    SIZE,
+    SheetScene,
+    SheetState,
+    places,
+    render_frames,
+    spin,
+    swing,
+)
+from tests.reference import gauss_newton as plain_form
+
+KINDS = (GaussNewton, plain_form.GaussNewton)
 
 
 @pytest.mark.parametrize("degrees", [-120, -1, 0, 1e-6, 60, 120])
@@ -43,11 +58,21 @@ def test_the_hole_has_no_returns():
 def test_gauss_newton_follows_what_bends_and_what_turns():
     for scene in (SheetScene("5 mm", swing), SheetScene("spin", spin)):
         frames = render_frames(scene, range(12), np.random.default_rng(1))
-        tracker, at = with_template(lambda vertices: GaussNewton(vertices, 5e-3))(frames[0], 5e-3, 0)
+        tracker, at = with_template(lambda vertices: GaussNewton(vertices, 5e-3, *peers.STOP_RULE))(frames[0], 5e-3, 0)
         found = track_frames(tracker, at, frames)
         still = track_frames(*with_template(NoTracking)(frames[0], 5e-3, 0), frames)
         assert found.vertex_mm.mean() < 8 < still.vertex_mm.mean()
         assert np.all(found.surface_mm <= found.vertex_mm)
+
+
+@pytest.mark.parametrize("stop", [peers.STOP_RULE, peers.SIX_STEPS])
+@pytest.mark.parametrize("knows_hole", [False, True])
+def test_compiled_gauss_newton_finds_what_the_plain_one_finds(stop: tuple[int, float], knows_hole: bool):
+    frames = render_frames(SheetScene("hole", hole=(45, 22)), range(12), np.random.default_rng(1))
+    for first, second in pairwise(frames):
+        made = [kind(first.state.points(places(SIDE, SIDE).reshape(-1, 2)), 5e-3, *stop, knows_hole) for kind in KINDS]
+        compiled, plain = (one.track(second) for one in made)
+        np.testing.assert_allclose(compiled, plain, atol=1e-5)
 
 
 @pytest.mark.slow

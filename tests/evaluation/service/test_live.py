@@ -16,8 +16,10 @@ from abs_service.config import load
 from drivers.encoding.mcap_file import McapFile
 from evaluation.experiment import Context
 from evaluation.service import live
-from evaluation.service.live import losses, proc, recording, subscriber
+from evaluation.service.live import losses, measurement, proc, recording, subscriber
+from evaluation.service.live.measurement import StartTimes
 from evaluation.service.live.rig import write_rig
+from evaluation.service.live.service import Service
 from evaluation.service.live.trend import Trend, rolling_minimum, trend
 
 MINUTES = np.arange(600.0) / 60
@@ -96,6 +98,26 @@ def test_the_rig_is_one_that_the_service_takes(tmp_path):
     assert rig.devices["sim"].uri == "simulated://sheet?seed=3&color=640x480"
     assert rig.record.enabled
     assert rig.record.directory == tmp_path / "takes"
+
+
+@pytest.mark.slow
+def test_a_cold_start_has_a_cache_of_its_own(tmp_path):
+    cache = f"{measurement.CACHE}={tmp_path / 'cache'}"
+    with Service(write_rig(tmp_path, seed=3), {measurement.CACHE: str(tmp_path / "cache")}) as service:
+        told = Path(f"/proc/{service.processes()['run']}/environ").read_bytes().decode().split("\0")
+        assert cache in told
+        assert f"PATH={os.environ['PATH']}" in told
+
+
+def start_goals(cold):
+    """Goals on the start of what took these times [s] with an empty cache."""
+    seen = [StartTimes(1.0, 1.5), StartTimes(1.2, 3.0), StartTimes(1.1, 1.8)]
+    return live.start_goals([0.05, 0.2, 0.06], seen, [StartTimes(one - 1, one) for one in cold])
+
+
+def test_starts_are_judged_by_their_medians():
+    assert [(goal.value, goal.met) for goal in start_goals([21.0])] == [(1.8, True), (21.0, False), (0.06, True)]
+    assert len(start_goals([])) == 2
 
 
 def write_states(path: Path, seqs):

@@ -1,0 +1,82 @@
+"""A search whose own time is measured: without costs and derivatives, which the problem computes."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.tracker.optimizers.base import Budget, Optimizer, Problem, Search
+from abs_service.tracker.posterior.curvature import Quadratic
+from abs_service.tracking.plan import OptimizerSettings
+
+Answer = TypeVar("Answer")
+
+
+@dataclass
+class Clocked:
+    """A problem, and the processor time of its answers [s]."""
+
+    problem: Problem
+    dimension: int
+    spent_s: float = 0.0
+
+    def linearize(self, theta: NDArray[np.float64]) -> Quadratic:
+        """See `Problem`."""
+        return self._clocked(lambda: self.problem.linearize(theta))
+
+    def prior(self, theta: NDArray[np.float64]) -> Quadratic:
+        """See `Problem`."""
+        return self._clocked(lambda: self.problem.prior(theta))
+
+    def outlier_share(self, theta: NDArray[np.float64]) -> float:
+        """See `Problem`."""
+        return self._clocked(lambda: self.problem.outlier_share(theta))
+
+    def _clocked(self, ask: Callable[[], Answer]) -> Answer:
+        begin = time.thread_time()
+        answer = ask()
+        self.spent_s += time.thread_time() - begin
+        return answer
+
+
+@dataclass
+class Watched:
+    """Settings of a search, and the processor time of every frame's search without costs and derivatives [s]."""
+
+    settings: OptimizerSettings
+    took_s: list[float] = field(default_factory=list)
+
+    def build(self, dimension: int, generator: np.random.Generator) -> Optimizer:
+        """The search, watched."""
+        return WatchedSearch(self.settings.build(dimension, generator), self)
+
+
+@dataclass
+class WatchedSearch:
+    """An `Optimizer` that measures the time between the costs that it receives and the candidates that it asks for."""
+
+    search: Optimizer
+    watched: Watched
+
+    def follow(self, problem: Problem, start: NDArray[np.float64], budget: Budget) -> Search:
+        """See `Optimizer`."""
+        clocked, own_s = Clocked(problem, problem.dimension), 0.0
+        begin = time.thread_time()
+        search = self.search.follow(clocked, start, budget)
+        thetas = next(search)
+        while True:
+            own_s += time.thread_time() - begin
+            costs = yield thetas
+            begin = time.thread_time()
+            try:
+                thetas = search.send(costs)
+            except StopIteration as ended:
+                self.watched.took_s.append(own_s + time.thread_time() - begin - clocked.spent_s)
+                return ended.value
+
+    def explore(self, problem: Problem, start: NDArray[np.float64], budget: Budget) -> Search:
+        """See `Optimizer`."""
+        return self.search.explore(problem, start, budget)

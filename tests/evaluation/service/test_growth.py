@@ -1,0 +1,57 @@
+"""The experiment `growth`: laws, walls, extrapolations, and a short run."""
+
+import math
+
+import pytest
+
+from evaluation.experiment import Context
+from evaluation.service import growth
+from evaluation.service.growth import hosts
+from evaluation.service.growth.frames import axes
+from evaluation.service.growth.hosts import Costs
+from evaluation.service.growth.laws import Law, fit
+
+NUMBERS = (10.0, 20.0, 40.0, 80.0)
+
+
+@pytest.mark.parametrize("power", [1.0, 2.0])
+def test_a_law_is_found_that_is_true(power: float) -> None:
+    law = fit(NUMBERS, [3 + 0.25 * one**power for one in NUMBERS], power)
+    assert (law.start, law.each, law.determination) == pytest.approx((3, 0.25, 1))
+    assert law.time(law.wall(33.0)) == pytest.approx(33)
+
+
+def test_a_law_of_the_wrong_form_explains_less() -> None:
+    assert fit(NUMBERS, [one**3 for one in NUMBERS], 1.0).determination < growth.DETERMINATION
+
+
+def test_there_is_no_wall_where_nothing_grows() -> None:
+    assert Law(1.0, 3.0, 0.0, 1.0).wall(33.0) == math.inf
+    assert Law(1.0, 40.0, 1.0, 1.0).wall(33.0) == 0
+
+
+def test_what_could_not_be_measured_has_no_law() -> None:
+    law = fit(NUMBERS, [1.0, 2.0, math.nan, 4.0])
+    assert math.isnan(law.determination)
+    assert any(math.isnan(float(row[1] or 0)) for row in hosts.table(Costs(5.0, 1.0, 4.0, law)).rows)
+
+
+def test_larger_hosts_carry_what_the_costs_say() -> None:
+    costs = Costs(5.0, 1.0, 4.0, Law(1.0, 0.0, 10.0, 1.0))
+    assert costs.cores(1) == pytest.approx(0.6)
+    assert costs.cores(2) == pytest.approx(0.9)
+    assert costs.most_trackers(0.91) == 2
+    numbers = {str(row[0]): row[1] for row in hosts.table(costs).rows}
+    assert numbers["rigs with one tracker on 64 cores, 70% of them used"] == 74
+
+
+def test_every_axis_has_numbers_enough_for_its_law() -> None:
+    assert all(len(axis.setups) >= 4 for axis in axes())
+    assert {axis.power for axis in axes()} == {1, 2}
+
+
+@pytest.mark.slow
+def test_a_short_run_has_a_law_for_every_axis() -> None:
+    findings = growth.run(growth.QUICK, Context(0))
+    assert set(findings.values["laws"]) == {axis.unit for axis in axes()}
+    assert all(point["median_ms"] > 0 for points in findings.values["points"].values() for point in points)
