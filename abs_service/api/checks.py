@@ -74,7 +74,7 @@ def mapping(name: str, value: Any, example: str) -> Mapping[str, Any]:
 
 
 def array(name: str, value: Any) -> NDArray[Any]:
-    """What can be read as an array.
+    """The value as an array.
 
     Raises:
         ArgumentError: rows of different length, or an array with a mask of its own, which would be ignored.

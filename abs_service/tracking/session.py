@@ -178,7 +178,7 @@ def streams(sensors: Iterable[Sensor]) -> list[tuple[str, str]]:
 
 
 def missing_streams(sensors: Iterable[Sensor], there: Collection[str]) -> list[str]:
-    """What the sensors need of a recording and is not there, as "sensor/stream"."""
+    """Streams of the sensors that a recording lacks, as "sensor/stream"."""
     return [name for head, stream in streams(sensors) if (name := f"{head}/{stream}") not in there]
 
 

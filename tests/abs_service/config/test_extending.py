@@ -169,7 +169,7 @@ def rig_file(folder: Path) -> Path:
 
 
 def estimates_of(recording: Path) -> list[a.Estimate]:
-    """What was recorded."""
+    """The recorded messages."""
     return list(a.open_recording(recording).estimates())
 
 
@@ -242,7 +242,7 @@ def test_a_device_of_another_distribution_is_listed_and_its_addresses_checked(in
 
 
 def printed(environment: dict[str, str], program: str) -> list[Any]:
-    """What a program prints as JSON."""
+    """The output of a program, read as JSON."""
     command = [sys.executable, "-c", program]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=240, check=False)
     assert done.returncode == 0, done.stderr
