@@ -169,7 +169,7 @@ def rig_file(folder: Path) -> Path:
 
 
 def estimates_of(recording: Path) -> list[a.Estimate]:
-    """The recorded messages."""
+    """The estimates of a recording."""
     return list(a.open_recording(recording).estimates())
 
 
