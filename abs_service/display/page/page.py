@@ -3,6 +3,7 @@
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, redirect_stdout
+from dataclasses import dataclass
 from os import devnull
 
 import numpy as np
@@ -16,7 +17,8 @@ from abs_service.bus import keys
 from abs_service.display.page import pictures, words
 from abs_service.display.page.feed import Feed, rate_hz
 from abs_service.display.page.fields import FIELDS, ColorScale, MeshView
-from abs_service.display.page.panel import Panel
+from abs_service.display.page.panel import Button, Panel
+from abs_service.display.page.recording import Record, ask
 from abs_service.display.page.reinitialization import Reinitialization, Send
 from abs_service.display.page.scene import Scene
 from abs_service.tracking.tracker_log import points
@@ -35,6 +37,14 @@ NOTHING: pictures.Cloud = (np.empty((0, 3), np.float32), np.empty((0, 2), np.int
 HOST = "127.0.0.1"
 
 
+@dataclass(frozen=True, slots=True)
+class Commands:
+    """Commands to a rig: to a tracker, and to its recorder."""
+
+    reinitialize: Send
+    record: Record
+
+
 class Page:
     """One page of one rig.
 
@@ -44,18 +54,19 @@ class Page:
         port: to listen at; the next free one is taken.
         view_only: True leaves out everything that acts on the rig.
         references: by tracker, the sensor in whose depth image its object is detected.
-        send: asks a tracker to detect its object anew.
+        commands: to the rig.
     """
 
     def __init__(
-        self, feed: Feed, endpoint: str, port: int, view_only: bool, references: Mapping[str, str], send: Send
+        self, feed: Feed, endpoint: str, port: int, view_only: bool, references: Mapping[str, str], commands: Commands
     ) -> None:
         self._feed, self._endpoint, self._references = feed, endpoint, references
         with _quiet():
             self._server = viser.ViserServer(HOST, port, label="abs-service", verbose=False)
         self._scene = Scene(self._server)
-        self._panel = Panel(self._server, view_only, self._reinitialize, self._choose)
-        self._reinitialization = Reinitialization(feed, send, self._panel.answer)
+        self._panel = Panel(self._server, {} if view_only else self._buttons())
+        self._reinitialization = Reinitialization(feed, commands.reinitialize, self._panel.answer)
+        self._record = commands.record
         self._scales = {name: ColorScale(field) for name, field in FIELDS.items()}
         self._drawn: object = None
         self._view: MeshView | None = None
@@ -195,10 +206,22 @@ class Page:
             rows[f"lost, {health.component}"] = str(lost)
             if health.labels.get("file"):
                 rows["recording"] = health.labels["file"].removesuffix(".active")
+            if health.labels.get("trigger"):
+                rows["recorder"] = health.labels["trigger"]
         return rows
 
-    def _reinitialize(self, tracker: str) -> None:
-        self._reinitialization.ask(tracker)
+    def _buttons(self) -> dict[str, Button]:
+        def record(recording: bool) -> None:
+            self._panel.answer(ask(self._record, recording))
+
+        return {
+            "Reinitialise": Button(
+                "Detect the object again, with a new mesh", lambda: self._reinitialization.ask(self._panel.tracker)
+            ),
+            "Choose the object": Button("Detect the object that you click next", self._choose),
+            "Start recording": Button("Record from now on, with the seconds before", lambda: record(True)),
+            "Stop recording": Button("End the recording", lambda: record(False)),
+        }
 
     def _choose(self) -> None:
         """Waits for a click at the object."""

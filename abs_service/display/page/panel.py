@@ -1,6 +1,8 @@
 """The controls of the page: status in words, colours, images, plots, and buttons that act."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
 from html import escape
 
 import numpy as np
@@ -30,27 +32,26 @@ It connects again by itself; what it shows is old.</div>"""
 _STEPS = round(2 * MINUTE_S)
 
 
+@dataclass(frozen=True, slots=True)
+class Button:
+    """A button: its explanation, and what is called when it is pressed."""
+
+    hint: str
+    press: Callable[[], None]
+
+
 class Panel:
     """The panel beside the scene.
 
     Args:
         server: that serves it.
-        view_only: True leaves out everything that acts on the rig.
-        reinitialize: called with the tracker that is to detect its object anew.
-        choose: called when the next click in the scene chooses the object of the tracker.
+        buttons: what acts on the rig, by label.
     """
 
-    def __init__(
-        self,
-        server: viser.ViserServer,
-        view_only: bool,
-        reinitialize: Callable[[str], None],
-        choose: Callable[[], None],
-    ) -> None:
+    def __init__(self, server: viser.ViserServer, buttons: Mapping[str, Button]) -> None:
         gui = self._gui = server.gui
-        gui.configure_theme(
-            control_layout="fixed", control_width="large", dark_mode=True, show_logo=False, show_share_button=False
-        )
+        gui.main_panel.dock_right()
+        gui.configure_theme(control_width="large", dark_mode=True, show_logo=False, show_share_button=False)
         self._status, self._renewed = gui.add_html(""), 0
         self._tracker = gui.add_dropdown("Tracker", list[str](["–"]), visible=False)
         tabs = gui.add_tab_group()
@@ -60,11 +61,8 @@ class Panel:
             self._first = gui.add_checkbox("First pose", True)
             self._points = gui.add_checkbox("Measured points", True)
             self._cameras = gui.add_checkbox("Cameras", True)
-            if not view_only:
-                button = gui.add_button("Reinitialise", hint="Detect the object again, with a new mesh")
-                button.on_click(lambda _: reinitialize(self.tracker))
-                button = gui.add_button("Choose the object", hint="Detect the object that you click next")
-                button.on_click(lambda _: choose())
+            for label, button in buttons.items():
+                gui.add_button(label, hint=button.hint).on_click(partial(_press, button))
             self._answer = gui.add_markdown("", visible=False)
             self._table = gui.add_html("")
         self._image_tab = tabs.add_tab("Images")
@@ -196,6 +194,10 @@ def complete(columns: Sequence[np.ndarray]) -> tuple[np.ndarray, ...]:
 
 def _series(names: Iterable[str]) -> list[uplot.Series]:
     return [uplot.Series(label=name, stroke=color, width=2) for name, color in zip(names, _LINES)]
+
+
+def _press(button: Button, _: object) -> None:
+    button.press()
 
 
 def _set(html: viser.GuiHtmlHandle, content: str) -> None:
