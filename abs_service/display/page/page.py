@@ -18,6 +18,7 @@ from abs_service.display.page import pictures, words
 from abs_service.display.page.feed import Feed, rate_hz
 from abs_service.display.page.fields import FIELDS, ColorScale, MeshView
 from abs_service.display.page.panel import Button, Panel
+from abs_service.display.page.plots import plots
 from abs_service.display.page.recording import Record, ask
 from abs_service.display.page.reinitialization import Reinitialization, Send
 from abs_service.display.page.scene import Scene
@@ -163,7 +164,7 @@ class Page:
         self._panel.show_status(self._status(tracker))
         self._panel.show_legend(self._scales[self._panel.field].end)
         self._panel.show_table(self._table(tracker))
-        self._panel.show_plots(numbers, self._feed.now_s)
+        self._panel.show_plots(plots(numbers, self._feed.now_s))
         self._reinitialization.look()
 
     def _status(self, tracker: str) -> list[words.Words]:

@@ -9,9 +9,9 @@ import numpy as np
 import viser
 from viser import uplot
 
-from abs_service.display.page.feed import MINUTE_S, Numbers
 from abs_service.display.page.fields import FIELDS, PALETTES
 from abs_service.display.page.pictures import Picture
+from abs_service.display.page.plots import Curves, complete
 from abs_service.display.page.words import STALE_COLOR, Words
 
 _LINES = ("#3b82f6", "#f59e0b", "#10b981", "#ef4444", "#a78bfa")
@@ -27,9 +27,6 @@ _GONE = f"""<style>
 .abs-status {{ animation: abs-old 0s {GONE_S}s forwards }}
 </style><div class='abs-gone'><b>This page has lost its connection</b><br>Does abs-service still run?
 It connects again by itself; what it shows is old.</div>"""
-
-#: Columns of a plot: a point each half second.
-_STEPS = round(2 * MINUTE_S)
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +46,7 @@ class Panel:
     """
 
     def __init__(self, server: viser.ViserServer, buttons: Mapping[str, Button]) -> None:
-        gui = self._gui = server.gui
+        self._server, gui = server, server.gui
         gui.main_panel.dock_right()
         gui.configure_theme(control_width="large", dark_mode=True, show_logo=False, show_share_button=False)
         self._status, self._renewed = gui.add_html(""), 0
@@ -67,9 +64,8 @@ class Panel:
             self._table = gui.add_html("")
         self._image_tab = tabs.add_tab("Images")
         self._images: dict[str, viser.GuiImageHandle] = {}
-        with tabs.add_tab("Plots"):
-            self._plots = gui.add_folder("The last minute", expand_by_default=True)
-        self._lines: dict[str, tuple[tuple[str, ...], viser.GuiUplotHandle]] = {}
+        self._plot_tab = tabs.add_tab("Plots")
+        self._plots: dict[str, viser.GuiUplotHandle] = {}
 
     @property
     def tracker(self) -> str:
@@ -130,66 +126,27 @@ class Panel:
         shown = self._images.get(name)
         if shown is None:
             with self._image_tab:
-                self._images[name] = self._gui.add_image(picture, label=label, format="jpeg", jpeg_quality=80)
+                self._images[name] = self._server.gui.add_image(picture, label=label, format="jpeg", jpeg_quality=80)
             return
         shown.image = picture
         if shown.label != label:
             shown.label = label
 
-    def show_plots(self, numbers: Sequence[Numbers], now_s: float) -> None:
-        """Plots numbers of the last minute; each point is the mean of half a second."""
-        sensors = sorted({name for one in numbers for name in one.likelihoods})
-        curves = {
-            "latency [ms]": {"age": [one.age_ms for one in numbers], "search": [one.solve_ms for one in numbers]},
-            "estimates a second": {"rate": None},
-            "generations": {"generations": [one.generations for one in numbers]},
-            "log-likelihood of a vertex": {
-                name: [one.likelihoods.get(name, np.nan) for one in numbers] for name in sensors
-            },
-        }
-        times = np.array([one.t_s for one in numbers]) - now_s
-        for title, series in curves.items():
-            if series:
-                self._plot(title, tuple(series), [binned(times, values) for values in series.values()])
-
-    def _plot(self, title: str, names: tuple[str, ...], columns: list[np.ndarray]) -> None:
-        data = complete(columns)
-        known = self._lines.get(title)
-        if known is not None and known[0] == names:
-            known[1].data = data
-            return
-        if known is not None:
-            known[1].remove()
-        series = [uplot.Series(label="s"), *_series(names)]
-        axes = (uplot.Axis(stroke="#bbb"), uplot.Axis(stroke="#bbb"))
-        scales = {"x": uplot.Scale(time=False)}
-        with self._plots:
-            plot = self._gui.add_uplot(data, tuple(series), title=title, scales=scales, axes=axes, aspect=2.6)
-        self._lines[title] = names, plot
-
-
-def binned(times_s: np.ndarray, values: Sequence[float] | None) -> np.ndarray:
-    """Means of values in half seconds of the last minute, NaN where there are none; of None the rate [1/s].
-
-    Args:
-        times_s: of the values, before now (n,) [s], so negative.
-        values: (n,); NaN are left out.
-    """
-    index = np.floor((times_s + MINUTE_S) * _STEPS / MINUTE_S).astype(int)
-    number = np.ones(len(index)) if values is None else np.asarray(values, float)
-    kept = (index >= 0) & (index < _STEPS) & np.isfinite(number)
-    count = np.bincount(index[kept], minlength=_STEPS)
-    if values is None:
-        return count * _STEPS / MINUTE_S
-    total = np.bincount(index[kept], number[kept], minlength=_STEPS)
-    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
-
-
-def complete(columns: Sequence[np.ndarray]) -> tuple[np.ndarray, ...]:
-    """Times [s] and values of the half seconds in which every column has one: a plot cannot leave out values."""
-    times_s = np.linspace(-MINUTE_S, 0, _STEPS, endpoint=False) + 0.5 * MINUTE_S / _STEPS
-    kept = np.isfinite(columns).all(axis=0)
-    return times_s[kept], *(column[kept] for column in columns)
+    def show_plots(self, plots: Mapping[str, Curves]) -> None:
+        """Shows curves of the last minute by title."""
+        for title, curves in plots.items():
+            data, known = complete(list(curves.values())), self._plots.get(title)
+            series = uplot.Series(label="s"), *_series(curves)
+            if known is None:
+                with self._plot_tab:
+                    axes, scales = (uplot.Axis(stroke="#bbb"),) * 2, {"x": uplot.Scale(time=False)}
+                    add = self._server.gui.add_uplot
+                    self._plots[title] = add(data, series, title=title, scales=scales, axes=axes, aspect=2.6)
+                continue
+            with self._server.atomic():
+                if known.series != series:
+                    known.series = series
+                known.data = data
 
 
 def _series(names: Iterable[str]) -> list[uplot.Series]:

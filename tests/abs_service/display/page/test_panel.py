@@ -4,11 +4,13 @@ from contextlib import redirect_stdout
 from functools import partial
 from io import StringIO
 
+import numpy as np
 import pytest
 
 viser = pytest.importorskip("viser")
 
 from abs_service.display.page.panel import Button, Panel  # noqa: E402 - needs viser
+from abs_service.display.page.plots import STEPS  # noqa: E402 - needs viser
 
 
 @pytest.fixture
@@ -45,3 +47,19 @@ def test_buttons_are_those_that_are_given_and_act(server, pressed):
 def test_a_page_that_only_shows_has_none(server, pressed):
     Panel(server, {})
     assert pressed == {}
+
+
+def test_a_plot_shows_the_curves_that_it_is_given_last(server, monkeypatch):
+    drawn, add = [], server.gui.add_uplot
+
+    def spy(*arguments, **options):
+        drawn.append(add(*arguments, **options))
+        return drawn[-1]
+
+    monkeypatch.setattr(server.gui, "add_uplot", spy)
+    panel = Panel(server, {})
+    for name, value in (("Θ1", 1.0), ("Θ1", 2.0), ("Θ2", 3.0)):
+        panel.show_plots({"Θ": {name: np.full(STEPS, value)}})
+        (plot,) = drawn
+        assert [one["label"] for one in plot.series] == ["s", name]
+        assert (plot.data[1] == value).all()
