@@ -14,7 +14,7 @@ from absmsg.v1.health_pb2 import Health
 from numpy.typing import NDArray
 
 from abs_service.bus import keys
-from abs_service.display.page import pictures, words
+from abs_service.display.page import pictures, table, words
 from abs_service.display.page.feed import Feed, rate_hz
 from abs_service.display.page.fields import FIELDS, ColorScale, MeshView
 from abs_service.display.page.panel import Button, Panel
@@ -163,7 +163,7 @@ class Page:
         numbers = self._feed.numbers(tracker)
         self._panel.show_status(self._status(tracker))
         self._panel.show_legend(self._scales[self._panel.field].end)
-        self._panel.show_table(self._table(tracker))
+        self._panel.show_table(table.rows(self._feed, tracker))
         self._panel.show_plots(plots(numbers, self._feed.now_s))
         self._reinitialization.look()
 
@@ -191,25 +191,6 @@ class Page:
         """Rate of the fastest depth stream, which estimates should keep up with [1/s]; 0 if unknown."""
         depth = [topic for topic in self._feed.streams() if topic.endswith("/depth/image")]
         return max((self._feed.image_rate_hz(topic) for topic in depth), default=0.0)
-
-    def _table(self, tracker: str) -> dict[str, str]:
-        numbers = self._feed.numbers(tracker)
-        rows = {
-            "estimates": f"{rate_hz(numbers, self._feed.now_s):.1f} Hz, {sum(one.skipped for one in numbers)} skipped"
-        }
-        if numbers:
-            last = numbers[-1]
-            rows["latency"] = f"{last.age_ms:.0f} ms, search {last.solve_ms:.0f} ms, {last.generations} generations"
-            rows |= {f"log-likelihood, {name}": f"{value:.2f}" for name, value in last.likelihoods.items()}
-        for health, _ in self._feed.healths():
-            losses = ("dropped", "lost", "malformed", "unused", "skipped")
-            lost = sum(number for name, number in health.counters.items() if name.partition(".")[0] in losses)
-            rows[f"lost, {health.component}"] = str(lost)
-            if health.labels.get("file"):
-                rows["recording"] = health.labels["file"].removesuffix(".active")
-            if health.labels.get("trigger"):
-                rows["recorder"] = health.labels["trigger"]
-        return rows
 
     def _buttons(self) -> dict[str, Button]:
         def record(recording: bool) -> None:
