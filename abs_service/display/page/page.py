@@ -3,7 +3,7 @@
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, redirect_stdout
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import devnull
 
 import numpy as np
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from abs_service.bus import keys
 from abs_service.display.page import pictures, table, words
 from abs_service.display.page.feed import Feed, rate_hz
-from abs_service.display.page.fields import FIELDS, ColorScale, MeshView
+from abs_service.display.page.fields import FIELDS, ColorScale, MeshView, residual
 from abs_service.display.page.panel import Button, Panel
 from abs_service.display.page.plots import plots
 from abs_service.display.page.recording import Record, ask
@@ -156,6 +156,19 @@ class Page:
             name = topic.removesuffix("/image")
             state = f"{words.age(age_s)} old" if stale else f"{self._feed.image_rate_hz(topic):.1f} Hz"
             self._panel.show_image(name, f"{name}, {state}", drawn)
+            if frame.kind == Kind.DEPTH:
+                self._draw_residual(name, frame, camera, image, stale)
+
+    def _draw_residual(self, stream: str, frame: Frame, camera: Camera, image: pictures.Picture, stale: bool) -> None:
+        """Draws the residual of the mesh over a depth image, while it is wanted."""
+        name, view = f"{stream} residual", self._view
+        if not self._panel.shows_residual or stale or view is None:
+            self._panel.hide_image(name)
+            return
+        scale = self._scales["residual"]
+        view = replace(view, measured=pictures.radial(frame, camera), camera=camera)
+        drawn = pictures.with_colors(image, camera, view.vertices, view.faces, residual(view), scale.colors)
+        self._panel.show_image(name, f"{stream}, residual up to ± {scale.end:g} mm", drawn)
 
     def _write(self) -> None:
         self._panel.offer(self._feed.trackers())

@@ -63,6 +63,8 @@ class Panel:
             self._answer = gui.add_markdown("", visible=False)
             self._table = gui.add_html("")
         self._image_tab = tabs.add_tab("Images")
+        with self._image_tab:
+            self._residual = gui.add_checkbox("Residual", False, hint="Measured minus expected distance, in colours")
         self._images: dict[str, viser.GuiImageHandle] = {}
         self._plot_tab = tabs.add_tab("Plots")
         self._plots: dict[str, viser.GuiUplotHandle] = {}
@@ -76,6 +78,11 @@ class Panel:
     def field(self) -> str:
         """The quantity that the mesh's colours show, a key of `FIELDS`."""
         return self._field.value
+
+    @property
+    def shows_residual(self) -> bool:
+        """Check box for the residual's images: True to draw them."""
+        return self._residual.value
 
     @property
     def shows(self) -> tuple[bool, bool, bool]:
@@ -131,6 +138,11 @@ class Panel:
         shown.image = picture
         if shown.label != label:
             shown.label = label
+
+    def hide_image(self, name: str) -> None:
+        """Takes an image away, if it is shown."""
+        if (shown := self._images.pop(name, None)) is not None:
+            shown.remove()
 
     def show_plots(self, plots: Mapping[str, Curves]) -> None:
         """Shows curves of the last minute by title."""

@@ -49,17 +49,36 @@ def test_a_page_that_only_shows_has_none(server, pressed):
     assert pressed == {}
 
 
-def test_a_plot_shows_the_curves_that_it_is_given_last(server, monkeypatch):
-    drawn, add = [], server.gui.add_uplot
+@pytest.fixture
+def added(server, monkeypatch):
+    """The plots and images of a page, in the order in which they were added."""
+    found = []
 
-    def spy(*arguments, **options):
-        drawn.append(add(*arguments, **options))
-        return drawn[-1]
+    def spy(add, *arguments, **options):
+        found.append(add(*arguments, **options))
+        return found[-1]
 
-    monkeypatch.setattr(server.gui, "add_uplot", spy)
+    for name in ("add_uplot", "add_image"):
+        monkeypatch.setattr(server.gui, name, partial(spy, getattr(server.gui, name)))
+    return found
+
+
+def test_a_plot_shows_the_curves_that_it_is_given_last(server, added):
     panel = Panel(server, {})
     for name, value in (("Θ1", 1.0), ("Θ1", 2.0), ("Θ2", 3.0)):
         panel.show_plots({"Θ": {name: np.full(STEPS, value)}})
-        (plot,) = drawn
+        plot = added[-1]
         assert [one["label"] for one in plot.series] == ["s", name]
         assert (plot.data[1] == value).all()
+    assert len(added) == 1
+
+
+def test_an_image_is_updated_and_can_be_taken_away_and_shown_again(server, added):
+    panel, image = Panel(server, {}), np.zeros((4, 4, 3), np.uint8)
+    assert not panel.shows_residual
+    panel.hide_image("residual")
+    for label in ("1 mm", "2 mm"):
+        panel.show_image("residual", label, image)
+    panel.hide_image("residual")
+    panel.show_image("residual", "3 mm", image)
+    assert [one.label for one in added] == ["2 mm", "3 mm"]
