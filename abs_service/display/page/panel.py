@@ -54,14 +54,14 @@ class Panel:
         tabs = gui.add_tab_group()
         with tabs.add_tab("View"):
             self._field = gui.add_dropdown("Colour of the mesh", tuple(FIELDS))
-            self._legend = gui.add_html("")
+            self._legend = gui.add_image(np.zeros((16, 512, 3), np.uint8))
             self._first = gui.add_checkbox("First pose", True)
             self._points = gui.add_checkbox("Measured points", True)
             self._cameras = gui.add_checkbox("Cameras", True)
             for label, button in buttons.items():
                 gui.add_button(label, hint=button.hint).on_click(partial(_press, button))
             self._answer = gui.add_markdown("", visible=False)
-            self._table = gui.add_html("")
+            self._table = gui.add_markdown("")
         self._image_tab = tabs.add_tab("Images")
         with self._image_tab:
             self._residual = gui.add_checkbox("Residual", False, hint="Measured minus expected distance, in colours")
@@ -108,21 +108,19 @@ class Panel:
     def show_legend(self, end: float) -> None:
         """Shows the colours of the mesh; `end` has the last one."""
         field = FIELDS[self.field]
-        chosen = PALETTES[field.signed][np.linspace(0, 255, 9).astype(int)]
-        stops = ",".join(f"rgb({r},{g},{b})" for r, g, b in chosen)
-        bar = f"<div style='height:10px;border-radius:3px;background:linear-gradient(to right,{stops})'></div>"
-        names = (f"−{end:g}", "0", f"+{end:g} {field.unit}") if field.signed else ("0", "", f"{end:g} {field.unit}")
-        ends = "".join(f"<span>{name}</span>" for name in names)
-        row = f"<div style='display:flex;justify-content:space-between;font-size:.8em'>{ends}</div>"
-        _set(self._legend, f"<div style='margin:2px 12px'>{bar}{row}</div>")
+        label = f"−{end:g} … +{end:g} {field.unit}" if field.signed else f"0 … {end:g} {field.unit}"
+        if self._legend.label != label:
+            self._legend.label, self._legend.image = (
+                label,
+                np.tile(PALETTES[field.signed].repeat(2, axis=0), (16, 1, 1)),
+            )
 
     def show_table(self, rows: Mapping[str, str]) -> None:
         """Shows numbers by name."""
-        cells = "".join(
-            f"<tr><td style='opacity:.7;padding-right:10px'>{escape(name)}</td><td>{escape(text)}</td></tr>"
-            for name, text in rows.items()
-        )
-        _set(self._table, f"<table style='font-size:.85em;margin:4px 12px'>{cells}</table>")
+        cells = (" | ".join(escape(part).replace("|", "\\|") for part in row) for row in rows.items())
+        content = "\n".join(["| | |", "|-|-|", *(f"| {row} |" for row in cells)])
+        if self._table.content != content:
+            self._table.content = content
 
     def answer(self, text: str) -> None:
         """Shows the result of an action."""
@@ -167,8 +165,3 @@ def _series(names: Iterable[str]) -> list[uplot.Series]:
 
 def _press(button: Button, _: object) -> None:
     button.press()
-
-
-def _set(html: viser.GuiHtmlHandle, content: str) -> None:
-    if html.content != content:
-        html.content = content

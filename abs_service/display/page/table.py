@@ -2,7 +2,7 @@
 
 import math
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 from absmsg.v1.deformation_state_pb2 import DeformationState
 from absmsg.v1.health_pb2 import Health
@@ -34,14 +34,21 @@ def rows(feed: Feed, tracker: str) -> dict[str, str]:
         for sensor in state.sensors:
             parts = _age(state, sensor, since_s), _likelihood(sensor), _losses(on_the_way, sensor.sensor)
             found[sensor.sensor] = ", ".join(filter(None, parts))
+    found["lost"] = ", ".join(f"{number} {name}" for name, number in _lost(healths)) or "nothing"
     for health in healths:
-        lost = sum(number for name, number in health.counters.items() if name.partition(".")[0] in LOSSES)
-        found[f"lost, {health.component}"] = str(lost)
         if health.labels.get("file"):
             found["recording"] = health.labels["file"].removesuffix(".active")
         if health.labels.get("trigger"):
             found["recorder"] = health.labels["trigger"]
     return found
+
+
+def _lost(healths: Iterable[Health]) -> Iterator[tuple[str, int]]:
+    """Components that have lost something, and how much."""
+    for health in healths:
+        lost = sum(number for name, number in health.counters.items() if name.partition(".")[0] in LOSSES)
+        if lost:
+            yield health.component, lost
 
 
 def _age(state: DeformationState, sensor: DeformationState.Sensor, since_s: float) -> str:

@@ -9,6 +9,7 @@ import pytest
 
 viser = pytest.importorskip("viser")
 
+from abs_service.display.page.fields import PALETTES  # noqa: E402 - needs viser
 from abs_service.display.page.panel import Button, Panel  # noqa: E402 - needs viser
 from abs_service.display.page.plots import STEPS  # noqa: E402 - needs viser
 
@@ -51,14 +52,14 @@ def test_a_page_that_only_shows_has_none(server, pressed):
 
 @pytest.fixture
 def added(server, monkeypatch):
-    """The plots and images of a page, in the order in which they were added."""
+    """The plots, images and texts of a page, in the order in which they were added."""
     found = []
 
     def spy(add, *arguments, **options):
         found.append(add(*arguments, **options))
         return found[-1]
 
-    for name in ("add_uplot", "add_image"):
+    for name in ("add_uplot", "add_image", "add_markdown"):
         monkeypatch.setattr(server.gui, name, partial(spy, getattr(server.gui, name)))
     return found
 
@@ -70,7 +71,7 @@ def test_a_plot_shows_the_curves_that_it_is_given_last(server, added):
         plot = added[-1]
         assert [one["label"] for one in plot.series] == ["s", name]
         assert (plot.data[1] == value).all()
-    assert len(added) == 1
+    assert added.count(plot) == 1
 
 
 def test_an_image_is_updated_and_can_be_taken_away_and_shown_again(server, added):
@@ -81,4 +82,18 @@ def test_an_image_is_updated_and_can_be_taken_away_and_shown_again(server, added
         panel.show_image("residual", label, image)
     panel.hide_image("residual")
     panel.show_image("residual", "3 mm", image)
-    assert [one.label for one in added] == ["2 mm", "3 mm"]
+    assert [one.label for one in added if isinstance(one, viser.GuiImageHandle)][-2:] == ["2 mm", "3 mm"]
+
+
+def test_numbers_are_a_table_whose_cells_hold_any_text(server, added):
+    panel = Panel(server, {})
+    panel.show_table({"estimates": "30 Hz", "a|b": "<b>"})
+    rows = [one.content for one in added if isinstance(one, viser.GuiMarkdownHandle) and one.content]
+    assert rows == ["| | |\n|-|-|\n| estimates | 30 Hz |\n| a\\|b | &lt;b&gt; |"]
+
+
+def test_the_legend_has_the_colours_and_the_end_of_the_chosen_quantity(server, added):
+    Panel(server, {}).show_legend(5.0)
+    (legend,) = added[:1]
+    assert legend.label == "0 … 5 mm"
+    assert (legend.image[0, ::2] == PALETTES[False]).all()
