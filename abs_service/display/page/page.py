@@ -29,6 +29,9 @@ from drivers.contract.frame import Frame, Kind
 #: Periods of the page: mesh, points and images, words and plots [s]; without a browser [s].
 MESH_S, IMAGES_S, WORDS_S, IDLE_S = 1 / 30, 0.25, 1.0, 0.5
 
+#: A residual compares a mesh with images of its exposure: those at most so far from it [ns].
+SAME_NS = 20_000_000
+
 #: A click means the first point that is so near to its ray, in distances between neighbouring points.
 REACH = 1.5
 #: The points of a sensor that has delivered none.
@@ -164,6 +167,8 @@ class Page:
         name, view = f"{stream} residual", self._view
         if not self._panel.shows_residual or stale or view is None:
             self._panel.hide_image(name)
+            return
+        if abs(frame.t_host_ns - self._exposure_ns) > SAME_NS:
             return
         scale = self._scales["residual"]
         view = replace(view, measured=pictures.radial(frame, camera), camera=camera)
