@@ -109,6 +109,7 @@ def test_the_page_shows_a_mesh_that_moves_acts_and_connects_again(run, rig_file,
     page.get_by_role("button", name="Start recording").click(force=True)
     _says(page, "it records as long as it runs")
     page.get_by_role("tab", name="Images").click(force=True)
+    page.get_by_text("Residual", exact=True).wait_for(timeout=30_000)
     page.locator("input[type=checkbox]:visible").first.click(force=True)
     _says(page, "residual up to")
     page.get_by_role("tab", name="Plots").click(force=True)
