@@ -106,6 +106,15 @@ def test_the_page_shows_a_mesh_that_moves_acts_and_connects_again(run, rig_file,
     assert f'type = "seed"\npixel = [{column}, {row}]\n' in done.stdout
     wait_until(lambda: listener.states()[-1][1].mesh_version > version, 20, "a new mesh from the command line")
 
+    page.get_by_role("button", name="Start recording").click(force=True)
+    _says(page, "it records as long as it runs")
+    page.get_by_role("tab", name="Images").click(force=True)
+    page.get_by_text("Residual", exact=True).wait_for(timeout=30_000)
+    page.locator("input[type=checkbox]:visible").first.click(force=True)
+    _says(page, "residual up to")
+    page.get_by_role("tab", name="Plots").click(force=True)
+    _says(page, "components that move most")
+
     assert not page.get_by_text("lost its connection").first.is_visible()
     server.send_signal(signal.SIGTERM)
     assert server.wait(20) == 0
@@ -129,4 +138,5 @@ def test_a_page_that_only_shows_has_no_buttons(run, rig_file, launch, browser, p
     launch("view", rig_file, "--port", port, "--view-only")
     page, _ = _opened(browser, port)
     _says(page, "Tracking")
-    assert page.get_by_role("button", name="Reinitialise").count() == 0
+    for name in ("Reinitialise", "Choose the object", "Start recording", "Stop recording"):
+        assert page.get_by_role("button", name=name).count() == 0

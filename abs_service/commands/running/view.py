@@ -21,7 +21,7 @@ from abs_service.wire import commands
 
 PORT = 8080
 
-#: Time that a tracker has to answer a command [s].
+#: Time that a tracker or the recorder has to answer a command [s].
 ANSWER_S = 3.0
 
 
@@ -50,7 +50,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Serves the page until SIGTERM or SIGINT."""
     check()
     from abs_service.display.page.feed import Feed  # noqa: PLC0415 - needs viser
-    from abs_service.display.page.page import Page  # noqa: PLC0415 - needs viser
+    from abs_service.display.page.page import Commands, Page  # noqa: PLC0415 - needs viser
 
     rig = rig_process.load_config(arguments)
     stop = rig_process.stop_on_signals()
@@ -58,13 +58,17 @@ def run(arguments: argparse.Namespace) -> int:
     with rig_process.open_bus(rig, arguments, "viewer", "operator") as bus:
         health = Health(bus, "view", headers)
 
-        def send(tracker: str, seed: commands.Pixel | None) -> CommandAnswer | None:
+        def reinitialize(tracker: str, seed: commands.Pixel | None) -> CommandAnswer | None:
             return commands.reinitialize(bus, tracker, headers, ANSWER_S, seed)
+
+        def record(recording: bool) -> CommandAnswer | None:
+            return commands.record(bus, headers, recording, ANSWER_S)
 
         feed = Feed(bus, time.monotonic_ns)
         endpoint = arguments.connect or rig.bus.endpoint
         references = {name: rig.reference(name)[0] for name in rig.trackers}
-        page = Page(feed, endpoint, arguments.port, arguments.view_only, references, send)
+        to_rig = Commands(reinitialize, record)
+        page = Page(feed, endpoint, arguments.port, arguments.view_only, references, to_rig)
         print(f"live page: {page.url}", flush=True)
         try:
             page.run(stop, health.tick)

@@ -7,12 +7,14 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import TypeVar
 
+import numpy as np
 from absmsg.v1.deformation_state_pb2 import DeformationState
 from absmsg.v1.deformed_mesh_pb2 import DeformedMesh, MeshTopology
 from absmsg.v1.frame_info_pb2 import FrameInfo
 from absmsg.v1.health_pb2 import Health
 from absmsg.v1.sensor_model_pb2 import SensorModel
 from google.protobuf.message import DecodeError, Message
+from numpy.typing import NDArray
 
 from abs_service.bus import keys
 from abs_service.bus.contract import Bus, Sample, Subscription
@@ -30,9 +32,19 @@ _PATTERNS = ("health/**", keys.state("*"), keys.mesh("*"), keys.topology("*"), k
 _MESSAGES: tuple[type[Message], ...] = (Health, DeformationState, DeformedMesh, MeshTopology, SensorModel)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Numbers:
-    """Numbers of one estimate: arrival [s], ages [ms], effort, and the log-likelihood of a vertex by sensor."""
+    """Numbers of one estimate.
+
+    Attributes:
+        t_s: arrival [s].
+        age_ms, solve_ms: age, and time of the search [ms].
+        generations, skipped: effort, and frame sets passed over.
+        likelihoods: log-likelihood of a vertex by sensor.
+        deviation_mm: σ of a vertex, median over the mesh [mm]; NaN if it is unknown.
+        model_id: theta is comparable between equal ones.
+        theta: parameters (d,) of the model.
+    """
 
     t_s: float
     age_ms: float
@@ -40,6 +52,9 @@ class Numbers:
     generations: int
     skipped: int
     likelihoods: dict[str, float]
+    deviation_mm: float
+    model_id: str
+    theta: NDArray[np.float32]
 
 
 class Feed:
@@ -183,7 +198,10 @@ def rate_hz(numbers: Iterable[Numbers], now_s: float, seconds: float = 3.0) -> f
 
 def _numbers(state: DeformationState, t_s: float) -> Numbers:
     likelihoods = {one.sensor: one.mean_log_likelihood for one in state.sensors if not one.missing and one.samples}
-    return Numbers(t_s, state.age_ms, state.solve_ms, state.generations, state.skipped, likelihoods)
+    deviation_mm = 1e3 * state.deviation_m if state.covariance_valid else float("nan")
+    theta = np.array(state.theta, np.float32)
+    effort = state.age_ms, state.solve_ms, state.generations, state.skipped
+    return Numbers(t_s, *effort, likelihoods, deviation_mm, state.model_id, theta)
 
 
 def _belong(topology: MeshTopology, mesh: DeformedMesh) -> bool:

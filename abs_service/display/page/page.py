@@ -3,6 +3,7 @@
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, redirect_stdout
+from dataclasses import dataclass, replace
 from os import devnull
 
 import numpy as np
@@ -13,10 +14,12 @@ from absmsg.v1.health_pb2 import Health
 from numpy.typing import NDArray
 
 from abs_service.bus import keys
-from abs_service.display.page import pictures, words
+from abs_service.display.page import pictures, table, words
 from abs_service.display.page.feed import Feed, rate_hz
-from abs_service.display.page.fields import FIELDS, ColorScale, MeshView
-from abs_service.display.page.panel import Panel
+from abs_service.display.page.fields import FIELDS, ColorScale, MeshView, residual
+from abs_service.display.page.panel import Button, Panel
+from abs_service.display.page.plots import plots
+from abs_service.display.page.recording import Record, ask
 from abs_service.display.page.reinitialization import Reinitialization, Send
 from abs_service.display.page.scene import Scene
 from abs_service.tracking.tracker_log import points
@@ -26,6 +29,9 @@ from drivers.contract.frame import Frame, Kind
 #: Periods of the page: mesh, points and images, words and plots [s]; without a browser [s].
 MESH_S, IMAGES_S, WORDS_S, IDLE_S = 1 / 30, 0.25, 1.0, 0.5
 
+#: A residual compares a mesh with images of its exposure: those at most so far from it [ns].
+SAME_NS = 20_000_000
+
 #: A click means the first point that is so near to its ray, in distances between neighbouring points.
 REACH = 1.5
 #: The points of a sensor that has delivered none.
@@ -33,6 +39,14 @@ NOTHING: pictures.Cloud = (np.empty((0, 3), np.float32), np.empty((0, 2), np.int
 
 #: The page listens here only.
 HOST = "127.0.0.1"
+
+
+@dataclass(frozen=True, slots=True)
+class Commands:
+    """Commands to a rig: to a tracker, and to its recorder."""
+
+    reinitialize: Send
+    record: Record
 
 
 class Page:
@@ -44,18 +58,19 @@ class Page:
         port: to listen at; the next free one is taken.
         view_only: True leaves out everything that acts on the rig.
         references: by tracker, the sensor in whose depth image its object is detected.
-        send: asks a tracker to detect its object anew.
+        commands: to the rig.
     """
 
     def __init__(
-        self, feed: Feed, endpoint: str, port: int, view_only: bool, references: Mapping[str, str], send: Send
+        self, feed: Feed, endpoint: str, port: int, view_only: bool, references: Mapping[str, str], commands: Commands
     ) -> None:
         self._feed, self._endpoint, self._references = feed, endpoint, references
         with _quiet():
             self._server = viser.ViserServer(HOST, port, label="abs-service", verbose=False)
         self._scene = Scene(self._server)
-        self._panel = Panel(self._server, view_only, self._reinitialize, self._choose)
-        self._reinitialization = Reinitialization(feed, send, self._panel.answer)
+        self._panel = Panel(self._server, {} if view_only else self._buttons())
+        self._reinitialization = Reinitialization(feed, commands.reinitialize, self._panel.answer)
+        self._record = commands.record
         self._scales = {name: ColorScale(field) for name, field in FIELDS.items()}
         self._drawn: object = None
         self._view: MeshView | None = None
@@ -144,6 +159,21 @@ class Page:
             name = topic.removesuffix("/image")
             state = f"{words.age(age_s)} old" if stale else f"{self._feed.image_rate_hz(topic):.1f} Hz"
             self._panel.show_image(name, f"{name}, {state}", drawn)
+            if frame.kind == Kind.DEPTH:
+                self._draw_residual(name, frame, camera, image, stale)
+
+    def _draw_residual(self, stream: str, frame: Frame, camera: Camera, image: pictures.Picture, stale: bool) -> None:
+        """Draws the residual of the mesh over a depth image, while it is wanted."""
+        name, view = f"{stream} residual", self._view
+        if not self._panel.shows_residual or stale or view is None:
+            self._panel.hide_image(name)
+            return
+        if abs(frame.t_host_ns - self._exposure_ns) > SAME_NS:
+            return
+        scale = self._scales["residual"]
+        view = replace(view, measured=pictures.radial(frame, camera), camera=camera)
+        drawn = pictures.with_colors(image, camera, view.vertices, view.faces, residual(view), scale.colors)
+        self._panel.show_image(name, f"{stream}, residual up to ± {scale.end:g} mm", drawn)
 
     def _write(self) -> None:
         self._panel.offer(self._feed.trackers())
@@ -151,8 +181,8 @@ class Page:
         numbers = self._feed.numbers(tracker)
         self._panel.show_status(self._status(tracker))
         self._panel.show_legend(self._scales[self._panel.field].end)
-        self._panel.show_table(self._table(tracker))
-        self._panel.show_plots(numbers, self._feed.now_s)
+        self._panel.show_table(table.rows(self._feed, tracker))
+        self._panel.show_plots(plots(numbers, self._feed.now_s))
         self._reinitialization.look()
 
     def _status(self, tracker: str) -> list[words.Words]:
@@ -180,25 +210,18 @@ class Page:
         depth = [topic for topic in self._feed.streams() if topic.endswith("/depth/image")]
         return max((self._feed.image_rate_hz(topic) for topic in depth), default=0.0)
 
-    def _table(self, tracker: str) -> dict[str, str]:
-        numbers = self._feed.numbers(tracker)
-        rows = {
-            "estimates": f"{rate_hz(numbers, self._feed.now_s):.1f} Hz, {sum(one.skipped for one in numbers)} skipped"
-        }
-        if numbers:
-            last = numbers[-1]
-            rows["latency"] = f"{last.age_ms:.0f} ms, search {last.solve_ms:.0f} ms, {last.generations} generations"
-            rows |= {f"log-likelihood, {name}": f"{value:.2f}" for name, value in last.likelihoods.items()}
-        for health, _ in self._feed.healths():
-            losses = ("dropped", "lost", "malformed", "unused", "skipped")
-            lost = sum(number for name, number in health.counters.items() if name.partition(".")[0] in losses)
-            rows[f"lost, {health.component}"] = str(lost)
-            if health.labels.get("file"):
-                rows["recording"] = health.labels["file"].removesuffix(".active")
-        return rows
+    def _buttons(self) -> dict[str, Button]:
+        def record(recording: bool) -> None:
+            self._panel.answer(ask(self._record, recording))
 
-    def _reinitialize(self, tracker: str) -> None:
-        self._reinitialization.ask(tracker)
+        return {
+            "Reinitialise": Button(
+                "Detect the object again, with a new mesh", lambda: self._reinitialization.ask(self._panel.tracker)
+            ),
+            "Choose the object": Button("Detect the object that you click next", self._choose),
+            "Start recording": Button("Record from now on, with the seconds before", lambda: record(True)),
+            "Stop recording": Button("End the recording", lambda: record(False)),
+        }
 
     def _choose(self) -> None:
         """Waits for a click at the object."""

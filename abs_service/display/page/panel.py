@@ -1,15 +1,17 @@
 """The controls of the page: status in words, colours, images, plots, and buttons that act."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
 from html import escape
 
 import numpy as np
 import viser
 from viser import uplot
 
-from abs_service.display.page.feed import MINUTE_S, Numbers
 from abs_service.display.page.fields import FIELDS, PALETTES
 from abs_service.display.page.pictures import Picture
+from abs_service.display.page.plots import Curves, complete
 from abs_service.display.page.words import STALE_COLOR, Words
 
 _LINES = ("#3b82f6", "#f59e0b", "#10b981", "#ef4444", "#a78bfa")
@@ -26,8 +28,13 @@ _GONE = f"""<style>
 </style><div class='abs-gone'><b>This page has lost its connection</b><br>Does abs-service still run?
 It connects again by itself; what it shows is old.</div>"""
 
-#: Columns of a plot: a point each half second.
-_STEPS = round(2 * MINUTE_S)
+
+@dataclass(frozen=True, slots=True)
+class Button:
+    """A button: its explanation, and what is called when it is pressed."""
+
+    hint: str
+    press: Callable[[], None]
 
 
 class Panel:
@@ -35,43 +42,32 @@ class Panel:
 
     Args:
         server: that serves it.
-        view_only: True leaves out everything that acts on the rig.
-        reinitialize: called with the tracker that is to detect its object anew.
-        choose: called when the next click in the scene chooses the object of the tracker.
+        buttons: what acts on the rig, by label.
     """
 
-    def __init__(
-        self,
-        server: viser.ViserServer,
-        view_only: bool,
-        reinitialize: Callable[[str], None],
-        choose: Callable[[], None],
-    ) -> None:
-        gui = self._gui = server.gui
-        gui.configure_theme(
-            control_layout="fixed", control_width="large", dark_mode=True, show_logo=False, show_share_button=False
-        )
+    def __init__(self, server: viser.ViserServer, buttons: Mapping[str, Button]) -> None:
+        self._server, gui = server, server.gui
+        gui.main_panel.dock_right()
+        gui.configure_theme(control_width="large", dark_mode=True, show_logo=False, show_share_button=False)
         self._status, self._renewed = gui.add_html(""), 0
         self._tracker = gui.add_dropdown("Tracker", list[str](["–"]), visible=False)
         tabs = gui.add_tab_group()
         with tabs.add_tab("View"):
             self._field = gui.add_dropdown("Colour of the mesh", tuple(FIELDS))
-            self._legend = gui.add_html("")
+            self._legend = gui.add_image(np.zeros((16, 512, 3), np.uint8))
             self._first = gui.add_checkbox("First pose", True)
             self._points = gui.add_checkbox("Measured points", True)
             self._cameras = gui.add_checkbox("Cameras", True)
-            if not view_only:
-                button = gui.add_button("Reinitialise", hint="Detect the object again, with a new mesh")
-                button.on_click(lambda _: reinitialize(self.tracker))
-                button = gui.add_button("Choose the object", hint="Detect the object that you click next")
-                button.on_click(lambda _: choose())
+            for label, button in buttons.items():
+                gui.add_button(label, hint=button.hint).on_click(partial(_press, button))
             self._answer = gui.add_markdown("", visible=False)
-            self._table = gui.add_html("")
+            self._table = gui.add_markdown("")
         self._image_tab = tabs.add_tab("Images")
+        with self._image_tab:
+            self._residual = gui.add_checkbox("Residual", False, hint="Measured minus expected distance, in colours")
         self._images: dict[str, viser.GuiImageHandle] = {}
-        with tabs.add_tab("Plots"):
-            self._plots = gui.add_folder("The last minute", expand_by_default=True)
-        self._lines: dict[str, tuple[tuple[str, ...], viser.GuiUplotHandle]] = {}
+        self._plot_tab = tabs.add_tab("Plots")
+        self._plots: dict[str, viser.GuiUplotHandle] = {}
 
     @property
     def tracker(self) -> str:
@@ -82,6 +78,11 @@ class Panel:
     def field(self) -> str:
         """The quantity that the mesh's colours show, a key of `FIELDS`."""
         return self._field.value
+
+    @property
+    def shows_residual(self) -> bool:
+        """Check box for the residual's images: True to draw them."""
+        return self._residual.value
 
     @property
     def shows(self) -> tuple[bool, bool, bool]:
@@ -107,21 +108,19 @@ class Panel:
     def show_legend(self, end: float) -> None:
         """Shows the colours of the mesh; `end` has the last one."""
         field = FIELDS[self.field]
-        chosen = PALETTES[field.signed][np.linspace(0, 255, 9).astype(int)]
-        stops = ",".join(f"rgb({r},{g},{b})" for r, g, b in chosen)
-        bar = f"<div style='height:10px;border-radius:3px;background:linear-gradient(to right,{stops})'></div>"
-        names = (f"−{end:g}", "0", f"+{end:g} {field.unit}") if field.signed else ("0", "", f"{end:g} {field.unit}")
-        ends = "".join(f"<span>{name}</span>" for name in names)
-        row = f"<div style='display:flex;justify-content:space-between;font-size:.8em'>{ends}</div>"
-        _set(self._legend, f"<div style='margin:2px 12px'>{bar}{row}</div>")
+        label = f"−{end:g} … +{end:g} {field.unit}" if field.signed else f"0 … {end:g} {field.unit}"
+        if self._legend.label != label:
+            self._legend.label, self._legend.image = (
+                label,
+                np.tile(PALETTES[field.signed].repeat(2, axis=0), (16, 1, 1)),
+            )
 
     def show_table(self, rows: Mapping[str, str]) -> None:
         """Shows numbers by name."""
-        cells = "".join(
-            f"<tr><td style='opacity:.7;padding-right:10px'>{escape(name)}</td><td>{escape(text)}</td></tr>"
-            for name, text in rows.items()
-        )
-        _set(self._table, f"<table style='font-size:.85em;margin:4px 12px'>{cells}</table>")
+        cells = (" | ".join(escape(part).replace("|", "\\|") for part in row) for row in rows.items())
+        content = "\n".join(["| | |", "|-|-|", *(f"| {row} |" for row in cells)])
+        if self._table.content != content:
+            self._table.content = content
 
     def answer(self, text: str) -> None:
         """Shows the result of an action."""
@@ -132,72 +131,37 @@ class Panel:
         shown = self._images.get(name)
         if shown is None:
             with self._image_tab:
-                self._images[name] = self._gui.add_image(picture, label=label, format="jpeg", jpeg_quality=80)
+                self._images[name] = self._server.gui.add_image(picture, label=label, format="jpeg", jpeg_quality=80)
             return
         shown.image = picture
         if shown.label != label:
             shown.label = label
 
-    def show_plots(self, numbers: Sequence[Numbers], now_s: float) -> None:
-        """Plots numbers of the last minute; each point is the mean of half a second."""
-        sensors = sorted({name for one in numbers for name in one.likelihoods})
-        curves = {
-            "latency [ms]": {"age": [one.age_ms for one in numbers], "search": [one.solve_ms for one in numbers]},
-            "estimates a second": {"rate": None},
-            "generations": {"generations": [one.generations for one in numbers]},
-            "log-likelihood of a vertex": {
-                name: [one.likelihoods.get(name, np.nan) for one in numbers] for name in sensors
-            },
-        }
-        times = np.array([one.t_s for one in numbers]) - now_s
-        for title, series in curves.items():
-            if series:
-                self._plot(title, tuple(series), [binned(times, values) for values in series.values()])
+    def hide_image(self, name: str) -> None:
+        """Takes an image away, if it is shown."""
+        if (shown := self._images.pop(name, None)) is not None:
+            shown.remove()
 
-    def _plot(self, title: str, names: tuple[str, ...], columns: list[np.ndarray]) -> None:
-        data = complete(columns)
-        known = self._lines.get(title)
-        if known is not None and known[0] == names:
-            known[1].data = data
-            return
-        if known is not None:
-            known[1].remove()
-        series = [uplot.Series(label="s"), *_series(names)]
-        axes = (uplot.Axis(stroke="#bbb"), uplot.Axis(stroke="#bbb"))
-        scales = {"x": uplot.Scale(time=False)}
-        with self._plots:
-            plot = self._gui.add_uplot(data, tuple(series), title=title, scales=scales, axes=axes, aspect=2.6)
-        self._lines[title] = names, plot
-
-
-def binned(times_s: np.ndarray, values: Sequence[float] | None) -> np.ndarray:
-    """Means of values in half seconds of the last minute, NaN where there are none; of None the rate [1/s].
-
-    Args:
-        times_s: of the values, before now (n,) [s], so negative.
-        values: (n,); NaN are left out.
-    """
-    index = np.floor((times_s + MINUTE_S) * _STEPS / MINUTE_S).astype(int)
-    number = np.ones(len(index)) if values is None else np.asarray(values, float)
-    kept = (index >= 0) & (index < _STEPS) & np.isfinite(number)
-    count = np.bincount(index[kept], minlength=_STEPS)
-    if values is None:
-        return count * _STEPS / MINUTE_S
-    total = np.bincount(index[kept], number[kept], minlength=_STEPS)
-    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
-
-
-def complete(columns: Sequence[np.ndarray]) -> tuple[np.ndarray, ...]:
-    """Times [s] and values of the half seconds in which every column has one: a plot cannot leave out values."""
-    times_s = np.linspace(-MINUTE_S, 0, _STEPS, endpoint=False) + 0.5 * MINUTE_S / _STEPS
-    kept = np.isfinite(columns).all(axis=0)
-    return times_s[kept], *(column[kept] for column in columns)
+    def show_plots(self, plots: Mapping[str, Curves]) -> None:
+        """Shows curves of the last minute by title."""
+        for title, curves in plots.items():
+            data, known = complete(list(curves.values())), self._plots.get(title)
+            series = uplot.Series(label="s"), *_series(curves)
+            if known is None:
+                with self._plot_tab:
+                    axes, scales = (uplot.Axis(stroke="#bbb"),) * 2, {"x": uplot.Scale(time=False)}
+                    add = self._server.gui.add_uplot
+                    self._plots[title] = add(data, series, title=title, scales=scales, axes=axes, aspect=2.6)
+                continue
+            with self._server.atomic():
+                if known.series != series:
+                    known.series = series
+                known.data = data
 
 
 def _series(names: Iterable[str]) -> list[uplot.Series]:
     return [uplot.Series(label=name, stroke=color, width=2) for name, color in zip(names, _LINES)]
 
 
-def _set(html: viser.GuiHtmlHandle, content: str) -> None:
-    if html.content != content:
-        html.content = content
+def _press(button: Button, _: object) -> None:
+    button.press()

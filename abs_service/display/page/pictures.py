@@ -1,5 +1,7 @@
 """Images of a rig as points and as pictures with the mesh drawn over them."""
 
+from collections.abc import Callable
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -98,20 +100,44 @@ def with_mesh(image: Picture, camera: Camera, vertices: NDArray[np.float64], fac
         vertices: positions (n, 3) [m] in rig coordinates.
         faces: vertex indices (m, 3); none draws nothing.
     """
-    factor = WIDTH / image.shape[1]
-    by = cv2.INTER_AREA if factor < 1 else cv2.INTER_NEAREST
-    drawn = np.ascontiguousarray(cv2.resize(image, None, fx=factor, fy=factor, interpolation=by))
+    drawn = _enlarged(image)
     if not len(faces):
-        return np.asarray(drawn, np.uint8)
-    place = factor * (camera.project(vertices) + 0.5) - 0.5
-    within = np.isfinite(place).all(axis=1)
-    corners = np.round(16 * np.clip(np.where(within[:, None], place, 0), -1e4, 1e4)).astype(np.int32)  # of 1/16 pixel
+        return drawn
+    corners, within = _corners(camera, vertices, WIDTH / image.shape[1])
     edges, rim = Mesh(vertices, faces, np.empty((0, 3), np.float32), np.empty((0, 2))).edges, rim_edges(faces)
     lines = drawn.copy()
     cv2.polylines(lines, list(corners[edges[within[edges].all(axis=1)]]), False, MESH, 1, cv2.LINE_AA, 4)
     drawn = cv2.addWeighted(drawn, 0.6, lines, 0.4, 0)
     cv2.polylines(drawn, list(corners[rim[within[rim].all(axis=1)]]), False, RIM, 2, cv2.LINE_AA, 4)
     return np.asarray(drawn, np.uint8)
+
+
+def with_colors(
+    image: Picture,
+    camera: Camera,
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int32],
+    values: NDArray[np.floating],
+    color: Callable[[NDArray[np.float64]], Picture],
+) -> Picture:
+    """A picture in grey, `WIDTH` pixels wide, and over it the faces of a mesh in colours, the nearest on top.
+
+    Args:
+        image: of the camera, (height, width, 3).
+        camera: that took it.
+        vertices: positions (n, 3) [m] in rig coordinates.
+        faces: vertex indices (m, 3).
+        values: of the vertices (n,); a face has the mean of its corners, and is left out where one is NaN.
+        color: red, green, blue (k, 3) of values (k,).
+    """
+    drawn = _enlarged(grey(image))
+    corners, within = _corners(camera, vertices, WIDTH / image.shape[1])
+    mean = values[faces].mean(axis=1)
+    shown = np.flatnonzero(np.isfinite(mean) & within[faces].all(axis=1))
+    shown = shown[np.argsort(-camera.distance(vertices)[faces[shown]].mean(axis=1))]
+    for face, tone in zip(corners[faces[shown]], color(mean[shown]).tolist()):
+        cv2.fillConvexPoly(drawn, face, tone, cv2.LINE_8, 4)
+    return drawn
 
 
 def rim_edges(faces: NDArray[np.int32]) -> NDArray[np.int32]:
@@ -124,3 +150,19 @@ def rim_edges(faces: NDArray[np.int32]) -> NDArray[np.int32]:
 def grey(image: Picture) -> Picture:
     """A stale picture: without colours, and darker."""
     return np.repeat((cv2.cvtColor(image, cv2.COLOR_RGB2GRAY) // 2 + 40)[..., None], 3, axis=2)
+
+
+def _enlarged(image: Picture) -> Picture:
+    """A picture `WIDTH` pixels wide."""
+    factor = WIDTH / image.shape[1]
+    by = cv2.INTER_AREA if factor < 1 else cv2.INTER_NEAREST
+    return np.ascontiguousarray(cv2.resize(image, None, fx=factor, fy=factor, interpolation=by), np.uint8)
+
+
+def _corners(
+    camera: Camera, vertices: NDArray[np.float64], factor: float
+) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
+    """Places (n, 2) of vertices in a picture `factor` times as large [1/16 px], and those that have one (n,)."""
+    place = factor * (camera.project(vertices) + 0.5) - 0.5
+    within = np.asarray(np.isfinite(place).all(axis=1), np.bool_)
+    return np.round(16 * np.clip(np.where(within[:, None], place, 0), -1e4, 1e4)).astype(np.int32), within

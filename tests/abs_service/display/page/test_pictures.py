@@ -79,6 +79,35 @@ def test_what_is_behind_the_camera_is_not_drawn():
     assert not pictures.with_mesh(np.zeros((48, 64, 3), np.uint8), CAMERA, behind, FACES).any()
 
 
+def test_faces_have_the_mean_colour_of_their_corners_and_those_without_a_value_are_grey():
+    corners = plane_points()[[12, 12, 36, 36], [16, 48, 16, 48]]
+    asked = []
+
+    def color(values):
+        asked.append(values.tolist())
+        return np.full((len(values), 3), (200, 30, 0), np.uint8)
+
+    values = np.array([1.0, 2.0, 6.0, np.nan])
+    drawn = pictures.with_colors(np.full((48, 64, 3), 90, np.uint8), CAMERA, corners, FACES, values, color)
+    assert asked == [[3.0]]
+    assert drawn.shape == (360, 480, 3)
+    factor = pictures.WIDTH / 64
+    assert drawn[int(16 * factor), int(20 * factor)].tolist() == [200, 30, 0]
+    assert drawn[int(34 * factor), int(44 * factor)].tolist() == [85] * 3  # grey of the image: 90 / 2 + 40
+
+
+def test_the_nearer_of_two_faces_is_on_top():
+    far = plane_points()[[12, 12, 36], [16, 48, 16]]
+    eye = CAMERA.center
+    vertices = np.concatenate([eye + 0.5 * (far - eye), far])
+    faces = np.array([[0, 1, 2], [3, 4, 5]], np.int32)
+    image, values = np.zeros((48, 64, 3), np.uint8), np.array([7.0] * 3 + [9.0] * 3)
+    drawn = pictures.with_colors(
+        image, CAMERA, vertices, faces, values, lambda v: np.repeat(v[:, None], 3, 1).astype("u1")
+    )
+    assert drawn[int(16 * 7.5), int(20 * 7.5), 0] == 7
+
+
 def test_pictures_show_distances_in_colours_and_no_return_in_its_own():
     z = np.tile(np.linspace(1, 2, 64), (48, 1))
     z[5] = 0

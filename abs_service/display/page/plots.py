@@ -1,0 +1,81 @@
+"""Curves of the last minute."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.display.page.feed import MINUTE_S, Numbers
+
+#: Values of each half second, by name; NaN where there are none.
+Curves = Mapping[str, NDArray[np.float64]]
+
+#: Points of a curve: one each half second. Components of theta that are shown.
+STEPS, COMPONENTS = round(2 * MINUTE_S), 5
+
+
+def plots(numbers: Sequence[Numbers], now_s: float) -> dict[str, Curves]:
+    """Curves by title; each point is the mean of half a second.
+
+    Args:
+        numbers: of the last minute, oldest first.
+        now_s: monotonic time [s].
+    """
+    times_s = np.array([one.t_s for one in numbers]) - now_s
+    sensors = sorted({name for one in numbers for name in one.likelihoods})
+    values: dict[str, dict[str, Sequence[float] | NDArray[np.floating] | None]] = {
+        "latency [ms]": {"age": [one.age_ms for one in numbers], "search": [one.solve_ms for one in numbers]},
+        "estimates a second": {"rate": None},
+        "generations": {"generations": [one.generations for one in numbers]},
+        "log-likelihood of a vertex": {
+            name: [one.likelihoods.get(name, np.nan) for one in numbers] for name in sensors
+        },
+        "σ of a vertex, median [mm]": {"σ": [one.deviation_mm for one in numbers]},
+        "Θ from its mean, components that move most [SI]": dict(moving(numbers)),
+    }
+    return {
+        title: {name: binned(times_s, column) for name, column in curves.items()}
+        for title, curves in values.items()
+        if curves
+    }
+
+
+def moving(numbers: Sequence[Numbers]) -> dict[str, NDArray[np.floating]]:
+    """The components of theta that move most, each less its mean, by name; NaN where the model was another.
+
+    Args:
+        numbers: estimates (n), oldest first; the last one says which model.
+    """
+    if not numbers:
+        return {}
+    last = numbers[-1]
+    theta = np.full((len(numbers), len(last.theta)), np.nan)
+    same = [one.model_id == last.model_id and one.theta.shape == last.theta.shape for one in numbers]
+    theta[same] = [one.theta for one, kept in zip(numbers, same) if kept]
+    theta -= np.mean(theta[same], axis=0)
+    most = np.sort(np.argsort(-np.std(theta[same], axis=0), kind="stable")[:COMPONENTS])
+    return {f"Θ{index}": theta[:, index] for index in most}
+
+
+def binned(times_s: NDArray[np.float64], values: Sequence[float] | NDArray[np.floating] | None) -> NDArray[np.float64]:
+    """Means of values in half seconds of the last minute, NaN where there are none; of None the rate [1/s].
+
+    Args:
+        times_s: of the values, before now (n,) [s], so negative.
+        values: (n,); NaN are left out.
+    """
+    index = np.floor((times_s + MINUTE_S) * STEPS / MINUTE_S).astype(int)
+    number = np.ones(len(index)) if values is None else np.asarray(values, float)
+    kept = (index >= 0) & (index < STEPS) & np.isfinite(number)
+    count = np.bincount(index[kept], minlength=STEPS)
+    if values is None:
+        return count * STEPS / MINUTE_S
+    total = np.bincount(index[kept], number[kept], minlength=STEPS)
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+
+
+def complete(columns: Sequence[NDArray[np.float64]]) -> tuple[NDArray[np.float64], ...]:
+    """Times [s] and values of the half seconds in which every column has one: a plot cannot leave out values."""
+    times_s = np.linspace(-MINUTE_S, 0, STEPS, endpoint=False) + 0.5 * MINUTE_S / STEPS
+    kept = np.isfinite(columns).all(axis=0)
+    return times_s[kept], *(column[kept] for column in columns)

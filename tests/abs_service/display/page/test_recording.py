@@ -1,0 +1,40 @@
+"""The page starts and ends recordings, and says what the recorder answers."""
+
+import pytest
+
+from abs_service.bus.health import Health
+from abs_service.bus.stamps import HeaderFactory, WallClock
+from abs_service.display.page import recording
+from abs_service.recording.triggers.trigger import ALWAYS, Asked
+from abs_service.wire import commands
+from tests.abs_service.bus.loopback import LoopbackBus
+
+
+class Bench:
+    """A page and, beside it, a recorder with a trigger."""
+
+    def __init__(self, trigger=None):
+        self.bus, self.headers = LoopbackBus(), HeaderFactory("demo", WallClock())
+        if trigger is not None:
+            commands.answer_record(self.bus, self.headers, Health(self.bus, "record", self.headers), trigger.ask)
+
+    def ask(self, wanted: bool) -> str:
+        return recording.ask(lambda on: commands.record(self.bus, self.headers, on, 1.0), wanted)
+
+
+def test_a_recorder_with_a_trigger_begins_and_ends():
+    trigger = Asked(watches_status=False, post_roll_s=1.0, clock=lambda: 0)
+    bench = Bench(trigger)
+    assert bench.ask(True) == "The recorder records."
+    assert trigger.reason == "asked for"
+    assert bench.ask(False) == "The recorder waits for the next trigger."
+    assert trigger.reason == ""
+
+
+@pytest.mark.parametrize("wanted", [True, False])
+def test_a_recorder_that_records_always_says_so(wanted):
+    assert Bench(ALWAYS).ask(wanted) == ('The recorder refuses: record.when = "always": it records as long as it runs.')
+
+
+def test_without_a_recorder_there_is_no_answer():
+    assert "gives no answer" in Bench().ask(True)
