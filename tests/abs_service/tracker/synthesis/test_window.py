@@ -1,5 +1,7 @@
 """Only a window around the prediction is prepared: costs within reach are unchanged, all beyond are outliers."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -62,8 +64,8 @@ def scene(x: float = 0.0) -> np.ndarray:
 
 
 def depth_term(outline: bool = False) -> DepthTerm:
-    rim = {"outline": lambda camera: RimOutline(camera, Rim.of(MESH), 0.5)} if outline else {}
-    return DepthTerm("tof", sparse(WIDE, MESH), len(MESH.vertices), NOISE, BOUNDS, **rim)
+    term = partial(DepthTerm, "tof", sparse(WIDE, MESH), len(MESH.vertices), NOISE, BOUNDS)
+    return term(outline=lambda camera: RimOutline(camera, Rim.of(MESH), 0.5)) if outline else term()
 
 
 @settings(max_examples=60, deadline=None)
