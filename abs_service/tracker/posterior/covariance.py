@@ -24,8 +24,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.models.base import SparseJacobian, Surface
-from abs_service.tracker.posterior.curvature import add_at, solved, taken_at
-from abs_service.tracker.terms.linearization import Linearization
+from abs_service.tracker.posterior.curvature import solved, taken_at
+from abs_service.tracker.terms.linearization import Part
 from calib.jit import kernel
 
 #: Share of the widest motion prior's precision that keeps `unheld_deviation` finite, and number of vertices it probes.
@@ -36,29 +36,13 @@ LEAST_KEPT = 1e-6
 
 
 #: Residuals and derivatives of the sensors, by source, in parts; and a value of each residual (m,).
-Sensed = Sequence[Sequence[Linearization]]
+Sensed = Sequence[Sequence[Part]]
 PerResidual = Sequence[Sequence[NDArray[np.float64]]]
 
 
 def leverages(inverse: NDArray[np.float64], sensed: Sensed) -> PerResidual:
     """Leverage h = diag(J Σ Jᵀ) of every residual, from Σ (dim, dim)."""
-    return [[_leverage(inverse, part) for part in parts] for parts in sensed]
-
-
-def _leverage(inverse: NDArray[np.float64], part: Linearization) -> NDArray[np.float64]:
-    result = np.empty(len(part.residual))
-    _dot_rows(part.jacobian @ taken_at(part.parameters, inverse), part.jacobian, result)
-    return result
-
-
-@kernel
-def _dot_rows(one: NDArray[np.float64], other: NDArray[np.float64], result: NDArray[np.float64]) -> None:
-    """Dot products (m,) of the rows of two matrices (m, k)."""
-    for m in range(result.size):
-        total = 0.0
-        for k in range(one.shape[1]):
-            total += one[m, k] * other[m, k]
-        result[m] = total
+    return [[part.leverage(inverse) for part in parts] for parts in sensed]
 
 
 def score_covariance(
@@ -77,9 +61,7 @@ def score_covariance(
     result = priors.copy()
     for parts, shares, effect in zip(sensed, leverage, effects):
         for part, share in zip(parts, shares):
-            scale = part.residual * np.sqrt(effect / np.maximum(1 - share, LEAST_KEPT))
-            scaled = part.jacobian * scale[:, None]
-            add_at(part.parameters, scaled.T @ scaled, result)  # of one matrix: half the products
+            part.add_square(part.residual**2 * (effect / np.maximum(1 - share, LEAST_KEPT)), result)
     return result
 
 
@@ -87,7 +69,7 @@ def shared_covariance(sensed: Sensed, dimension: int) -> NDArray[np.float64]:
     """Covariance (dim, dim) of the gradient of errors that many residuals share, the same in all frames."""
     result = np.zeros((dimension, dimension))
     for part in (part for parts in sensed for part in parts if len(part.shared)):
-        add_at(part.parameters, part.shared.T @ part.shared, result)
+        result += part.shared.T @ part.shared
     return result
 
 
