@@ -80,6 +80,18 @@ def solved(curvature: NDArray[np.float64], right: NDArray[np.float64]) -> NDArra
     return np.asarray(found, np.float64)
 
 
+def whitened(curvature: NDArray[np.float64], right: NDArray[np.float64]) -> NDArray[np.float64]:
+    """L⁻¹ right (dim, k) with curvature = L Lᵀ: the sums of its squares are rightᵀ curvature⁻¹ right, column by column.
+
+    Raises:
+        LinAlgError: the curvature is not positive definite.
+    """
+    factor, is_indefinite = scipy.linalg.lapack.dpotrf(curvature, lower=True)
+    if is_indefinite:
+        raise np.linalg.LinAlgError(NOT_POSITIVE)
+    return np.asarray(scipy.linalg.blas.dtrsm(1.0, factor, right, lower=True), np.float64)
+
+
 def posterior_covariance(quadratic: Quadratic) -> NDArray[np.float64]:
     """Covariance (dim, dim) of Θ given the measurements: the inverse of the curvature at the estimate (Laplace)."""
     factor, is_indefinite = scipy.linalg.lapack.dpotrf(quadratic.curvature, lower=True)
