@@ -26,7 +26,7 @@ NOTHING_HAS = 1e6
 
 
 def around(camera: Camera, projection: Projection, predicted: Surface, reach_m: float) -> Window:
-    """Rows and columns that can contain a surface.
+    """Rows and columns that can contain a surface; the first ones are even, for images of half the size.
 
     Args:
         camera: the camera.
@@ -42,7 +42,7 @@ def around(camera: Camera, projection: Projection, predicted: Surface, reach_m: 
     low, high = np.full(2, np.inf), np.full(2, -np.inf)
     extent(place, inverse_z, low, high)
     size = np.array([camera.height, camera.width])
-    first = np.clip(np.floor(low - margin), 0, size).astype(int).tolist()
+    first = (np.clip(np.floor(low - margin), 0, size).astype(int) // 2 * 2).tolist()
     last = np.clip(np.ceil(high + margin) + 1, first, size).astype(int).tolist()
     return slice(first[0], last[0]), slice(first[1], last[1])
 
