@@ -92,8 +92,8 @@ class WholeTexels:
 
     def observe(self, image: DepthImage, window: Window) -> NDArray[np.float32]:
         """Renders the noise model over the window."""
-        texture = self._image.begin(image.distance.shape, window)
-        write_texture(self._noise, image.distance[window], image.amplitude[window], corner(window), texture)
+        texture = self._image.begin(image.shape, window)
+        write_texture(self._noise, *image.within(window), corner(window), texture)
         self._texture, self._window = self._synthesizer.texture(self._sensor, texture), window
         part = within(self._texture, window)
         self._distance = np.empty(part.shape[:2], np.float32)
@@ -135,8 +135,8 @@ class TexelsOnDemand:
 
     def observe(self, image: DepthImage, window: Window) -> NDArray[np.float32]:
         """Corrects the distances in the window, and renders nothing yet."""
-        self._texture, self._window = self._image.move(image.distance.shape, window), window
-        self._distance, self._amplitude = image.distance[window], image.amplitude[window]
+        self._texture, self._window = self._image.move(image.shape, window), window
+        self._distance, self._amplitude = image.within(window)
         self._corrected = corrected_distances(self._noise, self._distance, self._amplitude, corner(window))
         shape = self._corrected.shape
         self._masked, self._done = np.zeros(shape, np.bool_), np.zeros(shape, np.bool_)
