@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.models.base import SparseJacobian, Surface
-from abs_service.tracker.posterior.curvature import solved, taken_at, whitened
+from abs_service.tracker.posterior.curvature import solved, whitened
 from abs_service.tracker.terms.linearization import Part
 from calib.jit import kernel
 
@@ -76,37 +76,41 @@ def shared_covariance(sensed: Sensed, dimension: int) -> NDArray[np.float64]:
 def propagated(sparse_jacobian: SparseJacobian, covariance: NDArray[np.float64]) -> NDArray[np.float64]:
     """Covariance D Σ Dᵀ (n, 3, 3) of every vertex, from its Jacobian D and the covariance Σ (dim, dim) of Θ."""
     result = np.empty((len(sparse_jacobian.local), 3, 3))
-    for group, own in enumerate(sparse_jacobian.parameters):
-        vertices = np.flatnonzero(sparse_jacobian.group == group)
-        in_a_row = vertices.size and vertices[-1] - vertices[0] == vertices.size - 1
-        local = sparse_jacobian.local[
-            slice(vertices[0], vertices[-1] + 1) if in_a_row else vertices
-        ]  # a slice copies nothing
-        # One product of matrices for all vertices: n small ones take several times as long.
-        weighted = (local.reshape(-1, len(own)) @ taken_at(own, covariance)).reshape(local.shape)
-        _multiply(weighted, local, vertices, result)
+    of_points = sparse_jacobian.local, sparse_jacobian.group, sparse_jacobian.parameters
+    _propagate(*of_points, np.ascontiguousarray(covariance), result)
     return result
 
 
 @kernel
-def _multiply(
-    left: NDArray[np.float64], right: NDArray[np.float64], to: NDArray[np.int64], result: NDArray[np.float64]
+def _propagate(
+    local: NDArray[np.float64],
+    group: NDArray[np.int32],
+    parameters: NDArray[np.int64],
+    covariance: NDArray[np.float64],
+    result: NDArray[np.float64],
 ) -> None:
-    """Products left rightᵀ (3, 3) of pairs of matrices (n, 3, k), which are symmetric, to the places `to` (n,)."""
-    for v in range(to.size):
-        a, b = left[v], right[v]
-        xx, xy, xz, yy, yz, zz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        for d in range(left.shape[2]):  # one pass over both for all six
-            xx += a[0, d] * b[0, d]
-            xy += a[0, d] * b[1, d]
-            xz += a[0, d] * b[2, d]
-            yy += a[1, d] * b[1, d]
-            yz += a[1, d] * b[2, d]
-            zz += a[2, d] * b[2, d]
-        square = result[to[v]]
-        square[0, 0], square[1, 1], square[2, 2] = xx, yy, zz
-        square[0, 1], square[0, 2], square[1, 2] = xy, xz, yz
-        square[1, 0], square[2, 0], square[2, 1] = xy, xz, yz
+    """See `propagated`; points of a group that follow each other share one product of matrices."""
+    n, _, k = local.shape
+    part, first = np.empty((k, k)), 0
+    while first < n:
+        own, last = parameters[group[first]], first + 1
+        while last < n and group[last] == group[first]:
+            last += 1
+        for i in range(k):
+            line = covariance[own[i]]
+            for j in range(k):
+                part[i, j] = line[own[j]]
+        rows = local[first:last].reshape((3 * (last - first), k))
+        products = np.dot(rows, part)
+        for v in range(last - first):
+            square = result[first + v]
+            for i in range(3):
+                for j in range(i, 3):
+                    total = 0.0
+                    for d in range(k):
+                        total += products[3 * v + i, d] * rows[3 * v + j, d]
+                    square[i, j] = square[j, i] = total
+        first = last
 
 
 def unheld_deviation(

@@ -8,7 +8,6 @@ import scipy  # its parts are imported when they are first used
 from numpy.typing import NDArray
 
 from abs_service.tracker.terms.linearization import Part
-from calib.jit import kernel
 
 #: Message of the error for a curvature without a Cholesky factor.
 NOT_POSITIVE = "the curvature of the cost is not positive definite"
@@ -37,22 +36,6 @@ def gauss_newton(parts: Sequence[Part], dimension: int) -> Quadratic:
         part.add_curvature(curvature)
         part.add_gradient(gradient)
     return Quadratic(gradient, curvature)
-
-
-def taken_at(parameters: NDArray[np.int64], square: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The part (k, k) for some parameters of a matrix for all (dim, dim); ten times as fast as indexing."""
-    result = np.empty((len(parameters), len(parameters)))
-    _gather(parameters, square, result)
-    return result
-
-
-@kernel
-def _gather(parameters: NDArray[np.int64], square: NDArray[np.float64], part: NDArray[np.float64]) -> None:
-    """The rows and columns of some parameters (k,)."""
-    for i in range(parameters.size):
-        row = square[parameters[i]]
-        for j in range(parameters.size):
-            part[i, j] = row[parameters[j]]
 
 
 def search_metric(quadratic: Quadratic) -> NDArray[np.float64]:
