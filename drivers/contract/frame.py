@@ -175,7 +175,7 @@ class Frame:
 
     def si(self, rows: slice = slice(None), columns: slice = slice(None)) -> NDArray[np.float32]:
         """The image, or some rows and columns of it, in `unit` as float32, NaN where there is no return."""
-        data = np.ascontiguousarray(self.data[rows, columns])
+        data = self.data[rows, columns].copy()  # one memory layout, for which the kernel is compiled
         values = np.empty(data.shape, np.float32)
         invalid = np.float32(np.nan if self.invalid is None else self.invalid)
         _convert(data.reshape(-1), np.float32(self.scale), invalid, values.reshape(-1))

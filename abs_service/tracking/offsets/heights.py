@@ -79,6 +79,7 @@ class HeightSensor:
         limit = INLIER_DEVIATIONS * np.sqrt(sigma**2 + variance)
         height, pixels = np.empty_like(sigma), np.empty_like(sigma)
         places = row, column, self._steps, self._camera.width, top, left
+        measured = np.ascontiguousarray(measured)  # one memory layout, for which the kernel is compiled
         _mean_heights(measured, self._rays, *places, sight, normals, mean, limit, height, pixels)
         return Heights(height, pixels / np.where(pixels, sigma, 1) ** 2)
 

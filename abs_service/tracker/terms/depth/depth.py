@@ -76,7 +76,7 @@ class DepthTerm:
             raise TypeError(f"sensor {self.sensor} has a depth noise model but delivered {type(image).__name__}")
         window = self._synthesizer.window(self.sensor, predicted, reach_m)
         distance = self._texels.observe(image, window)
-        expected = self._view.render(predicted)[window]
+        expected = np.ascontiguousarray(self._view.render(predicted)[window])
         self._view.look(predicted)
         missing = np.isnan(distance)
         single = dropouts(missing)

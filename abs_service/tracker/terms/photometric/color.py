@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from abs_service.pairing.images import ColorImage, Image
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import Synthesis, Synthesizer
-from abs_service.tracker.synthesis.window import NOTHING_HAS, Bordered
+from abs_service.tracker.synthesis.window import NOTHING_HAS, Bordered, Window
 from abs_service.tracker.terms.base import Bounds, SensorFit, facing, summarize
 from abs_service.tracker.terms.gradients import color_rows
 from abs_service.tracker.terms.linearization import PointLinearization
@@ -49,6 +49,7 @@ class ColorTerm:
         self._normalizer = np.zeros(0, np.float32)
         self._texture = np.zeros((0, 3), np.float32)
         self._image: NDArray[np.float32] | NDArray[np.uint8] = np.zeros((1, 1, 3), np.float32)
+        self._levels = np.zeros((0, 0, 3), np.uint8)
         self._bordered = Bordered(np.full(3, np.nan, np.float32), np.full(3, NOTHING_HAS, np.float32))
 
     def observe(self, image: Image, predicted: Surface, reach_m: float = np.inf) -> None:
@@ -56,7 +57,7 @@ class ColorTerm:
         if not isinstance(image, ColorImage):
             raise TypeError(f"sensor {self.sensor} has a colour noise model but delivered {type(image).__name__}")
         window = self._synthesizer.window(self.sensor, predicted, reach_m)
-        self._image = self._resampled(image.rgb) if self._synthesizer.resamples else image.rgb
+        self._image = self._resampled(image.rgb) if self._synthesizer.resamples else self._ordered(image.rgb, window)
         texture = self._bordered.move(self._image.shape[:2], window)
         self._bordered.inside[:] = self._image[window]
         self._texture = texture.reshape(-1, 3)
@@ -70,6 +71,17 @@ class ColorTerm:
     def _resampled(self, rgb: NDArray[np.uint8]) -> NDArray[np.float32]:
         """The image in the view's camera, NaN where unknown."""
         return self._synthesizer.image(self.sensor, rgb.astype(np.float32))
+
+    def _ordered(self, rgb: NDArray[np.uint8], window: Window) -> NDArray[np.uint8]:
+        """The image, of which a view with reversed channels is copied in the window: one layout for the kernels."""
+        if rgb.flags.c_contiguous:
+            return rgb
+        if self._levels.shape != rgb.shape:
+            self._levels = np.zeros(rgb.shape, np.uint8)
+        self._levels[window] = rgb[window]
+        levels = self._levels.view()
+        levels.setflags(write=False)  # as frames are
+        return levels
 
     def foreground(self) -> NDArray[np.float64]:
         """No points: colours carry no distance."""
