@@ -1,6 +1,6 @@
 """Measurements, one type per kind of sensor: SI values, radial distances, NaN where unknown."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,18 +17,60 @@ BAYER_ORDERS: Mapping[str, NDArray[np.uint8]] = {
 }
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+#: Rows and columns of an image, and what an image holds there: distances and amplitudes.
+Window = tuple[slice, slice]
+Parts = tuple[NDArray[np.float32], NDArray[np.float32]]
+
+#: First row, end row, first column and end column of a window.
+Limits = tuple[int, int, int, int]
+
+
 class DepthImage:
     """Image of a depth sensor.
 
-    Attributes:
+    A tracked object fills a part of an image, and only that part is converted from what the sensor delivered.
+
+    Args:
         distance: radial distances (height, width) [m], NaN without return.
         amplitude: amplitudes (height, width) in the sensor's unit, or in their place what the sensor's noise model is
             about: its own deviations [m] (`calib.noise.measured`); NaN where there is none.
+
+    Attributes:
+        shape: height and width.
     """
 
-    distance: NDArray[np.float32]
-    amplitude: NDArray[np.float32]
+    def __init__(self, distance: NDArray[np.float32], amplitude: NDArray[np.float32]):
+        self.shape: tuple[int, ...] = distance.shape
+        self._convert: Callable[[Window], Parts] = lambda window: (distance[window], amplitude[window])
+        self._last: tuple[Limits, Parts] = ((0, len(distance), 0, distance.shape[1]), (distance, amplitude))
+
+    @classmethod
+    def deferred(cls, shape: tuple[int, int], convert: Callable[[Window], Parts]) -> "DepthImage":
+        """An image of a shape (height, width) that `convert` makes window by window, when it is wanted."""
+        empty = np.zeros((0, 0), np.float32)
+        image = cls(empty, empty)
+        image.shape, image._convert, image._last = shape, convert, ((0, 0, 0, 0), (empty, empty))
+        return image
+
+    @property
+    def distance(self) -> NDArray[np.float32]:
+        """See above."""
+        return self.within((slice(None), slice(None)))[0]
+
+    @property
+    def amplitude(self) -> NDArray[np.float32]:
+        """See above."""
+        return self.within((slice(None), slice(None)))[1]
+
+    def within(self, window: Window) -> Parts:
+        """Distances and amplitudes (rows, columns) in a window; parts of the last one are converted only once."""
+        (top, bottom, _), (left, right, _) = (axis.indices(size) for axis, size in zip(window, self.shape))
+        (first, last, begin, end), parts = self._last
+        if not (first <= top and bottom <= last and begin <= left and right <= end):
+            first, begin, parts = top, left, self._convert(window)
+            self._last = ((top, bottom, left, right), parts)
+        inside = slice(top - first, bottom - first), slice(left - begin, right - begin)
+        return parts[0][inside], parts[1][inside]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -77,4 +77,5 @@ def area_vectors(vertices: NDArray[np.floating], faces: NDArray[np.int32]) -> ND
 
 def edge_lengths(vertices: NDArray[np.floating], edges: NDArray[np.int32]) -> NDArray[np.floating]:
     """Lengths (k,) [m] of the edges (k, 2) of vertices (n, 3) [m]."""
-    return np.linalg.norm(vertices[edges[:, 0]] - vertices[edges[:, 1]], axis=1)
+    along = vertices.take(edges[:, 0], axis=0) - vertices.take(edges[:, 1], axis=0)
+    return np.sqrt(np.vecdot(along, along))  # a norm along an axis takes twice as long

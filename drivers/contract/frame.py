@@ -173,11 +173,12 @@ class Frame:
             t_reference=Reference.MIDDLE,
         )
 
-    def si(self) -> NDArray[np.float32]:
-        """The image in `unit` as float32, NaN where there is no return."""
-        values = np.empty(self.data.shape, np.float32)
+    def si(self, rows: slice = slice(None), columns: slice = slice(None)) -> NDArray[np.float32]:
+        """The image, or some rows and columns of it, in `unit` as float32, NaN where there is no return."""
+        data = self.data[rows, columns].copy()  # one memory layout, for which the kernel is compiled
+        values = np.empty(data.shape, np.float32)
         invalid = np.float32(np.nan if self.invalid is None else self.invalid)
-        _convert(self.data.reshape(-1), np.float32(self.scale), invalid, values.reshape(-1))
+        _convert(data.reshape(-1), np.float32(self.scale), invalid, values.reshape(-1))
         return values
 
 

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.pairing.images import DepthImage
+from abs_service.pairing.images import DepthImage, Parts, Window
 from abs_service.tracker.measurements.base import Comparison, Decoder
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.synthesis.base import Synthesizer
@@ -71,17 +71,26 @@ class _DepthDecoder:
         self._offset = np.float32(-gain * sensor.depth_offset)
 
     def decode(self, frames: Mapping[Kind, Frame]) -> DepthImage:
+        height, width = frames[Kind.DEPTH].data.shape
+        return DepthImage.deferred((height, width), partial(self._part, frames))
+
+    def _part(self, frames: Mapping[Kind, Frame], window: Window) -> Parts:
+        """Distances and amplitudes in a window of the image."""
         depth = frames[Kind.DEPTH]
-        gain = self._per_z if depth.geometry == Geometry.Z else self._per_radial
-        distance = depth.si()
+        gain = self._per_z[window] if depth.geometry == Geometry.Z else self._per_radial
+        distance = depth.si(*window)
         distance *= gain
         distance += self._offset
-        return DepthImage(distance, self._amplitude(frames, gain, distance.shape))
+        return distance, self._amplitude(frames, gain, window, distance.shape)
 
     def _amplitude(
-        self, frames: Mapping[Kind, Frame], gain: NDArray[np.float32] | np.float32, shape: tuple[int, ...]
+        self,
+        frames: Mapping[Kind, Frame],
+        gain: NDArray[np.float32] | np.float32,
+        window: Window,
+        shape: tuple[int, ...],
     ) -> NDArray[np.float32]:
         """Auxiliary input of the noise model: σ, scaled like the distance, or the amplitude; NaN if there is none."""
         if Kind.DEVIATION in self._auxiliary:
-            return frames[Kind.DEVIATION].si() * gain
-        return frames[Kind.AMPLITUDE].si() if Kind.AMPLITUDE in frames else np.full(shape, np.nan, np.float32)
+            return frames[Kind.DEVIATION].si(*window) * gain
+        return frames[Kind.AMPLITUDE].si(*window) if Kind.AMPLITUDE in frames else np.full(shape, np.float32(np.nan))

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.posterior.covariance import PerResidual, Sensed
-from abs_service.tracker.terms.linearization import Linearization
+from abs_service.tracker.terms.linearization import Part
 from calib.jit import kernel
 
 #: Side of a cluster in units of the typical distance between vertices; so a cluster has about six of them.
@@ -67,11 +67,11 @@ class DesignEffects:
     def _squares(
         self,
         inverse: NDArray[np.float64],
-        parts: Sequence[Linearization],
+        parts: Sequence[Part],
         leverage: Sequence[NDArray[np.float64]],
     ) -> NDArray[np.float64]:
         """Squared lengths of the scores, added up within clusters, and one by one (2,)."""
-        every, numbers, total = np.arange(len(inverse)), np.full(CLUSTERS, -1, np.int64), 0.0
+        numbers, total = np.full(CLUSTERS, -1, np.int64), 0.0
         placed = []
         for part, share in zip(parts, leverage):
             if len(part.residual) and len(part.positions) == len(part.residual):
@@ -80,7 +80,7 @@ class DesignEffects:
                 total += float(np.vdot(part.residual**2, share))  # the squared length of a score is r² h
         scores = np.zeros((numbers.max() + 1, len(inverse)))
         for part, clusters in placed:
-            _add_scores(clusters, part.residual, part.jacobian, every[part.parameters], scores)
+            part.add_scores(clusters, scores)
         return np.array([float(np.vdot(scores @ inverse, scores)), total])
 
 
@@ -107,18 +107,3 @@ def _find_clusters(
             numbers[cell] = count
             count += 1
         clusters[m] = numbers[cell]
-
-
-@kernel
-def _add_scores(
-    clusters: NDArray[np.int64],
-    residual: NDArray[np.float64],
-    jacobian: NDArray[np.float64],
-    own: NDArray[np.int64],
-    scores: NDArray[np.float64],
-) -> None:
-    """Adds scores Jᵀr, of residuals (m,) and rows (m, k) by parameters (k,), to those of their clusters (…, dim)."""
-    for m in range(residual.size):
-        row = scores[clusters[m]]
-        for k in range(own.size):
-            row[own[k]] += residual[m] * jacobian[m, k]

@@ -24,8 +24,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.models.base import SparseJacobian, Surface
-from abs_service.tracker.posterior.curvature import add_at, solved, taken_at
-from abs_service.tracker.terms.linearization import Linearization
+from abs_service.tracker.posterior.curvature import solved, whitened
+from abs_service.tracker.terms.linearization import Part
 from calib.jit import kernel
 
 #: Share of the widest motion prior's precision that keeps `unheld_deviation` finite, and number of vertices it probes.
@@ -36,29 +36,13 @@ LEAST_KEPT = 1e-6
 
 
 #: Residuals and derivatives of the sensors, by source, in parts; and a value of each residual (m,).
-Sensed = Sequence[Sequence[Linearization]]
+Sensed = Sequence[Sequence[Part]]
 PerResidual = Sequence[Sequence[NDArray[np.float64]]]
 
 
 def leverages(inverse: NDArray[np.float64], sensed: Sensed) -> PerResidual:
     """Leverage h = diag(J Σ Jᵀ) of every residual, from Σ (dim, dim)."""
-    return [[_leverage(inverse, part) for part in parts] for parts in sensed]
-
-
-def _leverage(inverse: NDArray[np.float64], part: Linearization) -> NDArray[np.float64]:
-    result = np.empty(len(part.residual))
-    _dot_rows(part.jacobian @ taken_at(part.parameters, inverse), part.jacobian, result)
-    return result
-
-
-@kernel
-def _dot_rows(one: NDArray[np.float64], other: NDArray[np.float64], result: NDArray[np.float64]) -> None:
-    """Dot products (m,) of the rows of two matrices (m, k)."""
-    for m in range(result.size):
-        total = 0.0
-        for k in range(one.shape[1]):
-            total += one[m, k] * other[m, k]
-        result[m] = total
+    return [[part.leverage(inverse) for part in parts] for parts in sensed]
 
 
 def score_covariance(
@@ -77,9 +61,7 @@ def score_covariance(
     result = priors.copy()
     for parts, shares, effect in zip(sensed, leverage, effects):
         for part, share in zip(parts, shares):
-            scale = part.residual * np.sqrt(effect / np.maximum(1 - share, LEAST_KEPT))
-            scaled = part.jacobian * scale[:, None]
-            add_at(part.parameters, scaled.T @ scaled, result)  # of one matrix: half the products
+            part.add_square(part.residual**2 * (effect / np.maximum(1 - share, LEAST_KEPT)), result)
     return result
 
 
@@ -87,44 +69,48 @@ def shared_covariance(sensed: Sensed, dimension: int) -> NDArray[np.float64]:
     """Covariance (dim, dim) of the gradient of errors that many residuals share, the same in all frames."""
     result = np.zeros((dimension, dimension))
     for part in (part for parts in sensed for part in parts if len(part.shared)):
-        add_at(part.parameters, part.shared.T @ part.shared, result)
+        result += part.shared.T @ part.shared
     return result
 
 
 def propagated(sparse_jacobian: SparseJacobian, covariance: NDArray[np.float64]) -> NDArray[np.float64]:
     """Covariance D Σ Dᵀ (n, 3, 3) of every vertex, from its Jacobian D and the covariance Σ (dim, dim) of Θ."""
     result = np.empty((len(sparse_jacobian.local), 3, 3))
-    for group, own in enumerate(sparse_jacobian.parameters):
-        vertices = np.flatnonzero(sparse_jacobian.group == group)
-        in_a_row = vertices.size and vertices[-1] - vertices[0] == vertices.size - 1
-        local = sparse_jacobian.local[
-            slice(vertices[0], vertices[-1] + 1) if in_a_row else vertices
-        ]  # a slice copies nothing
-        # One product of matrices for all vertices: n small ones take several times as long.
-        weighted = (local.reshape(-1, len(own)) @ taken_at(own, covariance)).reshape(local.shape)
-        _multiply(weighted, local, vertices, result)
+    of_points = sparse_jacobian.local, sparse_jacobian.group, sparse_jacobian.parameters
+    _propagate(*of_points, np.ascontiguousarray(covariance), result)
     return result
 
 
 @kernel
-def _multiply(
-    left: NDArray[np.float64], right: NDArray[np.float64], to: NDArray[np.int64], result: NDArray[np.float64]
+def _propagate(
+    local: NDArray[np.float64],
+    group: NDArray[np.int32],
+    parameters: NDArray[np.int64],
+    covariance: NDArray[np.float64],
+    result: NDArray[np.float64],
 ) -> None:
-    """Products left rightᵀ (3, 3) of pairs of matrices (n, 3, k), which are symmetric, to the places `to` (n,)."""
-    for v in range(to.size):
-        a, b = left[v], right[v]
-        xx, xy, xz, yy, yz, zz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        for d in range(left.shape[2]):  # one pass over both for all six
-            xx += a[0, d] * b[0, d]
-            xy += a[0, d] * b[1, d]
-            xz += a[0, d] * b[2, d]
-            yy += a[1, d] * b[1, d]
-            yz += a[1, d] * b[2, d]
-            zz += a[2, d] * b[2, d]
-        square = result[to[v]]
-        square[0, 0], square[1, 1], square[2, 2] = xx, yy, zz
-        square[0, 1], square[0, 2], square[1, 2] = xy, xz, yz
-        square[1, 0], square[2, 0], square[2, 1] = xy, xz, yz
+    """See `propagated`; points of a group that follow each other share one product of matrices."""
+    n, _, k = local.shape
+    part, first = np.empty((k, k)), 0
+    while first < n:
+        own, last = parameters[group[first]], first + 1
+        while last < n and group[last] == group[first]:
+            last += 1
+        for i in range(k):
+            line = covariance[own[i]]
+            for j in range(k):
+                part[i, j] = line[own[j]]
+        rows = local[first:last].reshape((3 * (last - first), k))
+        products = np.dot(rows, part)
+        for v in range(last - first):
+            square = result[first + v]
+            for i in range(3):
+                for j in range(i, 3):
+                    total = 0.0
+                    for d in range(k):
+                        total += products[3 * v + i, d] * rows[3 * v + j, d]
+                    square[i, j] = square[j, i] = total
+        first = last
 
 
 def unheld_deviation(
@@ -145,9 +131,8 @@ def unheld_deviation(
     np.put_along_axis(
         rows, sparse_jacobian.parameters[sparse_jacobian.group[some]][:, None], sparse_jacobian.local[some], axis=2
     )
-    flat = rows.reshape(-1, len(alone))
-    variance = np.einsum("pd,dp->p", flat, solved(alone, flat.T)).reshape(PROBES, 3).sum(axis=1)
-    return float(np.sqrt(np.median(variance)))
+    white = whitened(alone, rows.reshape(-1, len(alone)).T)
+    return float(np.sqrt(np.median(np.sum(white**2, axis=0).reshape(PROBES, 3).sum(axis=1))))
 
 
 def unseen_motion(
@@ -166,10 +151,11 @@ def unseen_motion(
         curvature: (dim, dim), of likelihood and priors without the motion prior.
         least_precision: of the widest motion prior (dim, dim).
     """
-    unseen = solved(curvature + least_precision, least_precision)
+    # Single precision is enough for a share that only tells the two apart, and takes half the time.
+    unseen = solved(curvature + least_precision, least_precision).astype(np.float32)
     for _ in range(3):
         unseen = unseen @ unseen
-    return unseen @ motion @ unseen.T
+    return np.asarray(unseen @ motion.astype(np.float32) @ unseen.T, np.float64)
 
 
 def along_normals(surface: Surface, variance: NDArray[np.float64]) -> NDArray[np.float64]:

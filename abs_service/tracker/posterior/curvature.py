@@ -7,8 +7,7 @@ import numpy as np
 import scipy  # its parts are imported when they are first used
 from numpy.typing import NDArray
 
-from abs_service.tracker.terms.linearization import Linearization
-from calib.jit import kernel
+from abs_service.tracker.terms.linearization import Part
 
 #: Message of the error for a curvature without a Cholesky factor.
 NOT_POSITIVE = "the curvature of the cost is not positive definite"
@@ -30,48 +29,13 @@ class Quadratic:
         return Quadratic(self.gradient + other.gradient, self.curvature + other.curvature)
 
 
-def gauss_newton(parts: Sequence[Linearization], dimension: int) -> Quadratic:
+def gauss_newton(parts: Sequence[Part], dimension: int) -> Quadratic:
     """Gauss–Newton approximation of the cost: sums of the gradients Jᵀr and the curvatures JᵀJ of all parts."""
     gradient, curvature = np.zeros(dimension), np.zeros((dimension, dimension))
     for part in (part for part in parts if len(part.residual)):
-        add_at(part.parameters, part.jacobian.T @ part.jacobian, curvature)
-        gradient[part.parameters] += part.jacobian.T @ part.residual
+        part.add_curvature(curvature)
+        part.add_gradient(gradient)
     return Quadratic(gradient, curvature)
-
-
-def add_at(parameters: NDArray[np.int64] | slice, square: NDArray[np.float64], total: NDArray[np.float64]) -> None:
-    """Adds a matrix (k, k) for some parameters to one for all (dim, dim)."""
-    if isinstance(parameters, slice):
-        total[parameters, parameters] += square
-    else:
-        _scatter(parameters, square, total)
-
-
-def taken_at(parameters: NDArray[np.int64] | slice, square: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The part (k, k) for some parameters of a matrix for all (dim, dim)."""
-    if isinstance(parameters, slice):
-        return square[parameters, parameters]
-    result = np.empty((len(parameters), len(parameters)))
-    _gather(parameters, square, result)
-    return result
-
-
-@kernel
-def _gather(parameters: NDArray[np.int64], square: NDArray[np.float64], part: NDArray[np.float64]) -> None:
-    """The opposite of `_scatter`, as fast."""
-    for i in range(parameters.size):
-        row = square[parameters[i]]
-        for j in range(parameters.size):
-            part[i, j] = row[parameters[j]]
-
-
-@kernel
-def _scatter(parameters: NDArray[np.int64], square: NDArray[np.float64], total: NDArray[np.float64]) -> None:
-    """Scatter-add of a matrix; ten times as fast as indexing with two arrays."""
-    for i in range(parameters.size):
-        row = total[parameters[i]]
-        for j in range(parameters.size):
-            row[parameters[j]] += square[i, j]
 
 
 def search_metric(quadratic: Quadratic) -> NDArray[np.float64]:
@@ -97,6 +61,18 @@ def solved(curvature: NDArray[np.float64], right: NDArray[np.float64]) -> NDArra
     if is_indefinite:
         raise np.linalg.LinAlgError(NOT_POSITIVE)
     return np.asarray(found, np.float64)
+
+
+def whitened(curvature: NDArray[np.float64], right: NDArray[np.float64]) -> NDArray[np.float64]:
+    """L⁻¹ right (dim, k) with curvature = L Lᵀ: the sums of its squares are rightᵀ curvature⁻¹ right, column by column.
+
+    Raises:
+        LinAlgError: the curvature is not positive definite.
+    """
+    factor, is_indefinite = scipy.linalg.lapack.dpotrf(curvature, lower=True)
+    if is_indefinite:
+        raise np.linalg.LinAlgError(NOT_POSITIVE)
+    return np.asarray(scipy.linalg.blas.dtrsm(1.0, factor, right, lower=True), np.float64)
 
 
 def posterior_covariance(quadratic: Quadratic) -> NDArray[np.float64]:

@@ -13,7 +13,7 @@ from abs_service.tracker.posterior.priors.motion_prior import MotionPrior
 from abs_service.tracker.posterior.priors.shape_prior import ShapePrior
 from abs_service.tracker.posterior.priors.stretch_prior import StretchPrior
 from abs_service.tracker.terms.base import SensorFit, inlier_share
-from abs_service.tracker.terms.linearization import Linearization
+from abs_service.tracker.terms.linearization import Part
 
 #: A linearisation is reused within this many nats per parameter: the length of the last step of a descent, and half the
 #: step that the noise of a frame causes.
@@ -35,7 +35,7 @@ class Linearized:
     theta: NDArray[np.float64]
     quadratic: Quadratic
     priors: NDArray[np.float64]
-    sensed: list[list[Linearization]]
+    sensed: list[list[Part]]
     sparse_jacobian: SparseJacobian
 
 
@@ -170,8 +170,6 @@ class FramePosterior:
         """Share of the visible vertices, over all sensors, that do not agree with their measurement at theta (dim,)."""
         return 1 - inlier_share(self.fits(theta))
 
-    def _priors(
-        self, surface: Surface, sparse_jacobian: SparseJacobian, theta: NDArray[np.float64]
-    ) -> list[Linearization]:
+    def _priors(self, surface: Surface, sparse_jacobian: SparseJacobian, theta: NDArray[np.float64]) -> list[Part]:
         of = self._of
         return [*of.stretch.linearize(surface, sparse_jacobian), of.shape.linearize(theta), of.motion.linearize(theta)]

@@ -90,9 +90,11 @@ class Synthesizer(Protocol):
 
     Attributes:
         canvas: the mesh on whose vertices the appearance is sampled for the views: the deformed mesh or a finer one.
+        resamples: true if views have another geometry than the sensors' own images.
     """
 
     canvas: Mesh
+    resamples: bool
 
     def observe(self, observation: Observation) -> None:
         """Sets the images to which the following calls refer."""

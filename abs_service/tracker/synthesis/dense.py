@@ -55,7 +55,10 @@ class Dense:
 
     Attributes:
         canvas: lattice points at which the appearance is sampled.
+        resamples: false.
     """
+
+    resamples = False
 
     def __init__(self, rig: Rig, mesh: Mesh, step: int, detail: int):
         self.canvas = lattice(mesh, detail)

@@ -40,7 +40,10 @@ class Sparse:
 
     Attributes:
         canvas: the vertices and their surroundings.
+        resamples: false.
     """
+
+    resamples = False
 
     def __init__(self, rig: Rig, mesh: Mesh):
         self._step_m = half_pixel(rig, mesh)

@@ -30,7 +30,10 @@ class Undistorted:
 
     Attributes:
         canvas: the mesh.
+        resamples: true.
     """
+
+    resamples = True
 
     def __init__(self, rig: Rig, mesh: Mesh):
         self.canvas = mesh

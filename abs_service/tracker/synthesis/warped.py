@@ -52,7 +52,10 @@ class Warped:
 
     Attributes:
         canvas: the mesh.
+        resamples: true.
     """
+
+    resamples = True
 
     def __init__(self, rig: Rig, mesh: Mesh, reference: str):
         self.canvas = mesh

@@ -26,7 +26,7 @@ NOTHING_HAS = 1e6
 
 
 def around(camera: Camera, projection: Projection, predicted: Surface, reach_m: float) -> Window:
-    """Rows and columns that can contain a surface.
+    """Rows and columns that can contain a surface; the first ones are even, for images of half the size.
 
     Args:
         camera: the camera.
@@ -42,7 +42,7 @@ def around(camera: Camera, projection: Projection, predicted: Surface, reach_m: 
     low, high = np.full(2, np.inf), np.full(2, -np.inf)
     extent(place, inverse_z, low, high)
     size = np.array([camera.height, camera.width])
-    first = np.clip(np.floor(low - margin), 0, size).astype(int).tolist()
+    first = (np.clip(np.floor(low - margin), 0, size).astype(int) // 2 * 2).tolist()
     last = np.clip(np.ceil(high + margin) + 1, first, size).astype(int).tolist()
     return slice(first[0], last[0]), slice(first[1], last[1])
 
@@ -69,6 +69,7 @@ class Bordered:
     Allocating memory takes as long as filling it.
 
     Attributes:
+        border, beyond: see below.
         window: window of the last frame.
 
     Args:
@@ -77,8 +78,8 @@ class Bordered:
     """
 
     def __init__(self, border: NDArray[np.float32], beyond: NDArray[np.float32]):
-        self._border = border
-        self._beyond = beyond
+        self.border = border
+        self.beyond = beyond
         self._image = np.zeros((0, 0, len(border)), np.float32)
         self.window = WHOLE
 
@@ -90,18 +91,18 @@ class Bordered:
     def begin(self, shape: tuple[int, ...], window: Window) -> NDArray[np.float32]:
         """The image (height + 2, width + 2, channels) of a shape (height, width), its window filled with `border`."""
         image = self.move(shape, window)
-        _fill(image, *limits(window, shape), self._border)
+        _fill(image, *limits(window, shape), self.border)
         return image
 
     def move(self, shape: tuple[int, ...], window: Window) -> NDArray[np.float32]:
         """The same with anything in its window, for those who fill it."""
         height, width = shape
         if self._image.shape[:2] != (height + 2, width + 2):
-            self._image = np.empty((height + 2, width + 2, len(self._border)), np.float32)
-            self._image[:] = self._border
+            self._image = np.empty((height + 2, width + 2, len(self.border)), np.float32)
+            self._image[:] = self.border
             self.window = WHOLE
         for left_over in _without(limits(self.window, shape), limits(window, shape)):
-            _fill(self._image, *left_over, self._beyond)
+            _fill(self._image, *left_over, self.beyond)
         self.window = window
         return self._image
 

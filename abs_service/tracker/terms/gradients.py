@@ -42,7 +42,9 @@ def depth_rows(
     return rows
 
 
-def color_rows(image: NDArray[np.float32], camera: Camera, vertices: NDArray[np.floating]) -> NDArray[np.float64]:
+def color_rows(
+    image: NDArray[np.float32] | NDArray[np.uint8], camera: Camera, vertices: NDArray[np.floating]
+) -> NDArray[np.float64]:
     """Derivatives (n, channels, 3) of the measurement at a vertex's pixel with respect to the vertex [image unit / m].
 
     Args:
@@ -130,7 +132,7 @@ def _depth_rows(
 
 @kernel
 def _color_rows(
-    image: NDArray[np.float32],
+    image: NDArray[np.float32] | NDArray[np.uint8],
     places: NDArray[np.float64],
     weights: NDArray[np.float64],
     projection: NDArray[np.float64],

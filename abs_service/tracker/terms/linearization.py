@@ -9,9 +9,7 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.models.base import SparseJacobian
 from abs_service.tracker.terms.chain_rule import apply_chain_rule, count_points, sum_at_points, transpose_times
-
-#: All parameters.
-EVERY = slice(None)
+from abs_service.tracker.terms.grouped import GroupedLinearization, add_scores
 
 #: Residuals, rows and points of no measurement.
 NO_ROWS = np.zeros(0), np.zeros((0, 3)), np.zeros(0, np.int64)
@@ -23,19 +21,17 @@ class Linearization:
 
     Attributes:
         residual: (m,).
-        jacobian: (m, k).
-        parameters: indices of the k parameters that the residuals depend on.
+        jacobian: (m, dim).
         positions: of the points that they belong to (m, 3) [m]; empty (0, 3) if they belong to none.
-        shared: sum of the derivatives (s, k) of the residuals that share an error, times that error's deviation.
+        shared: sum of the derivatives (s, dim) of the residuals that share an error, times that error's deviation.
     """
 
     residual: NDArray[np.float64]
     jacobian: NDArray[np.float64]
-    parameters: NDArray[np.int64] | slice = field(default_factory=lambda: EVERY)
     positions: NDArray[np.floating] = field(default_factory=lambda: np.zeros((0, 3)))
     shared: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
 
-    def parts(self) -> list["Linearization"]:
+    def parts(self) -> list["Part"]:
         """A list of this linearisation alone."""
         return [self]
 
@@ -45,13 +41,33 @@ class Linearization:
 
     def moved(self, by: NDArray[np.float64]) -> "Linearization":
         """Linearisation with its residuals extrapolated to first order by a step (dim,) of theta."""
-        return replace(self, residual=self.residual + self.jacobian @ by[self.parameters])
+        return replace(self, residual=self.residual + self.jacobian @ by)
 
     def transposed_times(self, values: NDArray[np.float64], dimension: int) -> NDArray[np.float64]:
         """Jᵀ times values (m, k) of the residuals (dimension, k)."""
-        result = np.zeros((dimension, values.shape[1]))
-        result[self.parameters] = self.jacobian.T @ values
-        return result
+        return self.jacobian.T @ values if len(values) else np.zeros((dimension, values.shape[1]))
+
+    def add_gradient(self, total: NDArray[np.float64]) -> None:
+        """Adds Jᵀr to a gradient (dim,)."""
+        total += self.jacobian.T @ self.residual
+
+    def add_curvature(self, total: NDArray[np.float64]) -> None:
+        """Adds JᵀJ to a matrix (dim, dim)."""
+        total += self.jacobian.T @ self.jacobian  # of one matrix: half the products
+
+    def add_square(self, weights: NDArray[np.float64], total: NDArray[np.float64]) -> None:
+        """Adds Jᵀ diag(weights) J, of weights (m,), not negative, to a matrix (dim, dim)."""
+        weighted = self.jacobian * np.sqrt(weights)[:, None]
+        total += weighted.T @ weighted
+
+    def leverage(self, covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+        """diag(J Σ Jᵀ) (m,) of a covariance Σ (dim, dim)."""
+        return np.vecdot(self.jacobian @ covariance, self.jacobian)
+
+    def add_scores(self, clusters: NDArray[np.int64], scores: NDArray[np.float64]) -> None:
+        """Adds the score Jᵀr of every residual to that of its cluster (m,), one of the rows of `scores` (…, dim)."""
+        every = np.arange(scores.shape[1])[None]
+        add_scores(clusters, self.residual, self.jacobian, every, np.array([0, len(clusters)]), scores)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,11 +111,11 @@ class PointLinearization:
         """A list of this linearisation alone."""
         return [self]
 
-    def parts(self) -> list[Linearization]:
-        """Linearisations with respect to theta by the chain rule, one per group of points."""
+    def parts(self) -> list["Part"]:
+        """A linearisation with respect to theta by the chain rule, sorted by the group of the points."""
         sparse_jacobian = self.sparse_jacobian
-        end = np.zeros(len(sparse_jacobian.parameters) + 1, np.int64)
-        count_points(self.points, sparse_jacobian.group, end)
+        start = np.zeros(len(sparse_jacobian.parameters) + 1, np.int64)
+        count_points(self.points, sparse_jacobian.group, start)
         m = len(self.residual)
         residual, jacobian, points = (
             np.empty(m),
@@ -107,8 +123,10 @@ class PointLinearization:
             np.empty(m, self.points.dtype),
         )
         of_points = sparse_jacobian.group, sparse_jacobian.local
-        apply_chain_rule(self.residual, self.rows, self.points, *of_points, end[:-1].copy(), residual, jacobian, points)
-        return split(residual, jacobian, end, sparse_jacobian.parameters, self.positions[points])
+        apply_chain_rule(
+            self.residual, self.rows, self.points, *of_points, start[:-1].copy(), residual, jacobian, points
+        )
+        return [GroupedLinearization(residual, jacobian, sparse_jacobian.parameters, start, self.positions[points])]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -139,7 +157,7 @@ class Together:
         split_values = zip(self.all, np.split(values, ends))
         return np.sum([part.transposed_times(own, dimension) for part, own in split_values], axis=0)
 
-    def parts(self) -> list[Linearization]:
+    def parts(self) -> list["Part"]:
         """Parts of all linearisations."""
         return [part for linear in self.all for part in linear.parts()]
 
@@ -170,7 +188,7 @@ class Linear(Protocol):
         """
         ...
 
-    def parts(self) -> list[Linearization]:
+    def parts(self) -> list["Part"]:
         """The same residuals in any order, grouped by the parameters that they depend on."""
         ...
 
@@ -179,28 +197,14 @@ class Linear(Protocol):
         ...
 
 
-def split(
-    residual: NDArray[np.float64],
-    jacobian: NDArray[np.float64],
-    start: NDArray[np.int64],
-    parameters: NDArray[np.int64],
-    positions: NDArray[np.floating],
-) -> list[Linearization]:
-    """One linearisation per non-empty group of residuals (m,), sorted by group with first indices `start`."""
-    return [
-        Linearization(residual[first:last], jacobian[first:last], own, positions[first:last])
-        for first, last, own in zip(start[:-1], start[1:], parameters)
-        if last > first
-    ]
+#: What linearisations consist of.
+Part = Linearization | GroupedLinearization
 
 
-def stack(parts: Sequence[Linear], dimension: int) -> Linearization:
+def stack(parts: Sequence[Linear | Part], dimension: int) -> Linearization:
     """Vertically stacked residuals and Jacobians with respect to all parameters."""
-    rows = [np.zeros((0, dimension))]
-    for part in parts:
-        rows.append(np.zeros((len(part.residual), dimension)))
-        rows[-1][:, part.parameters if isinstance(part, Linearization) else EVERY] = part.jacobian
+    rows = (part.dense(dimension) if isinstance(part, GroupedLinearization) else part.jacobian for part in parts)
     return Linearization(
         np.concatenate([np.zeros(0), *(part.residual for part in parts)]),
-        np.concatenate(rows),
+        np.concatenate([np.zeros((0, dimension)), *rows]),
     )

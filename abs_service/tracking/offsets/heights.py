@@ -49,7 +49,7 @@ class HeightSensor:
         radius = min(spacing / np.sqrt(np.pi), LARGEST_RADIUS_PX)  # a disc as large as a cell
         self._reach = int(radius)
         rows, columns = np.mgrid[-self._reach : self._reach + 1, -self._reach : self._reach + 1].reshape(2, -1)
-        self._steps = (rows * camera.width + columns)[np.hypot(rows, columns) <= radius]
+        self._steps = np.stack([rows, columns], axis=1)[np.hypot(rows, columns) <= radius]
         self._rays = camera.lookup.rays.reshape(-1, 3) @ camera.T_rs[:3, :3].T
 
     def measure(
@@ -69,31 +69,42 @@ class HeightSensor:
         sight = vertices - self._camera.center
         distance = np.sqrt(np.vecdot(sight, sight))
         cosine = np.abs(np.vecdot(sight, normals)) / distance
-        pixel, seen = self._pixel(vertices)
-        deviation, mean = self._noise_of(image, distance, pixel, seen & (cosine > MIN_COSINE))
+        row, column, seen = self._pixel(vertices)
+        top, left = int(row.min()) - self._reach, int(column.min()) - self._reach
+        window = slice(top, int(row.max()) + self._reach + 1), slice(left, int(column.max()) + self._reach + 1)
+        measured, amplitude = image.within(window)
+        own = amplitude[row - top, column - left].astype(np.float64)
+        deviation, mean = self._noise_of(own, distance, (row, column), seen & (cosine > MIN_COSINE))
         sigma = deviation * cosine
         limit = INLIER_DEVIATIONS * np.sqrt(sigma**2 + variance)
         height, pixels = np.empty_like(sigma), np.empty_like(sigma)
-        _mean_heights(
-            image.distance.ravel(), self._rays, self._steps, pixel, sight, normals, mean, limit, height, pixels
-        )
+        places = row, column, self._steps, self._camera.width, top, left
+        measured = np.ascontiguousarray(measured)  # one memory layout, for which the kernel is compiled
+        _mean_heights(measured, self._rays, *places, sight, normals, mean, limit, height, pixels)
         return Heights(height, pixels / np.where(pixels, sigma, 1) ** 2)
 
-    def _pixel(self, vertices: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-        """Number (n,) of the pixel of every vertex, and whether all of its pixels are in the image, (n,)."""
+    def _pixel(self, vertices: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
+        """Row and column (n,) of every vertex's pixel, and whether all of its pixels are in the image, (n,).
+
+        Of others, they are those of any pixel near the rest of the mesh.
+        """
         camera, reach = self._camera, self._reach
         column, row = np.floor(camera.project(vertices).T + 0.5)
         seen = (column >= reach) & (column < camera.width - reach) & (row >= reach) & (row < camera.height - reach)
-        return np.where(seen, row * camera.width + column, reach * (camera.width + 1)).astype(np.int64), seen
+        any_row, any_column = (row[seen][0], column[seen][0]) if seen.any() else (reach, reach)
+        row, column = np.where(seen, row, any_row), np.where(seen, column, any_column)
+        return row.astype(np.int64), column.astype(np.int64), seen
 
     def _noise_of(
-        self, image: DepthImage, distance: NDArray[np.float64], pixel: NDArray[np.int64], wanted: NDArray[np.bool_]
+        self,
+        amplitude: NDArray[np.float64],
+        distance: NDArray[np.float64],
+        pixel: tuple[NDArray[np.int64], NDArray[np.int64]],
+        wanted: NDArray[np.bool_],
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """σ and mean offset (n,) [m] of the vertices' own pixels; NaN where not wanted or not known."""
-        amplitude = image.amplitude.ravel()[pixel].astype(np.float64)
         known = wanted & (np.isfinite(amplitude) | (not self._noise.uses_amplitude))
-        row, column = np.divmod(pixel[known], self._camera.width)
-        arguments = distance[known], amplitude[known], (row, column)
+        arguments = distance[known], amplitude[known], (pixel[0][known], pixel[1][known])
         deviation, mean = np.full((2, len(distance)), np.nan)
         deviation[known], mean[known] = self._noise.deviation(*arguments), self._noise.mean(*arguments)
         return deviation, mean
@@ -103,8 +114,12 @@ class HeightSensor:
 def _mean_heights(
     distance: NDArray[np.float32],
     rays: NDArray[np.float64],
+    rows: NDArray[np.int64],
+    columns: NDArray[np.int64],
     steps: NDArray[np.int64],
-    pixel: NDArray[np.int64],
+    width: int,
+    top: int,
+    left: int,
     sight: NDArray[np.float64],
     normals: NDArray[np.float64],
     mean: NDArray[np.float64],
@@ -115,24 +130,27 @@ def _mean_heights(
     """Mean height of the inliers among every vertex's pixels, if they are more than half.
 
     Args:
-        distance: measured distances of all pixels (height · width,) [m].
+        distance: measured distances in a window of the image [m].
         rays: unit directions of all pixels in the rig frame (height · width, 3).
-        steps: from a vertex's own pixel to each of its pixels (k,).
-        pixel: of every vertex (n,).
+        rows, columns: of every vertex's own pixel (n,).
+        steps: rows and columns (k, 2) from a vertex's own pixel to each of its pixels.
+        width: of the image.
+        top, left: the window's first row and column.
         sight: vertices relative to the camera (n, 3) [m].
         normals: their unit normals (n, 3).
         mean: mean offset of their measurements (n,) [m]; NaN where nothing is to be measured.
         limit: largest height of an inlier (n,) [m].
         height, pixels: results (n,) [m], and the number of inliers (n,); both 0 without enough of them.
     """
-    for v in range(pixel.size):
+    for v in range(rows.size):
         x, y, z = normals[v, 0], normals[v, 1], normals[v, 2]
         vertex, total, count = sight[v, 0] * x + sight[v, 1] * y + sight[v, 2] * z, 0.0, 0
-        for step in steps:
-            ray = rays[pixel[v] + step]
-            away = (distance[pixel[v] + step] - mean[v]) * (ray[0] * x + ray[1] * y + ray[2] * z) - vertex
+        for k in range(steps.shape[0]):
+            row, column = rows[v] + steps[k, 0], columns[v] + steps[k, 1]
+            ray = rays[row * width + column]
+            away = (distance[row - top, column - left] - mean[v]) * (ray[0] * x + ray[1] * y + ray[2] * z) - vertex
             if abs(away) < limit[v]:  # False for NaN
                 total += away
                 count += 1
-        enough = 2 * count > steps.size
+        enough = 2 * count > steps.shape[0]
         height[v], pixels[v] = (total / count, count) if enough else (0.0, 0)

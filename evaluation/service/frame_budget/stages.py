@@ -7,7 +7,7 @@ from abs_service.tracker.posterior.posterior import FramePosterior, Posterior
 from abs_service.tracker.posterior.uncertainty import Uncertainty
 from abs_service.tracker.shape_quality import ShapeJudge
 from abs_service.tracker.synthesis.sparse import Sparse, SparseView
-from abs_service.tracker.terms.depth import depth
+from abs_service.tracker.terms.depth import depth, texels
 from abs_service.tracker.terms.depth.background import Background
 from abs_service.tracker.terms.depth.outline import RimOutline
 from abs_service.tracker.terms.photometric.color import ColorTerm
@@ -30,7 +30,8 @@ SEAMS = (
     Seam("predict", Posterior, "observe"),
     Seam("textures, masks", TermSum, "observe"),
     Seam("window", Sparse, "window"),
-    Seam("noise rendering", depth, "write_texture"),
+    Seam("noise rendering", texels, "corrected_distances"),
+    Seam("noise rendering", texels, "write_pixels"),
     Seam("rendered prediction", SparseView, "render"),
     Seam("visible vertices", SparseView, "look"),
     Seam("classify", depth, "dropouts"),

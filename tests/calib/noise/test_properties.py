@@ -7,8 +7,9 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from numpy.polynomial.polynomial import polyval2d
 
-from calib.noise.base import WINDOW_M, log_density, sample
+from calib.noise.base import log_density, sample
 from calib.noise.fit.polynomial import evaluate
+from calib.noise.texture import WINDOW_M
 from tests.calib.noise.models import AMPLITUDES, DISTANCES, HEIGHT, MODELS, WIDTH, any_model
 from tests.calib.noise.texels import negative_log_density, render_texture
 

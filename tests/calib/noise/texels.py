@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from calib.noise.base import WINDOW_M, DepthNoise, write_texture
+from calib.noise.base import DepthNoise
+from calib.noise.texture import WINDOW_M, write_texture
 
 
 def render_texture(model: DepthNoise, distance: np.ndarray, amplitude: np.ndarray, uniform: float) -> np.ndarray:

@@ -6,7 +6,8 @@ from numpy.typing import NDArray
 from abs_service.tracker.mesh import Mesh, edge_lengths
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.posterior.priors.edge_runs import EdgeRuns
-from abs_service.tracker.terms.linearization import Linearization, split
+from abs_service.tracker.terms.grouped import GroupedLinearization
+from abs_service.tracker.terms.linearization import Linearization, Part
 from calib.jit import kernel
 
 
@@ -38,7 +39,7 @@ class StretchPrior:
         """Negative log-density (population,) of the edge lengths, up to a constant."""
         return self._runs.sum_squares(surface.vertices, 0.5 * self._inverse_deviation**2)
 
-    def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> list[Linearization]:
+    def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> list[Part]:
         """The edges' normalised residuals of a population of one; those between groups of vertices in one part."""
         start = np.zeros(len(sparse_jacobian.parameters) + 2, np.int64)
         _count_edges(self._edges, sparse_jacobian.group, start)
@@ -49,8 +50,8 @@ class StretchPrior:
         of_points = sparse_jacobian.local, sparse_jacobian.group, sparse_jacobian.parameters
         edges = surface.vertices[0], self._edges, scales, self._inverse_deviation
         _stretch_rows(*edges, *of_points, start[:-1].copy(), residual, rows, across)
-        parts = split(residual[:within], rows, start[:-1], sparse_jacobian.parameters, np.zeros((0, 3)))
-        return [*parts, Linearization(residual[within:], across)]
+        grouped = GroupedLinearization(residual[:within], rows, sparse_jacobian.parameters, start[:-1])
+        return [grouped, Linearization(residual[within:], across)]
 
 
 @kernel

@@ -9,27 +9,25 @@ from numpy.typing import NDArray
 from abs_service.pairing.images import DepthImage, Image
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import Synthesis, Synthesizer
-from abs_service.tracker.synthesis.window import WHOLE, Bordered, Placed, Window, corner, within
+from abs_service.tracker.synthesis.window import WHOLE, Placed, corner
 from abs_service.tracker.terms.base import Bounds, SensorFit, facing, summarize
 from abs_service.tracker.terms.depth.background import Background, dropouts
 from abs_service.tracker.terms.depth.continuation import Continuation, NoContinuation
 from abs_service.tracker.terms.depth.depth_cost import (
     FREE_SCALE_M,
     depth_cost,
-    distances,
-    median_inlier_cost,
     missing_cost,
     normalize,
-    write_constants,
 )
 from abs_service.tracker.terms.depth.outline import NoOutline, Outline
+from abs_service.tracker.terms.depth.texels import Unusable, texels
 from abs_service.tracker.terms.depth.visibility import Visibility, classify
 from abs_service.tracker.terms.gradients import color_rows, depth_rows
 from abs_service.tracker.terms.linearization import NO_ROWS, PointLinearization, Together
 from abs_service.tracker.terms.vertex_counts import Sight
 from calib import pose
 from calib.camera import Camera
-from calib.noise.base import DepthNoise, write_texture
+from calib.noise.base import DepthNoise
 
 #: Nearer to the object than this, a sample in free space is pulled back no more stiffly [m].
 MIN_FREE_M = 0.005
@@ -57,7 +55,6 @@ class DepthTerm:
         continuation: Callable[[Camera], Continuation] = lambda camera: NoContinuation(),
     ):
         self.sensor = sensor
-        self._noise = noise
         self._bounds = bounds
         self._synthesizer = synthesizer
         self._view = synthesizer.view(sensor, np.zeros((vertices, 0), np.float32))
@@ -65,10 +62,7 @@ class DepthTerm:
         self._continuation = continuation(self._view.camera)
         self._background = Background()
         self._missing = np.zeros((1, vertices), np.float32)
-        # Cost of no measurement, unbounded, so that leaving the image does not lower the cost.
-        beyond = np.array([0, 0, 0, 0, 0, 0, bounds.outlier - bounds.inlier, 0], np.float32)
-        self._image = Bordered(np.array([0, 0, 0, 0, 0, 0, bounds.uniform, 0], np.float32), beyond)
-        self._texture = np.zeros((0, 8), np.float32)
+        self._texels = texels(sensor, synthesizer, noise, bounds)
         self._images = Placed(np.bool_), Placed(np.bool_), Placed(np.float32), Placed(np.bool_)
         self._lost = self._covered = np.zeros(0, np.bool_)
         self._doubtful = np.zeros(0, np.bool_)
@@ -81,37 +75,27 @@ class DepthTerm:
         if not isinstance(image, DepthImage):
             raise TypeError(f"sensor {self.sensor} has a depth noise model but delivered {type(image).__name__}")
         window = self._synthesizer.window(self.sensor, predicted, reach_m)
-        texture = self._synthesizer.texture(self.sensor, self._render(image, window))
-        texels = within(texture, window)
-        expected = self._view.render(predicted)[window]
+        distance = self._texels.observe(image, window)
+        expected = np.ascontiguousarray(self._view.render(predicted)[window])
         self._view.look(predicted)
-        distance = np.empty(texels.shape[:2], np.float32)
-        distances(texels, distance)
-        height, width = texture.shape[0] - 2, texture.shape[1] - 2
         missing = np.isnan(distance)
         single = dropouts(missing)
-        empty = self._background.observe(missing & ~single, np.isfinite(expected), window, (height, width))
+        empty = self._background.observe(missing & ~single, np.isfinite(expected), window, self._texels.shape)
         seen = classify(distance, expected, self._view.camera.fx, empty, single)
         doubtful = self._outline.observe(distance, seen, expected, predicted, window)
         self._continuation.observe(seen.object, window)
         self._window, self._distance, self._foreground = window, distance, seen.foreground
-        self._place(seen, doubtful, (height, width))
-        self._explain_pixels(texture, seen, doubtful, predicted)
-        self._texture = texture.reshape(-1, 8)
+        free_m = np.where(doubtful, np.float32(0), seen.free_m)
+        self._place(seen, doubtful, free_m)
+        self._explain_pixels(seen, doubtful, free_m, predicted)
 
-    def _place(self, seen: Visibility, doubtful: NDArray[np.bool_], shape: tuple[int, int]) -> None:
-        """Puts what the window shows where samples find it: into images (height + 2, width + 2) of a shape."""
-        lost, free_m = seen.hole | seen.dropout, np.where(doubtful, np.float32(0), seen.free_m)
+    def _place(self, seen: Visibility, doubtful: NDArray[np.bool_], free_m: NDArray[np.float32]) -> None:
+        """Puts what the window shows where samples find it: into images (height + 2, width + 2)."""
+        lost, shape = seen.hole | seen.dropout, self._texels.shape
         self._lost = self._images[0].put(self._window, lost, *shape).ravel()
         self._doubtful = self._images[1].put(self._window, doubtful, *shape).ravel()
         self._free_m = self._images[2].put(self._window, free_m, *shape)
         self._covered = self._images[3].put(self._window, seen.foreground, *shape).ravel()
-
-    def _render(self, image: DepthImage, window: Window) -> NDArray[np.float32]:
-        """The noise model over a window of an image (height + 2, width + 2, 8)."""
-        texture = self._image.begin(image.distance.shape, window)
-        write_texture(self._noise, image.distance[window], image.amplitude[window], corner(window), texture)
-        return texture
 
     def foreground(self) -> NDArray[np.float64]:
         """Points (k, 3) [m] of occluders."""
@@ -126,9 +110,9 @@ class DepthTerm:
         """Does nothing: a depth sensor detects occluders in its own image."""
 
     def _explain_pixels(
-        self, texture: NDArray[np.float32], seen: Visibility, doubtful: NDArray[np.bool_], predicted: Surface
+        self, seen: Visibility, doubtful: NDArray[np.bool_], free_m: NDArray[np.float32], predicted: Surface
     ) -> None:
-        """Writes constant costs into the texture (height + 2, width + 2, 8) at pixels without a usable distance.
+        """Sets constant costs at pixels without a usable distance.
 
         Behind an occluder, in a hole, and next to an outline with a term of its own, a vertex costs the mean of an
         inlier, so that the cost has no gradient there. In free space it costs an outlier plus a penalty proportional to
@@ -136,11 +120,9 @@ class DepthTerm:
         """
         if not seen.object.any():
             return
-        masked, missing = seen.foreground | seen.hole | doubtful, np.isnan(self._distance)
-        agreeing = median_inlier_cost(within(texture, self._window), seen.object)
-        free_m, outlier = within(self._free_m, self._window), self._bounds.outlier - self._bounds.inlier
-        write_constants(masked, missing, free_m, agreeing, outlier, *corner(self._window), texture)
-        self._missing = missing_cost(self._bounds.no_return, predicted, self._view.camera.center, outlier - agreeing)
+        agreeing = self._texels.explain(Unusable(seen.foreground | seen.hole | doubtful, free_m, seen.object))
+        most = self._bounds.outlier - self._bounds.inlier - agreeing
+        self._missing = missing_cost(self._bounds.no_return, predicted, self._view.camera.center, most)
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
         """−Σ_v log φ (population,) plus the cost of the outline."""
@@ -150,7 +132,8 @@ class DepthTerm:
         """Cost (population,) of the distances; the density is the larger of inlier and outlier density."""
         out = np.empty(len(seen.pixel))
         missing = self._view.carry(surface, self._missing)
-        depth_cost(seen.pixel, seen.distance, missing, self._texture, self._bounds.inlier, self._bounds.outlier, out)
+        texture = self._texels.at(seen.pixel)
+        depth_cost(seen.pixel, seen.distance, missing, texture, self._bounds.inlier, self._bounds.outlier, out)
         return self._view.balance(out, surface, self._bounds.inlier + self._bounds.uniform)
 
     def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> Together:
@@ -221,5 +204,5 @@ class DepthTerm:
     def _residuals(self, seen: Synthesis) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Normalised residual, inverse deviation, and unbounded cost, infinite without a measurement, each (n,)."""
         residual, inverse, cost = np.empty((3, seen.pixel.shape[1]))
-        normalize(seen.pixel[0], seen.distance[0], self._texture, residual, inverse, cost)
+        normalize(seen.pixel[0], seen.distance[0], self._texels.at(seen.pixel), residual, inverse, cost)
         return residual, inverse, cost

@@ -1,4 +1,4 @@
-"""Kernels of the cost of measured distances; textures as written by `calib.noise.base.write_texture`."""
+"""Kernels of the cost of measured distances; textures as written by `calib.noise.texture.write_texture`."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from abs_service.tracker.models.base import Surface
 from calib.jit import kernel, prange
 from calib.no_return import NoReturn
-from calib.noise.base import WINDOW_M
+from calib.noise.texture import WINDOW_M
 
 #: A vertex in free space costs one unit of log-likelihood more for every so many metres from the object: the outline
 #: errs by a Laplace distribution of this scale.
@@ -50,30 +50,52 @@ def distances(texels: NDArray[np.float32], found: NDArray[np.float32]) -> None:
 
 
 @kernel
+def settle(
+    row: int,
+    column: int,
+    masked: NDArray[np.bool_],
+    distance: NDArray[np.float32],
+    free_m: NDArray[np.float32],
+    missing: NDArray[np.float32],
+    agreeing: float,
+    outlier: float,
+    texel: NDArray[np.float32],
+) -> bool:
+    """Writes the constant cost of a pixel without a usable distance into its texel (8,); False if it has one.
+
+    At a distance d > 0 from the object, in free space, that is outlier + d / s; else at a masked pixel `agreeing`; else
+    at a missing return the texel `missing`, see `depth_cost`. The others are images (rows, columns).
+    """
+    free, is_masked = free_m[row, column], masked[row, column]
+    if not (free > 0 or is_masked or np.isnan(distance[row, column])):
+        return False
+    texel[:] = 0
+    if free > 0:
+        texel[6] = np.float32(outlier) + free * np.float32(1 / FREE_SCALE_M)
+    elif is_masked:
+        texel[6] = np.float32(agreeing)
+    else:
+        texel[:] = missing
+    return True
+
+
+@kernel
 def write_constants(
     masked: NDArray[np.bool_],
-    missing: NDArray[np.bool_],
+    distance: NDArray[np.float32],
     free_m: NDArray[np.float32],
+    missing: NDArray[np.float32],
     agreeing: float,
     outlier: float,
     top: int,
     left: int,
     texture: NDArray[np.float32],
 ) -> None:
-    """Writes constant costs into the texels of pixels without a usable distance.
-
-    At distance d > 0 from the object, in free space, that is outlier + d / s; else at masked pixels `agreeing`; else at
-    missing returns `agreeing` plus what a missing return costs the sample that meets it, see `depth_cost`.
-    """
-    per_metre = np.float32(1 / FREE_SCALE_M)
+    """`settle` for all pixels of a window (rows, columns) of a texture with a border of one pixel."""
     for row in range(masked.shape[0]):
         for column in range(masked.shape[1]):
-            free = free_m[row, column]
-            if free > 0 or masked[row, column] or missing[row, column]:
-                texel = texture[top + row + 1, left + column + 1]
-                texel[:] = 0
-                texel[6] = np.float32(outlier) + free * per_metre if free > 0 else np.float32(agreeing)
-                texel[7] = np.float32(0) if free > 0 or masked[row, column] else np.float32(1)
+            texel = texture[top + row + 1, left + column + 1]
+            settle(row, column, masked, distance, free_m, missing, agreeing, outlier, texel)
 
 
 @kernel

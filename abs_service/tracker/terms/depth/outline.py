@@ -17,7 +17,7 @@ from abs_service.tracker.synthesis.projection import Projection
 from abs_service.tracker.synthesis.window import WHOLE, Window, corner
 from abs_service.tracker.terms.base import RimFit
 from abs_service.tracker.terms.depth.outline_distance import inwards
-from abs_service.tracker.terms.depth.rim import Rim, chain, locate, shared_by_side
+from abs_service.tracker.terms.depth.rim import Rim, chain, locate, read, shared_by_side
 from abs_service.tracker.terms.depth.rim_classes import LARGEST_GAP_STEPS, RimClass, classify_rim
 from abs_service.tracker.terms.depth.rim_cost import FARTHEST, rim_cost
 from abs_service.tracker.terms.depth.visibility import Visibility
@@ -211,14 +211,8 @@ class RimOutline:
 
     def _inside_at(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Distance inside the outline (k,) of points (k, 3) [px]: −∞ far outside, NaN if unknown."""
-        pixels = np.nan_to_num(project_with_jacobian(self._camera, points)[0], nan=-1e6)
-        place = np.floor(pixels - self._corner + 0.5)
-        rows, columns = self._inwards.shape
-        near = np.all((place >= 0) & (place < (columns, rows)), axis=1)
-        away = np.full(len(place), -np.inf)  # the part of the image ends beside the object
-        away[~np.all((pixels >= 0) & (pixels < (self._camera.width, self._camera.height)), axis=1)] = np.nan
-        column, row = place[near].astype(np.intp).T
-        away[near] = self._inwards[row, column]
+        away, last = np.empty(len(points)), np.array([self._camera.width, self._camera.height], np.float64)
+        read(self._inwards, self._corner, project_with_jacobian(self._camera, points)[0], last, away)
         return away
 
     @property
@@ -238,11 +232,8 @@ class RimOutline:
     ) -> NDArray[np.bool_]:
         """True for outer vertices (m,) that lie behind the predicted surface (rows, columns) [m]."""
         points = predicted.vertices[0].T[self._rim.outer[which]].astype(np.float64)
-        pixels = np.nan_to_num(project_with_jacobian(self._camera, points)[0], nan=-1.0)
-        place = np.floor(pixels + 0.5).astype(np.intp)
-        column, row = (place - corner(window)[::-1]).T
-        inside = (row >= 0) & (row < expected.shape[0]) & (column >= 0) & (column < expected.shape[1])
-        hidden = np.zeros(len(which), np.bool_)
-        distance = np.linalg.norm(points[inside] - self._camera.center, axis=1)
-        hidden[inside] = expected[row[inside], column[inside]] < distance - HIDDEN_BEHIND_M
-        return hidden
+        in_front, last = np.empty(len(which)), np.array([self._camera.width, self._camera.height], np.float64)
+        first = np.array(corner(window)[::-1], np.float32)
+        read(expected, first, project_with_jacobian(self._camera, points)[0], last, in_front)
+        behind = in_front < np.linalg.norm(points - self._camera.center, axis=1) - HIDDEN_BEHIND_M
+        return behind & (in_front > -np.inf)

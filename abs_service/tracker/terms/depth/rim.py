@@ -65,6 +65,33 @@ def look_up(
 
 
 @kernel
+def read(
+    image: NDArray[np.float32],
+    corner: NDArray[np.float32],
+    places: NDArray[np.float64],
+    last: NDArray[np.float64],
+    values: NDArray[np.float64],
+) -> None:
+    """Values (n,) of the pixels of a part of an image at places (n, 2); −∞ beside the part, NaN beside the image.
+
+    Args:
+        image: the part (rows, columns).
+        corner: column and row of its first pixel (2,).
+        places: columns and rows; NaN is beside the image.
+        last: column and row (2,) at which the image ends.
+        values: results.
+    """
+    for k in range(places.shape[0]):
+        u, v = places[k, 0], places[k, 1]
+        if not (u >= 0 and v >= 0 and u < last[0] and v < last[1]):
+            values[k] = np.nan
+            continue
+        column, row = int(np.floor(u - corner[0] + 0.5)), int(np.floor(v - corner[1] + 0.5))
+        inside = row >= 0 and row < image.shape[0] and column >= 0 and column < image.shape[1]
+        values[k] = image[row, column] if inside else -np.inf
+
+
+@kernel
 def chain(
     rows: NDArray[np.float64],
     outer: NDArray[np.intp],

@@ -156,27 +156,42 @@ def _holes(
 
 
 def _extended(predicted: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Distances [m] of the predicted mesh, beside it those of its nearest pixel."""
-    beside = ~np.isfinite(predicted)
+    """Distances [m] of the predicted mesh, beside it those of its nearest pixel, found in an image of half the size."""
+    coarse = np.full([-(-size // 2) for size in predicted.shape], np.float32(np.inf))
+    _halve(predicted, coarse)
     labels = cv2.distanceTransformWithLabels(
-        beside.view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
+        (~np.isfinite(coarse)).view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
     )[1]
     values = np.empty(predicted.shape, np.float32)
-    _spread(predicted, np.asarray(labels, np.int32), values)
+    _spread(predicted, coarse, np.asarray(labels, np.int32), values)
     return values
 
 
 @kernel
-def _spread(predicted: NDArray[np.float32], labels: NDArray[np.int32], values: NDArray[np.float32]) -> None:
-    """Value of the pixel on the mesh with the same label, for every pixel; NaN if there is none."""
+def _halve(image: NDArray[np.float32], coarse: NDArray[np.float32]) -> None:
+    """Least value of every square of four pixels, into infinities of half the size, rounded up."""
+    for row in range(image.shape[0]):
+        for column in range(image.shape[1]):
+            coarse[row // 2, column // 2] = min(coarse[row // 2, column // 2], image[row, column])
+
+
+@kernel
+def _spread(
+    predicted: NDArray[np.float32],
+    coarse: NDArray[np.float32],
+    labels: NDArray[np.int32],
+    values: NDArray[np.float32],
+) -> None:
+    """Predicted values, beside them those of the coarse pixel with the same label; NaN if there is none."""
     table = np.full(labels.size + 1, np.float32(np.nan))
     for row in range(labels.shape[0]):
         for column in range(labels.shape[1]):
-            if np.isfinite(predicted[row, column]):
-                table[labels[row, column]] = predicted[row, column]
-    for row in range(labels.shape[0]):
-        for column in range(labels.shape[1]):
-            values[row, column] = table[labels[row, column]]
+            if np.isfinite(coarse[row, column]):
+                table[labels[row, column]] = coarse[row, column]
+    for row in range(values.shape[0]):
+        for column in range(values.shape[1]):
+            own = predicted[row, column]
+            values[row, column] = own if np.isfinite(own) else table[labels[row // 2, column // 2]]
 
 
 def _depth_inside(mask: NDArray[np.bool_]) -> NDArray[np.float32]:

@@ -5,8 +5,8 @@ from numpy.typing import NDArray
 
 from abs_service.pairing.images import ColorImage, Image
 from abs_service.tracker.models.base import SparseJacobian, Surface
-from abs_service.tracker.synthesis.base import Synthesizer
-from abs_service.tracker.synthesis.window import NOTHING_HAS, Bordered
+from abs_service.tracker.synthesis.base import Synthesis, Synthesizer
+from abs_service.tracker.synthesis.window import NOTHING_HAS, Bordered, Window
 from abs_service.tracker.terms.base import Bounds, SensorFit, facing, summarize
 from abs_service.tracker.terms.gradients import color_rows
 from abs_service.tracker.terms.linearization import PointLinearization
@@ -48,8 +48,8 @@ class ColorTerm:
         self._inverse = np.zeros((0, 3), np.float32)
         self._normalizer = np.zeros(0, np.float32)
         self._texture = np.zeros((0, 3), np.float32)
-        self._image = np.zeros((1, 1, 3), np.float32)
-        self._levels = np.zeros((0, 0, 3), np.float32)
+        self._image: NDArray[np.float32] | NDArray[np.uint8] = np.zeros((1, 1, 3), np.float32)
+        self._levels = np.zeros((0, 0, 3), np.uint8)
         self._bordered = Bordered(np.full(3, np.nan, np.float32), np.full(3, NOTHING_HAS, np.float32))
 
     def observe(self, image: Image, predicted: Surface, reach_m: float = np.inf) -> None:
@@ -57,10 +57,7 @@ class ColorTerm:
         if not isinstance(image, ColorImage):
             raise TypeError(f"sensor {self.sensor} has a colour noise model but delivered {type(image).__name__}")
         window = self._synthesizer.window(self.sensor, predicted, reach_m)
-        if self._levels.shape != image.rgb.shape:
-            self._levels = np.zeros(image.rgb.shape, np.float32)
-        self._levels[window] = image.rgb[window]
-        self._image = self._synthesizer.image(self.sensor, self._levels)
+        self._image = self._resampled(image.rgb) if self._synthesizer.resamples else self._ordered(image.rgb, window)
         texture = self._bordered.move(self._image.shape[:2], window)
         self._bordered.inside[:] = self._image[window]
         self._texture = texture.reshape(-1, 3)
@@ -70,6 +67,21 @@ class ColorTerm:
             np.float32(1) / (self._sigma * widening.factor), 3 // widening.factor.shape[1], axis=1
         )
         self._normalizer = (self._constant + 3 * widening.log.mean(axis=1)).astype(np.float32)
+
+    def _resampled(self, rgb: NDArray[np.uint8]) -> NDArray[np.float32]:
+        """The image in the view's camera, NaN where unknown."""
+        return self._synthesizer.image(self.sensor, rgb.astype(np.float32))
+
+    def _ordered(self, rgb: NDArray[np.uint8], window: Window) -> NDArray[np.uint8]:
+        """The image, of which a view with reversed channels is copied in the window: one layout for the kernels."""
+        if rgb.flags.c_contiguous:
+            return rgb
+        if self._levels.shape != rgb.shape:
+            self._levels = np.zeros(rgb.shape, np.uint8)
+        self._levels[window] = rgb[window]
+        levels = self._levels.view()
+        levels.setflags(write=False)  # as frames are
+        return levels
 
     def foreground(self) -> NDArray[np.float64]:
         """No points: colours carry no distance."""
@@ -82,7 +94,10 @@ class ColorTerm:
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
         """−Σ_v log of the density of the measured colours (population,)."""
-        seen = self._view.synthesize(surface)
+        return self._cost_of(self._view.synthesize(surface), surface)
+
+    def _cost_of(self, seen: Synthesis, surface: Surface) -> NDArray[np.float64]:
+        """Cost (population,) of what is synthesised."""
         out = np.empty(len(seen.pixel))
         _color_cost(seen.pixel, seen.attributes, *self._measured, out)
         return self._view.balance(out, surface, self._bounds.inlier + self._bounds.uniform)
@@ -94,7 +109,7 @@ class ColorTerm:
 
     def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> PointLinearization:
         """Normalised residuals of the inliers, three channels each, and their derivatives with respect to theta."""
-        residual, measured = self._residuals(surface)
+        residual, measured = self._residuals(self._view.synthesize(surface))
         use = measured & (self._normalizer + 0.5 * np.sum(residual**2, axis=1) < self._bounds.outlier)
         vertices = self._view.spread(surface, surface.vertices[0].T)
         inverse = np.broadcast_to(self._inverse, residual.shape)[use, :, None]
@@ -105,12 +120,12 @@ class ColorTerm:
 
     def fit(self, surface: Surface) -> SensorFit:
         """Agreement of the sensor with a population of one."""
-        residual, measured = self._residuals(surface)
         seen = self._view.synthesize(surface)
+        residual, measured = self._residuals(seen)
         pixel, known = seen.pixel[0], np.isfinite(seen.attributes[0]).all(axis=0)
         hidden = np.isinf(self._texture[pixel, 0])
         sight = Sight.of(pixel, facing(self._view, surface), np.zeros_like(hidden), hidden, ~known)
-        mean = -float(self.cost(surface)[0]) / len(residual)
+        mean = -float(self._cost_of(seen, surface)[0]) / len(residual)
         size = np.sqrt(np.mean(residual**2, axis=1))
         return summarize(self.sensor, sight, measured, size, mean, channels=3)
 
@@ -118,9 +133,8 @@ class ColorTerm:
         """Zero: colours carry no distance."""
         return np.zeros((2, 1))
 
-    def _residuals(self, surface: Surface) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    def _residuals(self, seen: Synthesis) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
         """Normalised residuals (n, 3) and mask of the measured samples (n,)."""
-        seen = self._view.synthesize(surface)
         colors = seen.attributes[0].T.astype(np.float64)
         residual = (self._texture[seen.pixel[0]] - colors) * self._inverse
         measured = (seen.pixel[0] > 0) & np.all(np.isfinite(residual), axis=1)

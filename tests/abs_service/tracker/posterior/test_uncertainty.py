@@ -36,6 +36,17 @@ def test_vertices_of_a_linear_model_scatter_as_their_covariance_says(seed):
 
 
 @given(SEEDS)
+def test_groups_of_vertices_in_any_order_have_the_covariance_of_the_dense_jacobian(seed):
+    generator = np.random.default_rng(seed)
+    group = generator.integers(0, 3, 9).astype(np.int32)
+    parameters = np.array([generator.permutation(7)[:4] for _ in range(3)], np.int64)
+    sparse_jacobian = SparseJacobian(generator.standard_normal((9, 3, 4)), group, parameters, 7)
+    root = generator.standard_normal((7, 7))
+    expected = np.einsum("nid,de,nje->nij", sparse_jacobian.dense, root @ root.T, sparse_jacobian.dense)
+    np.testing.assert_allclose(propagated(sparse_jacobian, root @ root.T), expected, atol=1e-12)
+
+
+@given(SEEDS)
 def test_what_remains_of_the_meshs_own_errors_is_that_of_the_definition(seed):
     generator = np.random.default_rng(seed)
     jacobian, response = generator.standard_normal((7, 3, 6)), generator.standard_normal((6, 7))

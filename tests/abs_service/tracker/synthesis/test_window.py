@@ -23,11 +23,11 @@ from abs_service.tracker.terms.photometric.channel import ChannelTerm
 from abs_service.tracker.terms.photometric.color import ColorTerm
 from abs_service.tracker.terms.photometric.illumination import Passive
 from calib.camera import Camera
-from calib.noise.base import write_texture
 from calib.noise.gaussian_polynomial import GaussianPolynomial
 from calib.noise.images.bayer import GaussianBayer
 from calib.noise.images.color import GaussianColor
 from calib.noise.per_pixel import PerPixel
+from calib.noise.texture import write_texture
 from tests.abs_service.tracker.scenes import (
     CAMERA,
     FISHEYE,

@@ -10,6 +10,7 @@ from abs_service.tracker.posterior.priors.stretch_prior import StretchPrior
 from abs_service.tracker.terms.base import Bounds
 from abs_service.tracker.terms.depth.depth import DepthTerm
 from abs_service.tracker.terms.depth.depth_cost import FREE_SCALE_M, depth_cost, write_constants
+from abs_service.tracker.terms.depth.texels import missing_texel
 from abs_service.tracker.terms.photometric.color import ColorTerm
 from calib.camera import Camera
 from calib.noise.gaussian_polynomial import GaussianPolynomial
@@ -90,7 +91,8 @@ def test_pixels_that_say_nothing_of_distances_become_constants(seed):
     inner[missing] = np.eye(8)[6] * -2.5 + np.eye(8)[7]
     inner[silent] = np.eye(8)[6] * -2.5
     inner[free_m > 0] = np.eye(8)[6] * (7.0 + free_m[free_m > 0, None] / FREE_SCALE_M)
-    write_constants(silent, missing, free_m, -2.5, 7.0, top, left, texture)
+    distance = np.where(missing, np.nan, 1).astype(np.float32)
+    write_constants(silent, distance, free_m, missing_texel(-2.5), -2.5, 7.0, top, left, texture)
     np.testing.assert_allclose(texture, expected, rtol=1e-5)
 
 

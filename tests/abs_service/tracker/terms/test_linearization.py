@@ -255,3 +255,20 @@ def test_linearizations_are_stacked_also_if_there_is_none():
     assert stack([], 3).jacobian.shape == (0, 3)
     parts = [Linearization(np.ones(k), np.full((k, 3), k)) for k in (1, 2)]
     assert stack(parts, 3).jacobian.tolist() == [[1, 1, 1], [2, 2, 2], [2, 2, 2]]
+
+
+def test_colours_are_read_alike_whatever_the_order_of_their_bytes():
+    """A camera that delivers blue first: its image is a view with reversed channels."""
+    mesh = sheet(7, 9, height=flat, size=(0.2, 0.14))
+    model, theta, noise = Rigid(mesh), np.zeros(6), GaussianColor(10.0)
+    columns, rows = COLOR.project(mesh.vertices).T
+    colors, bounds = np.stack([columns, rows, 255 - rows], axis=-1), LIKELIHOOD.bounds(seen_by(noise))
+    found = []
+    for rgb in (ramp(), np.ascontiguousarray(ramp()[..., ::-1])[..., ::-1]):
+        term = ColorTerm("color", sparse(COLOR, mesh), colors.astype(np.float32), noise, bounds)
+        for _ in range(2):  # memory is reused
+            term.observe(ColorImage(rgb), as_surface((mesh.vertices, mesh.normals)), 0.02)
+        found.append(term.linearize(model.deform(theta[None]), model.sparse_jacobian(theta)))
+    np.testing.assert_array_equal(found[0].residual, found[1].residual)
+    np.testing.assert_array_equal(found[0].jacobian, found[1].jacobian)
+    assert found[0].residual.size > mesh.vertices.size / 2

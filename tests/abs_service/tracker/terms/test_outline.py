@@ -16,7 +16,7 @@ from abs_service.tracker.objectives import likelihood
 from abs_service.tracker.synthesis.projection import optics
 from abs_service.tracker.terms.base import Bounds
 from abs_service.tracker.terms.depth.outline_distance import inwards
-from abs_service.tracker.terms.depth.rim import Rim, look_up
+from abs_service.tracker.terms.depth.rim import Rim, look_up, read
 from abs_service.tracker.terms.depth.rim_cost import FARTHEST, rim_cost
 from abs_service.tracker.terms.depth.visibility import classify
 from calib.lenses.fisheye import KannalaBrandt
@@ -26,6 +26,25 @@ from calib.rig import Sensor
 from tests import reference
 from tests.abs_service.tracker.scenes import depth_image, sparse
 from tests.abs_service.tracker.terms.outline_scene import CAMERA, MESH, look, moved, outline, picture
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_places_read_their_pixel_of_a_part_of_an_image(seed: int):
+    generator = np.random.default_rng(seed)
+    image = generator.normal(size=(12, 15)).astype(np.float32)
+    (top, left), places = generator.integers(0, 5, 2), generator.uniform(-2, 17, (40, 2))
+    places[generator.random(40) < 0.1] = np.nan
+    part, values = image[top : top + 6, left : left + 7], np.empty(40)
+    read(part, np.array([left, top], np.float32), places, np.array([15.0, 12.0]), values)
+    for (u, v), value in zip(places, values, strict=True):
+        row, column = np.floor(v + 0.5), np.floor(u + 0.5)
+        if not (0 <= u < 15 and 0 <= v < 12):
+            assert np.isnan(value)
+        elif top <= row < top + 6 and left <= column < left + 7:
+            assert value == image[int(row), int(column)]
+        else:
+            assert value == -np.inf
 
 
 @settings(max_examples=50, deadline=None)

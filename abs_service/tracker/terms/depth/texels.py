@@ -1,0 +1,243 @@
+"""The noise texture of a depth image: what the cost kernels read, rendered once for a frame.
+
+A texel is what `calib.noise.texture.write_texture` writes, or a constant cost where there is no usable distance.
+"""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.pairing.images import DepthImage
+from abs_service.tracker.synthesis.base import Synthesizer
+from abs_service.tracker.synthesis.window import Bordered, Window, corner, within
+from abs_service.tracker.terms.base import Bounds
+from abs_service.tracker.terms.depth.depth_cost import distances, median_inlier_cost, settle, write_constants
+from calib.jit import kernel
+from calib.noise.base import DepthNoise
+from calib.noise.texture import corrected_distances, write_pixels, write_texture
+
+#: The cost of an inlier is the median of about so many pixels on the object.
+SAMPLED = 500
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Unusable:
+    """Pixels of a window (rows, columns) without a usable distance.
+
+    Attributes:
+        masked: behind an occluder, in a hole, or left to the outline.
+        free_m: distance from the object where the sensor looks past it [m], else 0.
+        shown: those on the object, whose distances are usable.
+    """
+
+    masked: NDArray[np.bool_]
+    free_m: NDArray[np.float32]
+    shown: NDArray[np.bool_]
+
+
+class Texels(Protocol):
+    """The texture of one sensor's frame in its view."""
+
+    def observe(self, image: DepthImage, window: Window) -> NDArray[np.float32]:
+        """Begins a frame; distances (rows, columns) in the window of the view [m], without mean offset, NaN if unknown.
+
+        Args:
+            image: the depth image.
+            window: of the view.
+        """
+        ...
+
+    def explain(self, unusable: Unusable) -> float:
+        """Sets constant costs where there is no usable distance; the median cost of an inlier on the object [nats].
+
+        A pixel at a distance d > 0 from the object, in free space, costs an outlier and what `FREE_SCALE_M` says; a
+        masked one costs an inlier, and a missing return an inlier plus what it costs the sample that meets it.
+        """
+        ...
+
+    def at(self, pixel: NDArray[np.int32]) -> NDArray[np.float32]:
+        """The texture (pixels, 8), complete at the pixels of samples (population, m), see `Synthesis`."""
+        ...
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Height and width of the view."""
+        ...
+
+
+def missing_texel(agreeing: float) -> NDArray[np.float32]:
+    """Texel (8,) of a missing return: cost of an inlier, and what it costs the sample that meets it (`depth_cost`)."""
+    return np.array([0, 0, 0, 0, 0, 0, agreeing, 1], np.float32)
+
+
+def texels(sensor: str, synthesizer: Synthesizer, noise: DepthNoise, bounds: Bounds) -> Texels:
+    """The texture of a sensor: whole if the synthesis resamples images, else only where it is read."""
+    border = np.array([0, 0, 0, 0, 0, 0, bounds.uniform, 0], np.float32)
+    # Cost of no measurement, unbounded, so that leaving the image does not lower the cost.
+    beyond = np.array([0, 0, 0, 0, 0, 0, bounds.outlier - bounds.inlier, 0], np.float32)
+    image = Bordered(border, beyond)
+    return WholeTexels(sensor, synthesizer, noise, image) if synthesizer.resamples else TexelsOnDemand(noise, image)
+
+
+class WholeTexels:
+    """A texture that is rendered in the sensor's image and resampled for the view; see `Texels`."""
+
+    def __init__(self, sensor: str, synthesizer: Synthesizer, noise: DepthNoise, image: Bordered):
+        self._sensor, self._synthesizer, self._noise, self._image = sensor, synthesizer, noise, image
+        self._texture = np.zeros((2, 2, 8), np.float32)
+        self._window: Window = image.window
+        self._distance = np.zeros((0, 0), np.float32)
+
+    def observe(self, image: DepthImage, window: Window) -> NDArray[np.float32]:
+        """Renders the noise model over the window."""
+        texture = self._image.begin(image.shape, window)
+        write_texture(self._noise, *image.within(window), corner(window), texture)
+        self._texture, self._window = self._synthesizer.texture(self._sensor, texture), window
+        part = within(self._texture, window)
+        self._distance = np.empty(part.shape[:2], np.float32)
+        distances(part, self._distance)
+        return self._distance
+
+    def explain(self, unusable: Unusable) -> float:
+        """Writes the constants into the window."""
+        agreeing = median_inlier_cost(within(self._texture, self._window), unusable.shown)
+        missing, outlier = missing_texel(agreeing), float(self._image.beyond[6])
+        parts = unusable.masked, self._distance, unusable.free_m, missing
+        write_constants(*parts, agreeing, outlier, *corner(self._window), self._texture)
+        return agreeing
+
+    def at(self, pixel: NDArray[np.int32]) -> NDArray[np.float32]:
+        """The whole texture."""
+        return self._texture.reshape(-1, 8)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Height and width of the view."""
+        return self._texture.shape[0] - 2, self._texture.shape[1] - 2
+
+
+class TexelsOnDemand:
+    """A texture that is rendered where single candidates read it, and over the window for populations; see `Texels`.
+
+    A descent reads a few pixels around every vertex: a tenth of those on the object.
+    """
+
+    def __init__(self, noise: DepthNoise, image: Bordered):
+        self._noise, self._image = noise, image
+        self._texture = np.zeros((2, 2, 8), np.float32)
+        self._window: Window = image.window
+        self._distance = self._amplitude = self._corrected = self._free_m = np.zeros((0, 0), np.float32)
+        self._masked = self._done = np.zeros((0, 0), np.bool_)
+        self._missing = image.border
+        self._agreeing = 0.0
+
+    def observe(self, image: DepthImage, window: Window) -> NDArray[np.float32]:
+        """Corrects the distances in the window, and renders nothing yet."""
+        self._texture, self._window = self._image.move(image.shape, window), window
+        self._distance, self._amplitude = image.within(window)
+        self._corrected = corrected_distances(self._noise, self._distance, self._amplitude, corner(window))
+        shape = self._corrected.shape
+        self._masked, self._done = np.zeros(shape, np.bool_), np.zeros(shape, np.bool_)
+        self._free_m, self._missing = np.zeros(shape, np.float32), self._image.border
+        return self._corrected
+
+    def explain(self, unusable: Unusable) -> float:
+        """Remembers what is unusable, and renders some pixels on the object."""
+        shown = np.flatnonzero(unusable.shown)
+        rows, columns = np.divmod(shown[:: max(len(shown) // SAMPLED, 1)], unusable.shown.shape[1])
+        top, left = corner(self._window)
+        some = ((rows + top + 1) * self._texture.shape[1] + columns + left + 1).astype(np.int32)
+        texture = self.at(some[None])
+        self._agreeing = float(np.median(texture[some, 6])) + 0.5 if len(some) else 0.0
+        self._missing = missing_texel(self._agreeing)
+        self._masked, self._free_m = unusable.masked, unusable.free_m
+        return self._agreeing
+
+    def at(self, pixel: NDArray[np.int32]) -> NDArray[np.float32]:
+        """The texture after rendering what is still missing of it."""
+        is_single, place = len(pixel) == 1, corner(self._window)
+        wanted = np.empty((2, pixel.size if is_single else self._done.size), np.int64)
+        constants = self._missing, self._agreeing, float(self._image.beyond[6])
+        rest = *place, self._corrected, self._masked, self._free_m, *constants, self._done, self._texture, wanted
+        count = _take(pixel[0], *rest) if is_single else _take_all(*rest)
+        if count:
+            row, column = wanted[:, :count]
+            measured, amplitude = (part[row, column].astype(np.float64) for part in (self._distance, self._amplitude))
+            write_pixels(self._noise, measured, amplitude, (row + place[0], column + place[1]), self._texture)
+        return self._texture.reshape(-1, 8)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Height and width of the view."""
+        return self._texture.shape[0] - 2, self._texture.shape[1] - 2
+
+
+@kernel
+def _take(
+    pixels: NDArray[np.int32],
+    top: int,
+    left: int,
+    corrected: NDArray[np.float32],
+    masked: NDArray[np.bool_],
+    free_m: NDArray[np.float32],
+    missing: NDArray[np.float32],
+    agreeing: float,
+    outlier: float,
+    done: NDArray[np.bool_],
+    texture: NDArray[np.float32],
+    wanted: NDArray[np.int64],
+) -> int:
+    """Writes the constant texels of pixels that are not done; the number of those with a usable distance.
+
+    Args:
+        pixels: indices (m,) into the flattened texture.
+        top, left: first row and column of the window.
+        corrected: distances (rows, columns), NaN where unknown.
+        masked, free_m: see `Unusable`.
+        missing: texel (8,) of a missing return.
+        agreeing, outlier: cost of a masked pixel, and of one in free space beside the object.
+        done: pixels (rows, columns) that are rendered; those that are taken become so.
+        texture: (height + 2, width + 2, 8).
+        wanted: rows and columns (2, …) in the window of those with a usable distance.
+    """
+    count, stride = 0, texture.shape[1]
+    for m in range(pixels.size):
+        pixel = int(pixels[m])
+        row, column = pixel // stride - 1 - top, pixel % stride - 1 - left
+        inside = pixel > 0 and row >= 0 and row < done.shape[0] and column >= 0 and column < done.shape[1]
+        if inside and not done[row, column]:
+            done[row, column] = True
+            texel = texture[top + row + 1, left + column + 1]
+            if not settle(row, column, masked, corrected, free_m, missing, agreeing, outlier, texel):
+                wanted[0, count], wanted[1, count] = row, column
+                count += 1
+    return count
+
+
+@kernel
+def _take_all(
+    top: int,
+    left: int,
+    corrected: NDArray[np.float32],
+    masked: NDArray[np.bool_],
+    free_m: NDArray[np.float32],
+    missing: NDArray[np.float32],
+    agreeing: float,
+    outlier: float,
+    done: NDArray[np.bool_],
+    texture: NDArray[np.float32],
+    wanted: NDArray[np.int64],
+) -> int:
+    """`_take` for all pixels of the window."""
+    count = 0
+    for row in range(done.shape[0]):
+        for column in range(done.shape[1]):
+            if not done[row, column]:
+                done[row, column] = True
+                texel = texture[top + row + 1, left + column + 1]
+                if not settle(row, column, masked, corrected, free_m, missing, agreeing, outlier, texel):
+                    wanted[0, count], wanted[1, count] = row, column
+                    count += 1
+    return count
