@@ -6,11 +6,12 @@ from typing import Annotated
 import numpy as np
 from annotated_types import Gt
 
+from abs_service.pairing.observation import Observation
 from abs_service.tracker.measurements import measurement
 from abs_service.tracker.measurements.base import Comparison
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import ModelError, Surface
-from abs_service.tracker.objectives.base import TermSum
+from abs_service.tracker.objectives.base import ObservedTerms, TermSum
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.terms.base import Bounds, SensorFit, Term
 from calib.no_return import NEVER
@@ -85,6 +86,14 @@ class Settings:
 
 class SquareSum(TermSum):
     """The weighted squares of all sensors."""
+
+    def observe(self, observation: Observation, predicted: Surface, reach_m: float = np.inf) -> "ObservedSquares":
+        """See `TermSum`."""
+        return ObservedSquares(super().observe(observation, predicted, reach_m).terms)
+
+
+class ObservedSquares(ObservedTerms):
+    """The weighted squares of the sensors that contribute to one frame."""
 
     def fits(self, surface: Surface) -> list[SensorFit]:
         """Agreement of every sensor; without normalised residuals, because weights are no noise model."""
