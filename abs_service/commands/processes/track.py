@@ -33,6 +33,7 @@ from abs_service.tracking.session import TrackingSession, streams
 from abs_service.tracking.tracker_health import TrackerHealth
 from abs_service.tracking.warmup.board import warm_up
 from abs_service.wire import commands
+from abs_service.wire.checked_bus import CheckedBus
 from calib.camera import Camera
 from calib.jit import load_compiler
 from calib.rig import Rig
@@ -93,7 +94,7 @@ def run(arguments: argparse.Namespace) -> int:
     return Exit.OK
 
 
-def _report(tracker_health: TrackerHealth, bus: Bus, health: Health) -> None:
+def _report(tracker_health: TrackerHealth, bus: CheckedBus, health: Health) -> None:
     tracker_health.report()
     bus.report(health)
     health.tick()
