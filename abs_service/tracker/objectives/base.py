@@ -1,7 +1,6 @@
 """Interface of an objective, and the sum of all terms."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 from functools import reduce
 from typing import Protocol
 
@@ -60,6 +59,7 @@ class TermSum:
     def __init__(self, synthesizer: Synthesizer, terms: Sequence[Term]):
         self._synthesizer = synthesizer
         self._terms = terms
+        self._frames = 0
 
     def observe(self, observation: Observation, predicted: Surface, reach_m: float = np.inf) -> "ObservedTerms":
         """Passes every sensor's image to its term, and all occluders to every term."""
@@ -70,37 +70,46 @@ class TermSum:
         occluders = np.concatenate([np.zeros((0, 3)), *(term.foreground() for term in terms)])
         for term in terms:
             term.hide(occluders)
-        return ObservedTerms(terms)
+        self._frames = frame = self._frames + 1
+        return ObservedTerms(terms, lambda: self._frames == frame)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
 class ObservedTerms:
     """The sum of the terms of the sensors that contribute to one frame.
 
-    Attributes:
+    Args:
         terms: terms that have observed their sensor's image.
+        is_newest: False once they have observed another one, for which they use the same memory.
     """
 
-    terms: Sequence[Term]
+    def __init__(self, terms: Sequence[Term], is_newest: Callable[[], bool]):
+        self._observed = terms
+        self._is_newest = is_newest
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
         """Cost (population,) of every deformed mesh."""
-        if not self.terms:
+        if not self._terms:
             return np.zeros(len(surface.vertices))
-        return reduce(np.add, (term.cost(surface) for term in self.terms))
+        return reduce(np.add, (term.cost(surface) for term in self._terms))
 
     def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> list[Linear]:
         """Normalised residuals of all sensors and their derivatives."""
-        return [term.linearize(surface, sparse_jacobian) for term in self.terms]
+        return [term.linearize(surface, sparse_jacobian) for term in self._terms]
 
     def fits(self, surface: Surface) -> list[SensorFit]:
         """Agreement of every contributing sensor with a population of one."""
-        return [term.fit(surface) for term in self.terms]
+        return [term.fit(surface) for term in self._terms]
 
     def misfit(self, surface: Surface) -> NDArray[np.float64]:
         """Signed distance of each vertex from its measurements, the largest, and its deviation by noise (2, n) [m]."""
         none = np.zeros((2, surface.vertices.shape[2]))
-        return reduce(_larger, (term.misfit(surface) for term in self.terms), none)
+        return reduce(_larger, (term.misfit(surface) for term in self._terms), none)
+
+    @property
+    def _terms(self) -> Sequence[Term]:
+        if not self._is_newest():
+            raise RuntimeError("the cost of a frame is asked after the next frame was observed")
+        return self._observed
 
 
 def _larger(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -37,7 +37,7 @@ class Posterior:
         """Predicts theta, and renders every noise model over its image around the predicted surface.
 
         Vertex offsets that the model has learnt since the last frame have moved its mesh at rest. Images are rendered
-        into the memory of the last frame's: its posterior must not be asked any more.
+        into the memory of the last frame's, whose posterior answers no more.
         """
         self.stretch.rest_on(self.model.mesh.vertices)
         motion = self.motion.predict(observation.t_host_ns)

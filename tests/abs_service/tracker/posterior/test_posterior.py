@@ -1,6 +1,7 @@
 """Linearisations of the cost of one frame."""
 
 import numpy as np
+import pytest
 
 from abs_service.tracker.posterior.curvature import search_metric
 from abs_service.tracker.posterior.linearized_cost import NEAR
@@ -39,3 +40,15 @@ def test_the_order_in_which_a_frame_is_asked_changes_nothing():
     again = frame.optimum(theta, None)
     np.testing.assert_array_equal(again.inverse_curvature, first.inverse_curvature)
     assert frame.fits(theta) == fits
+
+
+def test_the_posterior_of_a_frame_answers_no_more_once_the_next_is_observed():
+    *_, step = drive(one := tracking(vertices=120), SHEET, [0, 1])
+    assert one.model is not None
+    theta, exposed = step.estimate.theta, SHEET.expose(1)[0]
+    posterior = posterior_of(one.model, RIG, exposed)
+    observation = Observer(RIG).observe(frame_set(exposed, 1))
+    first, second = posterior.observe(observation), posterior.observe(observation)
+    assert len(second.fits(theta)) == 2
+    with pytest.raises(RuntimeError, match="after the next frame"):
+        first.fits(theta)
