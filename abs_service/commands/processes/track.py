@@ -68,10 +68,7 @@ def run(arguments: argparse.Namespace) -> int:
         if stop.is_set():
             return Exit.OK
         rigs.put(rig := wiring.rig(settings, name, cameras))
-        while preparing.is_alive() and not stop.is_set():
-            preparing.join(0.05)
-            health.tick()
-        health.publish()
+        _await(preparing, health, stop)
         if stop.is_set():
             return Exit.OK
         gc_tuning.freeze_loaded_objects()
@@ -92,6 +89,13 @@ def run(arguments: argparse.Namespace) -> int:
         health.publish()
         measuring.join()  # it uses the bus
     return Exit.OK
+
+
+def _await(preparing: threading.Thread, health: Health, stop: threading.Event) -> None:
+    while preparing.is_alive() and not stop.is_set():
+        preparing.join(0.05)
+        health.tick()
+    health.publish()
 
 
 def _report(tracker_health: TrackerHealth, bus: CheckedBus, health: Health) -> None:

@@ -41,7 +41,7 @@ LASTING = 0.25
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
-    """What the object has done since the frame before without being predicted.
+    """Unpredicted motion of the object since the frame before.
 
     Attributes:
         unpredicted: covariance Q (dim, dim) where measurements show the object's velocity.

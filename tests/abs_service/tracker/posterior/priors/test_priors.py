@@ -178,7 +178,7 @@ class Followed(NamedTuple):
 
 
 def follow(motion: MotionPrior, steps: list[float], held: float = 1.0, begin: int = 0) -> list[Followed]:
-    """What follows estimates that are off the prediction by so much [m], at 30 Hz; so much of them is measured."""
+    """Frames after estimates that are off the prediction by so much [m], at 30 Hz; so much of them is measured."""
     frames = []
     prediction = motion.predict(round(begin * 1e9 / 30))
     for k, step in enumerate([0.0, *steps], start=begin + 1):
