@@ -7,7 +7,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.pairing.observation import Source
+from abs_service.pairing.observation import Observation, Source
 from abs_service.tracker.optimizers.base import Stop
 from abs_service.tracker.shape_quality import ShapeQuality
 from abs_service.tracker.terms.base import SensorFit
@@ -72,3 +72,36 @@ class Estimate:
     sources: Mapping[str, Source]
     missing: tuple[str, ...]
     warnings: tuple[str, ...] = ()
+
+
+def initializing(observation: Observation, reasons: tuple[str, ...], warnings: tuple[str, ...]) -> Estimate:
+    """The estimate as long as no object is found.
+
+    Args:
+        observation: the images of all sensors at one moment.
+        reasons: why it is not found, in plain words.
+        warnings: doubts about what was found.
+    """
+    return Estimate(
+        seq=observation.seq,
+        t_host_ns=observation.t_host_ns,
+        status=Status.INITIALIZING,
+        reasons=reasons,
+        theta=np.zeros(0),
+        covariance=np.zeros((0, 0)),
+        vertices=np.zeros((0, 3), np.float32),
+        vertex_covariance=np.zeros((0, 3, 3)),
+        cost=float("nan"),
+        deviation=float("nan"),
+        searcher="",
+        stop=Stop.NOTHING,
+        generations=0,
+        evaluations=0,
+        budget=0,
+        inlier_share=0.0,
+        fits=(),
+        shape=ShapeQuality(),
+        sources=observation.sources,
+        missing=observation.missing,
+        warnings=warnings,
+    )

@@ -19,16 +19,16 @@ class ShapeQuality:
         stretch: relative change of the length of an edge, 95th percentile.
         folded_share: share of the pairs of neighbouring faces that are folded onto each other, 0…1.
         deviation_m: standard deviation of the position of a vertex, median [m].
-        unheld_m: the same by the measurements of this frame alone, without the past [m].
+        single_frame_deviation_m: the same by the measurements of this frame alone, without the past [m].
     """
 
     stretch: float = 0.0
     folded_share: float = 0.0
     deviation_m: float = float("nan")
-    unheld_m: float = float("nan")
+    single_frame_deviation_m: float = float("nan")
 
 
-class ShapeJudge:
+class ShapeComparison:
     """Compares deformed meshes with the undeformed one.
 
     Args:
@@ -43,10 +43,16 @@ class ShapeJudge:
         even = np.einsum("pi,pi->p", normals[pairs[:, 0]], normals[pairs[:, 1]]) > UNFOLDED_COSINE
         self._pairs = pairs[even]
 
-    def judge(
-        self, vertices: NDArray[np.floating], vertex_covariance: NDArray[np.float64], unheld_m: float
+    def compare(
+        self, vertices: NDArray[np.floating], vertex_covariance: NDArray[np.float64], single_frame_deviation_m: float
     ) -> ShapeQuality:
-        """Quality of deformed vertices (n, 3) [m] with covariances (n, 3, 3) [m²]; `unheld_m` as in `ShapeQuality`."""
+        """Quality of deformed vertices (n, 3) [m] with covariances (n, 3, 3) [m²].
+
+        Args:
+            vertices: deformed vertices.
+            vertex_covariance: of every vertex.
+            single_frame_deviation_m: see `ShapeQuality`.
+        """
         stretch = np.abs(edge_lengths(vertices, self._edges) / self._lengths - 1)
         normals = _normals(vertices, self._faces)
         cosine = np.einsum("pi,pi->p", normals[self._pairs[:, 0]], normals[self._pairs[:, 1]])
@@ -55,7 +61,7 @@ class ShapeJudge:
             stretch=float(np.percentile(stretch, 95)),
             folded_share=float(np.mean(cosine < FOLDED_COSINE)) if len(cosine) else 0.0,
             deviation_m=float(np.sqrt(np.median(variance))),
-            unheld_m=unheld_m,
+            single_frame_deviation_m=single_frame_deviation_m,
         )
 
 

@@ -35,13 +35,13 @@ class Settings:
             it is above the standard deviation of a vertex as well [m].
         degraded_unexplained: by how much the share of the measured surface beside the mesh may be larger than in the
             first image. Something that touches a square object along one whole side adds 0.2.
-        degraded_surprise: distance of an estimate from where the object was expected, in standard deviations of the
+        degraded_innovation: distance of an estimate from where the object was expected, in standard deviations of the
             motion prior, above which it is DEGRADED: the prior has held the mesh back.
         degraded_folded: share of folded faces above which an estimate is DEGRADED.
         degraded_deviation_m: standard deviation of the position of a vertex, median over the mesh, above which an
             estimate is DEGRADED [m].
-        degraded_unheld_m: the same standard deviation from the measurements of one frame alone, without the past, above
-            which an estimate is DEGRADED [m].
+        degraded_single_frame_deviation_m: the same standard deviation from the measurements of one frame alone, without
+            the past, above which an estimate is DEGRADED [m].
     """
 
     degraded_below: Annotated[float, Interval(gt=0, lt=1)] = 0.6
@@ -51,14 +51,14 @@ class Settings:
     degraded_rim: Annotated[float, Interval(gt=0, le=1)] = 0.3
     degraded_rim_m: Annotated[float, Gt(0)] = 0.005
     degraded_unexplained: Annotated[float, Interval(gt=0, le=1)] = 0.25
-    degraded_surprise: Annotated[float, Gt(1)] = 2.0
+    degraded_innovation: Annotated[float, Gt(1)] = 2.0
     degraded_folded: Annotated[float, Interval(gt=0, le=1)] = 0.05
     degraded_deviation_m: Annotated[float, Gt(0)] = 0.015
-    degraded_unheld_m: Annotated[float, Gt(0)] = 0.02
+    degraded_single_frame_deviation_m: Annotated[float, Gt(0)] = 0.02
 
 
 def judge(
-    fits: Sequence[SensorFit], missing: Sequence[str], shape: ShapeQuality, surprise: float, limits: Settings
+    fits: Sequence[SensorFit], missing: Sequence[str], shape: ShapeQuality, innovation: float, limits: Settings
 ) -> tuple[Status, tuple[str, ...]]:
     """Status, and the reasons for any other than TRACKING.
 
@@ -66,13 +66,13 @@ def judge(
         fits: agreement of every contributing sensor.
         missing: sensors without a frame.
         shape: quality of the deformed mesh.
-        surprise: see `MotionPrior`.
+        innovation: see `RecentMotion`.
         limits: thresholds.
     """
     lost = inlier_share(fits) < limits.lost_below
     reasons = [f"no frame from {name}" for name in missing]
     reasons += _seen(fits, lost, limits)
-    reasons += _placed(fits, shape, surprise, limits)
+    reasons += _placed(fits, shape, innovation, limits)
     reasons += _shaped(shape, limits)
     if lost:
         return Status.LOST, tuple(reasons)
@@ -112,7 +112,7 @@ _ABSENT = {
 }
 
 
-def _placed(fits: Sequence[SensorFit], shape: ShapeQuality, surprise: float, limits: Settings) -> Iterator[str]:
+def _placed(fits: Sequence[SensorFit], shape: ShapeQuality, innovation: float, limits: Settings) -> Iterator[str]:
     """Reasons by where the mesh lies."""
     if is_misplaced(fits, shape, limits):
         yield (
@@ -125,9 +125,9 @@ def _placed(fits: Sequence[SensorFit], shape: ShapeQuality, surprise: float, lim
             f"{gained:.0%} more of the measured surface continues beyond the mesh than at first – "
             "take away what touches the object, or have the mesh made anew by abs-service reinitialize"
         )
-    if surprise > limits.degraded_surprise:
+    if innovation > limits.degraded_innovation:
         yield (
-            f"the object moved {surprise:.1f} times as far from where it was expected as priors.speed allows for: "
+            f"the object moved {innovation:.1f} times as far from where it was expected as priors.speed allows for: "
             "the mesh lags behind – move it more slowly, or raise priors.speed or the camera's rate"
         )
 
@@ -139,7 +139,10 @@ def _shaped(shape: ShapeQuality, limits: Settings) -> Iterator[str]:
             f"{shape.folded_share:.0%} of the faces are folded: the model cannot follow the shape – "
             "give it more control points, or make priors.stretch smaller"
         )
-    if shape.deviation_m > limits.degraded_deviation_m or shape.unheld_m > limits.degraded_unheld_m:
+    if (
+        shape.deviation_m > limits.degraded_deviation_m
+        or shape.single_frame_deviation_m > limits.degraded_single_frame_deviation_m
+    ):
         yield (
             f"nothing holds the surface along itself, vertices are known to {shape.deviation_m * 1e3:.0f} mm so far: "
             "it needs a print that a colour camera sees, or free edges in sight"

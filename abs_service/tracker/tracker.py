@@ -1,4 +1,7 @@
-"""The method of the paper on one page (Fig. 1): predict, observe, search by synthesis, posterior, status.
+"""The method of the paper on one page (Fig. 1): predict, observe, search by synthesis, covariance, status.
+
+Initialisation, the detection of the object from which mesh and model are made, comes before (`tracking.plan`), and so
+does renewed detection after a loss (`tracking.session`), which ends in `relocate` here if the mesh is kept.
 
 Equation numbers: A. Jordt, R. Koch, Reconstruction of Deformation from Depth and Color Video with Explicit Noise
 Models.
@@ -14,10 +17,13 @@ from abs_service.tracker import status
 from abs_service.tracker.estimate import Estimate, Status
 from abs_service.tracker.models.base import DeformationModel
 from abs_service.tracker.optimizers.base import Budget, Optimizer, Outcome, Search
-from abs_service.tracker.posterior.posterior import FramePosterior, Posterior
+from abs_service.tracker.posterior.covariance.observability import single_frame_deviation
+from abs_service.tracker.posterior.covariance.theta_covariance import ThetaCovariance
+from abs_service.tracker.posterior.covariance.vertex_covariance import VertexCovariance
+from abs_service.tracker.posterior.frame_posterior import FramePosterior
+from abs_service.tracker.posterior.posterior import Posterior
 from abs_service.tracker.posterior.relocation import fit_to_points
-from abs_service.tracker.posterior.uncertainty import Uncertainty
-from abs_service.tracker.shape_quality import ShapeJudge
+from abs_service.tracker.shape_quality import ShapeComparison
 from abs_service.tracker.terms.base import inlier_share
 
 
@@ -30,7 +36,7 @@ class Tracker:
         optimizer: proposes candidates.
         evaluations: maximum number of cost evaluations per frame.
         limits: thresholds of the status.
-        placement_m: standard deviation of the place of the mesh at rest; 0 if the first frame defines it [m].
+        registration_m: standard deviation of the pose of a template's mesh; 0 if the first frame defines it [m].
 
     Attributes:
         model: see above.
@@ -43,15 +49,16 @@ class Tracker:
         optimizer: Optimizer,
         evaluations: int,
         limits: status.Settings,
-        placement_m: float = 0.0,
+        registration_m: float = 0.0,
     ):
         self.model = model
         self._posterior = posterior
         self._optimizer = optimizer
         self._evaluations = evaluations
         self._limits = limits
-        self._uncertainty = Uncertainty(model, posterior.motion, placement_m)
-        self._shape_judge = ShapeJudge(model.mesh)
+        self._theta_covariance = ThetaCovariance(model, registration_m)
+        self._vertex_covariance = VertexCovariance(model)
+        self._shape = ShapeComparison(model.mesh)
         self._is_warm = False
         self._last_tracked = model.rest
 
@@ -63,23 +70,21 @@ class Tracker:
             in_time: False when the time is up; the first frame is searched to the end.
         """
         frame = self._posterior.observe(observation)  # predicts Θ; renders the noise models per pixel
-        if self._is_warm:
-            budget = Budget(self._evaluations, in_time)
-            outcome = self._minimize(frame, self._optimizer.follow(frame, frame.predicted, budget), budget)
-        else:
-            budget = Budget(self._evaluations, lambda: True)
-            outcome = self._minimize(frame, self._optimizer.explore(frame, frame.predicted, budget), budget)
-        if self._posterior.motion.widen(outcome.theta):  # a sudden motion, for which the prior was too narrow
+        budget = Budget(self._evaluations, in_time if self._is_warm else _without_end)
+        start = self._optimizer.follow if self._is_warm else self._optimizer.explore  # warm or cold start
+        outcome = self._minimize(frame, start(frame, frame.motion.theta, budget), budget)
+        if frame.motion.is_too_narrow(outcome.theta):  # a sudden motion
+            frame = frame.with_motion(frame.motion.widened(outcome.theta))
             outcome = self._minimize(frame, self._optimizer.follow(frame, outcome.theta, budget), budget)
         self._is_warm = True
-        covariance = frame.covariance(outcome.theta)
-        self._posterior.motion.update(outcome.theta, covariance)
-        return self._estimate(observation, frame, outcome, budget, covariance)
+        return self._estimate(observation, frame, outcome, budget)
 
     def relocate(self, points: NDArray[np.float64]) -> None:
         """Warm start from points (k, 3) [m] of a lost object: the next search begins with the mesh laid over them."""
-        self._posterior.motion.restart(fit_to_points(self.model, self._last_tracked, points))
-        self._uncertainty.relocate()
+        motion = self._posterior.motion
+        motion.restart(fit_to_points(self.model, self._last_tracked, points))
+        self._theta_covariance.restart(motion.longest_covariance)
+        self._vertex_covariance.restart()
         self._is_warm = False
 
     def _minimize(self, frame: FramePosterior, search: Search, budget: Budget) -> Outcome:
@@ -94,31 +99,26 @@ class Tracker:
             except StopIteration as ended:
                 return ended.value
 
-    def _estimate(
-        self,
-        observation: Observation,
-        frame: FramePosterior,
-        outcome: Outcome,
-        budget: Budget,
-        covariance: NDArray[np.float64],
-    ) -> Estimate:
-        """Posterior covariance, agreement of the sensors and status at the optimum."""
-        theta, surface = outcome.theta, self.model.deform(outcome.theta[None])
-        vertices = np.ascontiguousarray(surface.vertices[0].T)
-        known = self._uncertainty.estimate(frame, theta, surface, covariance)
-        fits, shape = frame.fits(theta), self._shape_judge.judge(vertices, known.vertices, known.unheld_m)
-        verdict, reasons = status.judge(fits, observation.missing, shape, self._posterior.motion.surprise, self._limits)
+    def _estimate(self, observation: Observation, frame: FramePosterior, outcome: Outcome, budget: Budget) -> Estimate:
+        """Covariances, agreement of the sensors and status at the optimum."""
+        optimum = frame.optimum(outcome.theta, outcome.linearized)
+        motion = self._posterior.motion.update(frame.motion, optimum.theta, optimum.inverse_curvature)
+        covariance = self._theta_covariance.update(optimum, frame.motion, motion)
+        vertex_covariance = self._vertex_covariance.update(optimum, frame, covariance)
+        shape = self._shape.compare(optimum.vertices, vertex_covariance, single_frame_deviation(optimum, frame.motion))
+        fits = outcome.compared(frame).fits
+        verdict, reasons = status.judge(fits, observation.missing, shape, motion.innovation, self._limits)
         if verdict == Status.TRACKING:
-            self._last_tracked = theta
+            self._last_tracked = optimum.theta
         return Estimate(
             seq=observation.seq,
             t_host_ns=observation.t_host_ns,
             status=verdict,
             reasons=reasons,
-            theta=theta,
-            covariance=known.theta,
-            vertices=vertices,
-            vertex_covariance=known.vertices,
+            theta=optimum.theta,
+            covariance=covariance,
+            vertices=optimum.vertices,
+            vertex_covariance=vertex_covariance,
             cost=outcome.cost,
             deviation=outcome.deviation,
             searcher=outcome.searcher,
@@ -132,3 +132,7 @@ class Tracker:
             sources=observation.sources,
             missing=observation.missing,
         )
+
+
+def _without_end() -> bool:
+    return True

@@ -143,4 +143,4 @@ def make_tracker(
     model, sight = template.bind(plan.model, detection)
     posterior, mesh = make_posterior(plan, rig, model, observation, sight)
     optimizer = plan.optimizer.build(posterior.dimension, np.random.default_rng(plan.seed))
-    return Tracker(model, posterior, optimizer, plan.evaluations, plan.status, sight.placement_m), mesh
+    return Tracker(model, posterior, optimizer, plan.evaluations, plan.status, sight.registration_m), mesh

@@ -2,21 +2,18 @@
 
 from collections.abc import Callable, Collection, Iterable
 from dataclasses import replace
+from enum import Enum, auto
 from typing import NamedTuple
-
-import numpy as np
 
 from abs_service.pairing.observation import Observation
 from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection, UndecidedError
 from abs_service.tracker.detection.plausibility import ExtentError, warnings
 from abs_service.tracker.detection.regions.base import Region
 from abs_service.tracker.detection.segmentation import detect_object
-from abs_service.tracker.estimate import Estimate, Status
+from abs_service.tracker.estimate import Estimate, Status, initializing
 from abs_service.tracker.measurements import measurement
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import DeformationModel, ModelError
-from abs_service.tracker.optimizers.base import Stop
-from abs_service.tracker.shape_quality import ShapeQuality
 from abs_service.tracker.tracker import Tracker
 from abs_service.tracking.monitors import loss_monitor
 from abs_service.tracking.monitors.growth_monitor import LEAST_GROWTH, GrowthMonitor
@@ -28,7 +25,30 @@ from calib.rig import Rig, Sensor
 from drivers.contract.frame import FrameSet
 
 
-class _Begun(NamedTuple):
+class _Cause(Enum):
+    """Cause of a detection."""
+
+    START = auto()  # there is no object yet
+    REQUEST = auto()  # a user asked for it
+    LOSS = auto()  # the object is lost, or its appearance in a camera is still unknown
+    GROWTH = auto()  # much more of the object is in sight than the mesh has
+
+
+class _Due(NamedTuple):
+    """A detection that is due in this frame."""
+
+    cause: _Cause
+    region: Region
+
+
+class _Failure(NamedTuple):
+    """Reasons for which a detection failed; those that are doubts about the object are warnings as well."""
+
+    reasons: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+
+
+class _Built(NamedTuple):
     """A tracker of a detected object, its mesh, and doubts about the object."""
 
     tracker: Tracker
@@ -80,41 +100,21 @@ class TrackingSession:
             ObservationError: the frames do not fit the rig.
         """
         if frames.host_clock != self._host_clock:
-            self._begin_anew(frames.host_clock)
+            self._forget(frames.host_clock)
         return self.track_observation(self._observer.observe(frames), in_time)
 
     def track_observation(self, observation: Observation, in_time: Callable[[], bool]) -> Estimate:
         """The estimate for an observation, see `track`."""
-        requested, self._requested = self._requested, None
-        region = requested or self._region
-        grow, self._growth_due = self._growth_due, False
-        errors: tuple[str, ...] = ()
-        doubts: tuple[str, ...] = ()
-        try:
-            if self._tracker is None or requested:
-                self._adopt(self._begin(observation, region), observation)
-                self._region = region
-            elif self._loss_monitor.attempt_due(observation.t_host_ns) or self._without_appearance.difference(
-                observation.missing
-            ):
-                self._detect_again(self._tracker, observation)
-            elif grow:
-                self._grow(self._tracker.model.mesh, observation)
-        except (DetectionError, ModelError) as error:
-            errors = (str(error),)
-            if isinstance(error, UndecidedError):  # what was asked for is asked again, with more images
-                self._requested, self._growth_due = self._requested or requested, grow
-            doubts = errors if isinstance(error, ExtentError) else ()
+        due, failure = self._due(observation), _Failure()
+        if due is not None:
+            failure = self._attempt(due, observation)
         if self._tracker is None:
-            return _initializing(observation, errors, doubts)
+            return initializing(observation, failure.reasons, failure.warnings)
         estimate = self._loss_monitor.with_hysteresis(self._tracker.track(observation, in_time))
-        if estimate.status == Status.TRACKING and self._growth_monitor.due(estimate.fits, observation.t_host_ns):
-            self._growth_due = True
         if estimate.status == Status.TRACKING:
-            surface = self._tracker.model.deform(estimate.theta[None])
-            self._vertex_offsets.update(observation.images.get(self._plan.reference), surface, observation.t_host_ns)
-        reasons = estimate.reasons + tuple(f"looked for the object again: {error}" for error in errors)
-        reasons = () if estimate.status == Status.TRACKING else reasons
+            self._learn(self._tracker, estimate, observation)
+            return replace(estimate, reasons=(), warnings=self._warnings)
+        reasons = (*estimate.reasons, *(f"looked for the object again: {reason}" for reason in failure.reasons))
         return replace(estimate, reasons=reasons, warnings=self._warnings)
 
     def reinitialize(self, region: Region | None = None) -> None:
@@ -125,7 +125,7 @@ class TrackingSession:
         """
         self._requested = region or self._configured
 
-    def _begin_anew(self, host_clock: str) -> None:
+    def _forget(self, host_clock: str) -> None:
         """Forgets the object: on another clock, nobody knows how much time has passed since the last frame."""
         self._host_clock = host_clock
         self._tracker = None
@@ -133,29 +133,74 @@ class TrackingSession:
         self._loss_monitor = loss_monitor.LossMonitor(self._plan.reinitialization, self._plan.status)
         self._growth_due = False
 
-    def _detect_again(self, tracker: Tracker, observation: Observation) -> None:
-        """Detects the object again; DetectionError or ModelError if it is not in view or does not match the model."""
+    def _due(self, observation: Observation) -> _Due | None:
+        """The detection that is due in this frame, which then counts as made; None if the object is just tracked."""
+        requested, self._requested = self._requested, None
+        grow, self._growth_due = self._growth_due, False
+        if requested is not None:
+            return _Due(_Cause.REQUEST, requested)
+        if self._tracker is None:
+            return _Due(_Cause.START, self._region)
+        appears = self._without_appearance.difference(observation.missing)
+        if self._loss_monitor.attempt_due(observation.t_host_ns) or appears:
+            return _Due(_Cause.LOSS, self._region)
+        return _Due(_Cause.GROWTH, self._region) if grow else None
+
+    def _attempt(self, due: _Due, observation: Observation) -> _Failure:
+        """Detects the object; a failure leaves everything as it was."""
+        try:
+            self._detect(due, observation)
+        except UndecidedError as error:  # what was asked for is asked again, with more images
+            if due.cause == _Cause.REQUEST:
+                self._requested = self._requested or due.region
+            self._growth_due = due.cause == _Cause.GROWTH
+            return _Failure((str(error),))
+        except ExtentError as error:
+            return _Failure((str(error),), (str(error),))
+        except (DetectionError, ModelError) as error:
+            return _Failure((str(error),))
+        return _Failure()
+
+    def _detect(self, due: _Due, observation: Observation) -> None:
+        """Detects the object for a cause; DetectionError or ModelError if that fails."""
+        if self._tracker is not None and due.cause == _Cause.LOSS:
+            self._recover(self._tracker, observation)
+        elif self._tracker is not None and due.cause == _Cause.GROWTH:
+            self._grow(self._tracker.model.mesh, observation)
+        else:
+            self._adopt(self._build(observation, due.region), observation)
+            self._region = due.region
+
+    def _recover(self, tracker: Tracker, observation: Observation) -> None:
+        """Relocates the mesh of a lost object, or makes a new one if it was lost for too long."""
         if self._loss_monitor.keeps_mesh(observation.t_host_ns):
-            tracker.relocate(self._detect(observation, self._region).points)
+            tracker.relocate(self._detection(observation, self._region).points)
             return
         lost = tracker.model.mesh
-        begun = self._begin(observation, self._region)
-        if self._loss_monitor.differs_in_size(begun.mesh, lost):
-            raise DetectionError(f"what is in sight has {begun.mesh.area * 1e4:.0f} cm², not {lost.area * 1e4:.0f} cm²")
-        self._adopt(begun, observation)
+        built = self._build(observation, self._region)
+        if self._loss_monitor.differs_in_size(built.mesh, lost):
+            raise DetectionError(f"what is in sight has {built.mesh.area * 1e4:.0f} cm², not {lost.area * 1e4:.0f} cm²")
+        self._adopt(built, observation)
 
     def _grow(self, old: Mesh, observation: Observation) -> None:
-        """Replaces the mesh if much more of the object is in sight; DetectionError or ModelError if that fails."""
-        begun = self._begin(observation, self._region)
-        if begun.mesh.area > LEAST_GROWTH * old.area:
-            self._adopt(begun, observation)
+        """Replaces the mesh if much more of the object is in sight."""
+        built = self._build(observation, self._region)
+        if built.mesh.area > LEAST_GROWTH * old.area:
+            self._adopt(built, observation)
             self._loss_monitor.restart("a larger mesh was made")
 
-    def _adopt(self, begun: "_Begun", observation: Observation) -> None:
-        self._tracker, self.mesh, self._warnings = begun
+    def _learn(self, tracker: Tracker, estimate: Estimate, observation: Observation) -> None:
+        """Learns from an estimate that can be trusted: vertex offsets, and whether the object continues beyond it."""
+        if self._growth_monitor.due(estimate.fits, observation.t_host_ns):
+            self._growth_due = True
+        surface = tracker.model.deform(estimate.theta[None])
+        self._vertex_offsets.update(observation.images.get(self._plan.reference), surface, observation.t_host_ns)
+
+    def _adopt(self, built: _Built, observation: Observation) -> None:
+        self._tracker, self.mesh, self._warnings = built
         self.made_ns = observation.t_host_ns
         self._vertex_offsets = self._plan.vertex_offsets.build(
-            begun.tracker.model, self._rig.sensors[self._plan.reference]
+            built.tracker.model, self._rig.sensors[self._plan.reference]
         )
         # Their appearance is unknown: once one of them delivers images, mesh and appearance are built again.
         sensors = self._rig.sensors
@@ -163,12 +208,12 @@ class TrackingSession:
         self._growth_monitor = GrowthMonitor(self._plan.reinitialization.grow_s)
         self.mesh_version += 1
 
-    def _detect(self, observation: Observation, region: Region) -> InitialDetection:
+    def _detection(self, observation: Observation, region: Region) -> InitialDetection:
         return detect_object(observation, self._rig, self._plan.reference, region, self._plan.vertices)
 
-    def _begin(self, observation: Observation, region: Region) -> "_Begun":
-        detection = self._detect(observation, region)
-        return _Begun(*make_tracker(self._plan, self._template, self._rig, detection, observation), warnings(detection))
+    def _build(self, observation: Observation, region: Region) -> _Built:
+        detection = self._detection(observation, region)
+        return _Built(*make_tracker(self._plan, self._template, self._rig, detection, observation), warnings(detection))
 
 
 def streams(sensors: Iterable[Sensor]) -> list[tuple[str, str]]:
@@ -180,29 +225,3 @@ def streams(sensors: Iterable[Sensor]) -> list[tuple[str, str]]:
 def missing_streams(sensors: Iterable[Sensor], there: Collection[str]) -> list[str]:
     """Streams of the sensors that a recording lacks, as "sensor/stream"."""
     return [name for head, stream in streams(sensors) if (name := f"{head}/{stream}") not in there]
-
-
-def _initializing(observation: Observation, reasons: tuple[str, ...], warnings: tuple[str, ...]) -> Estimate:
-    return Estimate(
-        seq=observation.seq,
-        t_host_ns=observation.t_host_ns,
-        status=Status.INITIALIZING,
-        reasons=reasons,
-        theta=np.zeros(0),
-        covariance=np.zeros((0, 0)),
-        vertices=np.zeros((0, 3), np.float32),
-        vertex_covariance=np.zeros((0, 3, 3)),
-        cost=float("nan"),
-        deviation=float("nan"),
-        searcher="",
-        stop=Stop.NOTHING,
-        generations=0,
-        evaluations=0,
-        budget=0,
-        inlier_share=0.0,
-        fits=(),
-        shape=ShapeQuality(),
-        sources=observation.sources,
-        missing=observation.missing,
-        warnings=warnings,
-    )

@@ -29,7 +29,7 @@ from abs_service.tracker.models.flexpad import FlexPad
 from abs_service.tracker.models.gravity import Gravity
 from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.objectives import likelihood
-from abs_service.tracker.objectives.base import TermSum
+from abs_service.tracker.objectives.base import ObservedTerms
 from abs_service.tracker.synthesis import sparse, undistorted, warped
 from abs_service.tracking.observer import Observer
 from abs_service.tracking.plan import SynthesisSettings
@@ -81,7 +81,7 @@ def population(model: DeformationModel, size: int = POPULATION) -> NDArray[np.fl
 
 def objective_of(
     model: DeformationModel, sensors: tuple[str, ...], synthesis: SynthesisSettings = SPARSE, lens: str = ""
-) -> TermSum:
+) -> ObservedTerms:
     """The likelihood of what sensors of the simulator see, an exposure observed; `tof/2` is `tof` once more."""
     heads = {name: name.partition("/")[0] for name in sensors}
     simulation = simulate(f"simulated://wall?sensors={','.join(dict.fromkeys(heads.values()))}{lens}")
@@ -92,10 +92,10 @@ def objective_of(
     appearance = with_appearance(synthesizer.canvas, observation.images, rig).appearance
     mesh = replace(with_appearance(model.mesh, observation.images, rig), appearance=appearance)
     objective = likelihood.Settings().build(rig, mesh, synthesizer)
-    objective.observe(observation, model.deform(model.rest[None]))
-    fits = objective.fits(model.deform(model.rest[None]))
+    observed = objective.observe(observation, model.deform(model.rest[None]))
+    fits = observed.fits(model.deform(model.rest[None]))
     assert all(fit.inliers > 0.9 * len(mesh.vertices) for fit in fits), fits
-    return objective
+    return observed
 
 
 def whole(

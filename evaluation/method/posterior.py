@@ -22,7 +22,7 @@ from scipy.linalg import eigh
 from abs_service.report.content import Column, Section, Table
 from abs_service.tracker.estimate import Estimate
 from abs_service.tracker.models.base import DeformationModel, SparseJacobian
-from abs_service.tracker.posterior.covariance import propagated
+from abs_service.tracker.posterior.covariance.vertex_covariance import propagated
 from abs_service.tracker.posterior.priors.change_metric import ChangeMetric
 from abs_service.tracker.posterior.priors.stretch_prior import StretchPrior
 from abs_service.tracker.terms.linearization import stack

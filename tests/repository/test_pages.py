@@ -49,7 +49,7 @@ def test_troubleshooting_has_every_reason_of_a_status():
     nothing_right = SensorFit("tof", 100, 300, 100, 10, -1.0, 1.0, RimFit(20, 10, 10), counts, Remainder(0.9, 0.0))
     doubtful = replace(nothing_right, inliers=50)
     out_of_sight = replace(nothing_right, inliers=100, occluded=50)
-    bad = ShapeQuality(folded_share=0.5, deviation_m=1.0, unheld_m=1.0)
+    bad = ShapeQuality(folded_share=0.5, deviation_m=1.0, single_frame_deviation_m=1.0)
     found = [
         status.judge([fit], ["color"], bad, 9.9, status.Settings())[1]
         for fit in (nothing_right, doubtful, out_of_sight)

@@ -23,15 +23,17 @@ from abs_service.bus.frames import FrameSubscriber
 from abs_service.bus.health import Health, Level
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.commands.parts import chosen_region, rig_process
+from abs_service.pairing.frame_set_queue import FrameSetQueue
 from abs_service.supervision import gc_tuning
 from abs_service.supervision.exit_codes import Exit
 from abs_service.tracking.estimate_publisher import EstimatePublisher
-from abs_service.tracking.live_tracker import FrameSetQueue, LiveTracker
-from abs_service.tracking.monitors.noise_monitor import NoiseMonitor
+from abs_service.tracking.live_tracker import LiveTracker
 from abs_service.tracking.plan import Plan
 from abs_service.tracking.session import TrackingSession, streams
+from abs_service.tracking.tracker_health import TrackerHealth
 from abs_service.tracking.warmup.board import warm_up
 from abs_service.wire import commands
+from abs_service.wire.checked_bus import CheckedBus
 from calib.camera import Camera
 from calib.jit import load_compiler
 from calib.rig import Rig
@@ -66,10 +68,7 @@ def run(arguments: argparse.Namespace) -> int:
         if stop.is_set():
             return Exit.OK
         rigs.put(rig := wiring.rig(settings, name, cameras))
-        while preparing.is_alive() and not stop.is_set():
-            preparing.join(0.05)
-            health.tick()
-        health.publish()
+        _await(preparing, health, stop)
         if stop.is_set():
             return Exit.OK
         gc_tuning.freeze_loaded_objects()
@@ -77,18 +76,32 @@ def run(arguments: argparse.Namespace) -> int:
         act = partial(chosen_region.reinitialize, tracking, rig, plan, name)
         commands.answer_reinitialize(bus, name, headers, health, act)
         clocks, measuring = _clocks(bus, headers, stop)
-        live = _live(bus, settings, name, rig, tracking, headers, health, clocks)
+        sets = _frame_sets(bus, settings, name, rig)
+        tracker_health = TrackerHealth(health, sets, time.monotonic_ns)
+        publisher, budget_ms = _publisher(bus, settings, name, rig, headers), settings.trackers[name].budget_ms
+        live = LiveTracker(tracking, sets, publisher, tracker_health, time.monotonic_ns, clocks, budget_ms)
         while not stop.is_set():
             live.process_next()
             if health.due():
                 clock.measure()
-                live.report()
-                bus.report(health)
-                health.tick()
-        live.report()
+                _report(tracker_health, bus, health)
+        tracker_health.report()
         health.publish()
         measuring.join()  # it uses the bus
     return Exit.OK
+
+
+def _await(preparing: threading.Thread, health: Health, stop: threading.Event) -> None:
+    while preparing.is_alive() and not stop.is_set():
+        preparing.join(0.05)
+        health.tick()
+    health.publish()
+
+
+def _report(tracker_health: TrackerHealth, bus: CheckedBus, health: Health) -> None:
+    tracker_health.report()
+    bus.report(health)
+    health.tick()
 
 
 def _clocks(bus: Bus, headers: HeaderFactory, stop: threading.Event) -> tuple[ClockOffsets, threading.Thread]:
@@ -99,30 +112,17 @@ def _clocks(bus: Bus, headers: HeaderFactory, stop: threading.Event) -> tuple[Cl
     return clocks, measuring
 
 
-def _live(
-    bus: Bus,
-    settings: config.ServiceConfig,
-    name: str,
-    rig: Rig,
-    tracking: TrackingSession,
-    headers: HeaderFactory,
-    health: Health,
-    clocks: ClockOffsets,
-) -> LiveTracker:
+def _frame_sets(bus: Bus, settings: config.ServiceConfig, name: str, rig: Rig) -> FrameSetQueue:
     frames = FrameSubscriber(bus, streams(rig.sensors.values()), time.monotonic_ns)
     synchroniser = wiring.synchroniser(settings, name, rig.sensors.values())
-    return LiveTracker(
-        tracking,
-        FrameSetQueue(frames, synchroniser, time.monotonic_ns),
-        EstimatePublisher(
-            bus, headers, name, wiring.model_name(settings, name), rig.calib_id, settings.trackers[name].view_hz
-        ),
-        health,
-        NoiseMonitor(health),
-        time.monotonic_ns,
-        clocks,
-        settings.trackers[name].budget_ms,
-    )
+    return FrameSetQueue(frames, synchroniser, time.monotonic_ns)
+
+
+def _publisher(
+    bus: Bus, settings: config.ServiceConfig, name: str, rig: Rig, headers: HeaderFactory
+) -> EstimatePublisher:
+    model_name, view_hz = wiring.model_name(settings, name), settings.trackers[name].view_hz
+    return EstimatePublisher(bus, headers, name, model_name, rig.calib_id, view_hz)
 
 
 def await_cameras(bus: Bus, sensors: tuple[str, ...], health: Health, stop: threading.Event) -> dict[str, Camera]:

@@ -1,6 +1,6 @@
 """Interface of an objective, and the sum of all terms."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import reduce
 from typing import Protocol
 
@@ -15,10 +15,10 @@ from abs_service.tracker.terms.linearization import Linear
 
 
 class Objective(Protocol):
-    """A cost over deformed meshes, given one observation."""
+    """Compares deformed meshes with observations, one after the other."""
 
-    def observe(self, observation: Observation, predicted: Surface, reach_m: float = np.inf) -> None:
-        """Sets the measurements that the following costs refer to.
+    def observe(self, observation: Observation, predicted: Surface, reach_m: float = np.inf) -> "ObservedObjective":
+        """The cost of deformed meshes given an observation.
 
         Args:
             observation: the measurements.
@@ -26,6 +26,10 @@ class Objective(Protocol):
             reach_m: radius around the prediction outside which costs need not be exact, only high [m].
         """
         ...
+
+
+class ObservedObjective(Protocol):
+    """A cost over deformed meshes, given one observation; asked until the next one is observed."""
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
         """Cost (population,) of every deformed mesh; lower explains the measurements better."""
@@ -55,36 +59,57 @@ class TermSum:
     def __init__(self, synthesizer: Synthesizer, terms: Sequence[Term]):
         self._synthesizer = synthesizer
         self._terms = terms
-        self._active: list[Term] = []
+        self._frames = 0
 
-    def observe(self, observation: Observation, predicted: Surface, reach_m: float = np.inf) -> None:
+    def observe(self, observation: Observation, predicted: Surface, reach_m: float = np.inf) -> "ObservedTerms":
         """Passes every sensor's image to its term, and all occluders to every term."""
         self._synthesizer.observe(observation)
-        self._active = [term for term in self._terms if term.sensor in observation.images]
-        for term in self._active:
+        terms = [term for term in self._terms if term.sensor in observation.images]
+        for term in terms:
             term.observe(observation.images[term.sensor], predicted, reach_m)
-        occluders = np.concatenate([np.zeros((0, 3)), *(term.foreground() for term in self._active)])
-        for term in self._active:
+        occluders = np.concatenate([np.zeros((0, 3)), *(term.foreground() for term in terms)])
+        for term in terms:
             term.hide(occluders)
+        self._frames = frame = self._frames + 1
+        return ObservedTerms(terms, lambda: self._frames == frame)
+
+
+class ObservedTerms:
+    """The sum of the terms of the sensors that contribute to one frame.
+
+    Args:
+        terms: terms that have observed their sensor's image.
+        is_newest: False once they have observed another one, for which they use the same memory.
+    """
+
+    def __init__(self, terms: Sequence[Term], is_newest: Callable[[], bool]):
+        self._observed = terms
+        self._is_newest = is_newest
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
         """Cost (population,) of every deformed mesh."""
-        if not self._active:
+        if not self._terms:
             return np.zeros(len(surface.vertices))
-        return reduce(np.add, (term.cost(surface) for term in self._active))
+        return reduce(np.add, (term.cost(surface) for term in self._terms))
 
     def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> list[Linear]:
         """Normalised residuals of all sensors and their derivatives."""
-        return [term.linearize(surface, sparse_jacobian) for term in self._active]
+        return [term.linearize(surface, sparse_jacobian) for term in self._terms]
 
     def fits(self, surface: Surface) -> list[SensorFit]:
         """Agreement of every contributing sensor with a population of one."""
-        return [term.fit(surface) for term in self._active]
+        return [term.fit(surface) for term in self._terms]
 
     def misfit(self, surface: Surface) -> NDArray[np.float64]:
         """Signed distance of each vertex from its measurements, the largest, and its deviation by noise (2, n) [m]."""
         none = np.zeros((2, surface.vertices.shape[2]))
-        return reduce(_larger, (term.misfit(surface) for term in self._active), none)
+        return reduce(_larger, (term.misfit(surface) for term in self._terms), none)
+
+    @property
+    def _terms(self) -> Sequence[Term]:
+        if not self._is_newest():
+            raise RuntimeError("the cost of a frame is asked after the next frame was observed")
+        return self._observed
 
 
 def _larger(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:

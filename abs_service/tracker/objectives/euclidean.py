@@ -5,14 +5,17 @@ from typing import Annotated
 
 import numpy as np
 from annotated_types import Gt
+from numpy.typing import NDArray
 
+from abs_service.pairing.observation import Observation
 from abs_service.tracker.measurements import measurement
 from abs_service.tracker.measurements.base import Comparison
 from abs_service.tracker.mesh import Mesh
-from abs_service.tracker.models.base import ModelError, Surface
-from abs_service.tracker.objectives.base import TermSum
+from abs_service.tracker.models.base import ModelError, SparseJacobian, Surface
+from abs_service.tracker.objectives.base import ObservedTerms, TermSum
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.terms.base import Bounds, SensorFit, Term
+from abs_service.tracker.terms.linearization import Linear
 from calib.no_return import NEVER
 from calib.noise.base import LOG_SQRT_2PI, DepthNoise
 from calib.noise.constant import Constant
@@ -56,7 +59,8 @@ class Settings:
         Raises:
             ModelError: a sensor measures something without a weight.
         """
-        return SquareSum(synthesizer, [self._term(sensor, mesh, synthesizer) for sensor in rig.sensors.values()])
+        terms = [self._term(sensor, mesh, synthesizer) for sensor in rig.sensors.values()]
+        return SquareSum(TermSum(synthesizer, terms))
 
     def _term(self, sensor: Sensor, mesh: Mesh, synthesizer: Synthesizer) -> Term:
         level, cutoff = _deviation(self.color_weight), self.color_weight * self.cutoff_levels**2
@@ -83,12 +87,46 @@ class Settings:
         return measurement(noise).term(sensor, mesh, synthesizer, Comparison(bounds))
 
 
-class SquareSum(TermSum):
-    """The weighted squares of all sensors."""
+@dataclass(frozen=True)
+class SquareSum:
+    """The weighted squares of all sensors.
+
+    Attributes:
+        terms: their sum, as likelihoods.
+    """
+
+    terms: TermSum
+
+    def observe(self, observation: Observation, predicted: Surface, reach_m: float = np.inf) -> "ObservedSquares":
+        """See `Objective`."""
+        return ObservedSquares(self.terms.observe(observation, predicted, reach_m))
+
+
+@dataclass(frozen=True)
+class ObservedSquares:
+    """The weighted squares of the sensors that contribute to one frame.
+
+    Attributes:
+        terms: their sum, as likelihoods.
+    """
+
+    terms: ObservedTerms
+
+    def cost(self, surface: Surface) -> NDArray[np.float64]:
+        """See `ObservedObjective`."""
+        return self.terms.cost(surface)
+
+    def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> list[Linear]:
+        """See `ObservedObjective`."""
+        return self.terms.linearize(surface, sparse_jacobian)
 
     def fits(self, surface: Surface) -> list[SensorFit]:
         """Agreement of every sensor; without normalised residuals, because weights are no noise model."""
-        return [replace(fit, normalized_residual=float("nan")) for fit in super().fits(surface)]
+        return [replace(fit, normalized_residual=float("nan")) for fit in self.terms.fits(surface)]
+
+    def misfit(self, surface: Surface) -> NDArray[np.float64]:
+        """See `ObservedObjective`."""
+        return self.terms.misfit(surface)
 
 
 def _deviation(weight: float) -> float:

@@ -5,7 +5,7 @@ drives it (`abs_service.tracker.tracker`), so every optimiser has the same loop.
 """
 
 from collections.abc import Callable, Generator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Protocol
 
@@ -13,30 +13,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.posterior.curvature import Quadratic
+from abs_service.tracker.posterior.linearized_cost import LinearizedCost
+from abs_service.tracker.terms.base import SensorFit
 
 #: Costs (population,) [nats] of candidates (population, dim).
 Costs = NDArray[np.float64]
 
 
 class Problem(Protocol):
-    """The cost of one frame near a theta: derivatives for the searches that use them.
+    """The cost of one frame near a theta: derivatives and outliers for the searches that use them."""
 
-    Attributes:
-        dimension: number of parameters.
-    """
+    @property
+    def dimension(self) -> int:
+        """Number of parameters."""
+        ...
 
-    dimension: int
-
-    def linearize(self, theta: NDArray[np.float64]) -> Quadratic:
-        """Gauss–Newton approximation of the cost near theta (dim,)."""
+    def linearize(self, theta: NDArray[np.float64]) -> LinearizedCost:
+        """The cost near theta (dim,), with its Gauss–Newton approximation."""
         ...
 
     def prior(self, theta: NDArray[np.float64]) -> Quadratic:
         """Gauss–Newton approximation of the priors alone near theta (dim,)."""
         ...
 
-    def outlier_share(self, theta: NDArray[np.float64]) -> float:
-        """Share of the visible vertices, 0…1, that do not agree with their measurement at theta (dim,)."""
+    def fits(self, theta: NDArray[np.float64]) -> tuple[SensorFit, ...]:
+        """Agreement of every contributing sensor with theta (dim,)."""
         ...
 
 
@@ -85,6 +86,9 @@ class Outcome:
         searcher: "levenberg_marquardt", "cma" or "cma_es".
         stop: reason for the end.
         deviation: step size at the end, in deviations of the posterior.
+        linearized: the newest linearisation of the cost that the search made, from which the covariance of theta is
+            made if it holds there; None if it made none.
+        fits: agreement of the sensors with theta; empty if the search did not ask for it.
     """
 
     theta: NDArray[np.float64]
@@ -92,6 +96,12 @@ class Outcome:
     searcher: str
     stop: Stop
     deviation: float
+    linearized: LinearizedCost | None = None
+    fits: tuple[SensorFit, ...] = ()
+
+    def compared(self, problem: Problem) -> "Outcome":
+        """The same with the agreement of the sensors."""
+        return self if self.fits else replace(self, fits=problem.fits(self.theta))
 
 
 #: Yields candidates (population, dim), receives their costs (population,), returns the outcome.

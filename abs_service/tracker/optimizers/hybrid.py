@@ -20,6 +20,7 @@ from abs_service.tracker.optimizers.search.ask_and_tell import (
 )
 from abs_service.tracker.optimizers.search.levenberg_marquardt import descend
 from abs_service.tracker.posterior.curvature import search_metric
+from abs_service.tracker.terms.base import outlier_share
 
 #: Minimum step size of CMA-ES at the start of a frame, as a share of the initial one.
 MIN_STEP = 0.5
@@ -79,20 +80,19 @@ class Hybrid:
 
     def follow(self, problem: Problem, start: NDArray[np.float64], budget: Budget) -> Search:
         """Descends; with too many outliers, samples the priors and descends from the result."""
-        found = yield from self._descend(problem, start, budget)
-        outliers = problem.outlier_share(found.theta)
+        found = (yield from self._descend(problem, start, budget)).compared(problem)
         limit = self._settings.fallback_until if self._in_fallback else self._settings.fallback_above
-        if outliers > self._mean_outliers + limit:
-            found = yield from self._fall_back(problem, start, found, budget)
-            outliers = problem.outlier_share(found.theta)
-        self._update_mean(outliers)
+        if outlier_share(found.fits) > self._mean_outliers + limit:
+            found = (yield from self._fall_back(problem, start, found, budget)).compared(problem)
+        self._update_mean(outlier_share(found.fits))
         return found
 
     def explore(self, problem: Problem, start: NDArray[np.float64], budget: Budget) -> Search:
         """Descends, then samples the priors with growing populations."""
         restarts = self._settings.restarts
-        found = yield from explore(problem, start, self._descend, self._make, self._population, restarts, budget)
-        self._mean_outliers = problem.outlier_share(found.theta)
+        search = explore(problem, start, self._descend, self._make, self._population, restarts, budget)
+        found = (yield from search).compared(problem)
+        self._mean_outliers = outlier_share(found.fits)
         return found
 
     def _descend(self, problem: Problem, start: NDArray[np.float64], budget: Budget) -> Search:
@@ -107,8 +107,8 @@ class Hybrid:
         sampled = yield from sample(start, np.inf, metric, self._sampler, self._schedule, budget)
         polished = yield from self._descend(problem, sampled.theta, budget)
         if polished.cost < descended.cost - SIGNIFICANT:
-            return replace(sampled, theta=polished.theta, cost=polished.cost)
-        return descended
+            return replace(sampled, theta=polished.theta, cost=polished.cost, linearized=polished.linearized)
+        return replace(descended, linearized=polished.linearized)
 
     def _update_mean(self, outliers: float) -> None:
         """Updates the running mean; a higher share that lasts becomes the mean, which ends a fallback in vain."""

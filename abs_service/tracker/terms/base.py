@@ -150,6 +150,11 @@ def inlier_share(fits: Sequence[SensorFit]) -> float:
     return sum(fit.inliers for fit in fits) / visible if visible else 0.0
 
 
+def outlier_share(fits: Sequence[SensorFit]) -> float:
+    """Share of the vertices visible to any sensor that do not agree with their measurement; 1 if none is visible."""
+    return 1 - inlier_share(fits)
+
+
 def occluded_share(fits: Sequence[SensorFit]) -> float:
     """Share of occluded vertices in the sensor with the smallest such share; 0 without a sensor.
 

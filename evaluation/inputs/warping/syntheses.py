@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from abs_service.tracker.models.rigid import Rigid
-from abs_service.tracker.objectives.base import Objective
+from abs_service.tracker.objectives.base import ObservedObjective
 from abs_service.tracker.synthesis import dense, sparse, undistorted, warped
 from abs_service.tracking.observer import Observer
 from abs_service.tracking.plan import SynthesisSettings
@@ -90,9 +90,8 @@ def candidates_us(names: Sequence[str], sequence: Recorded) -> dict[str, float]:
     return {name: seconds / POPULATION * 1e6 for name, seconds in least.items()}
 
 
-def _objective(synthesis: SynthesisSettings, sequence: Recorded, model: Rigid) -> Objective:
+def _objective(synthesis: SynthesisSettings, sequence: Recorded, model: Rigid) -> ObservedObjective:
     """Objective of the first frame."""
     rig, mesh = sequence.rig, model.mesh
     objective = demo_plan().objective.build(rig, mesh, synthesis.build(rig, mesh))
-    objective.observe(Observer(rig).observe(sequence.exposures[0].frames), model.deform(model.rest[None]))
-    return objective
+    return objective.observe(Observer(rig).observe(sequence.exposures[0].frames), model.deform(model.rest[None]))

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.optimizers.base import Budget, Optimizer, Problem, Search
 from abs_service.tracker.posterior.curvature import Quadratic
+from abs_service.tracker.posterior.linearized_cost import LinearizedCost
+from abs_service.tracker.terms.base import SensorFit
 from abs_service.tracking.plan import OptimizerSettings
 
 Answer = TypeVar("Answer")
@@ -23,7 +25,7 @@ class Clocked:
     dimension: int
     spent_s: float = 0.0
 
-    def linearize(self, theta: NDArray[np.float64]) -> Quadratic:
+    def linearize(self, theta: NDArray[np.float64]) -> LinearizedCost:
         """See `Problem`."""
         return self._clocked(lambda: self.problem.linearize(theta))
 
@@ -31,9 +33,9 @@ class Clocked:
         """See `Problem`."""
         return self._clocked(lambda: self.problem.prior(theta))
 
-    def outlier_share(self, theta: NDArray[np.float64]) -> float:
+    def fits(self, theta: NDArray[np.float64]) -> tuple[SensorFit, ...]:
         """See `Problem`."""
-        return self._clocked(lambda: self.problem.outlier_share(theta))
+        return self._clocked(lambda: self.problem.fits(theta))
 
     def _clocked(self, ask: Callable[[], Answer]) -> Answer:
         begin = time.thread_time()

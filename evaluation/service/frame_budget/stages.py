@@ -3,9 +3,11 @@
 from abs_service.pairing.synchroniser import Synchroniser
 from abs_service.tracker import status
 from abs_service.tracker.objectives.base import TermSum
-from abs_service.tracker.posterior.posterior import FramePosterior, Posterior
-from abs_service.tracker.posterior.uncertainty import Uncertainty
-from abs_service.tracker.shape_quality import ShapeJudge
+from abs_service.tracker.posterior.covariance.theta_covariance import ThetaCovariance
+from abs_service.tracker.posterior.covariance.vertex_covariance import VertexCovariance
+from abs_service.tracker.posterior.frame_posterior import FramePosterior
+from abs_service.tracker.posterior.posterior import Posterior
+from abs_service.tracker.shape_quality import ShapeComparison
 from abs_service.tracker.synthesis.sparse import Sparse, SparseView
 from abs_service.tracker.terms.depth import depth, texels
 from abs_service.tracker.terms.depth.background import Background
@@ -40,10 +42,11 @@ SEAMS = (
     Seam("outline", RimOutline, "observe"),
     Seam("colour", ColorTerm, "observe"),
     Seam("search", Tracker, "_minimize"),
-    Seam("posterior", FramePosterior, "covariance"),
-    Seam("posterior", Uncertainty, "estimate"),
+    Seam("posterior", FramePosterior, "optimum"),
+    Seam("posterior", ThetaCovariance, "update"),
+    Seam("posterior", VertexCovariance, "update"),
     Seam("session, status", FramePosterior, "fits"),
-    Seam("session, status", ShapeJudge, "judge"),
+    Seam("session, status", ShapeComparison, "compare"),
     Seam("session, status", status, "judge"),
 )
 

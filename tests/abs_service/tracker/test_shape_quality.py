@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from abs_service.tracker.shape_quality import ShapeJudge
+from abs_service.tracker.shape_quality import ShapeComparison
 from tests.abs_service.tracker.scenes import flat, sheet
 
 MESH = sheet(9, 13, flat)
@@ -14,13 +14,13 @@ def covariances(sigma: float) -> np.ndarray:
 
 
 def test_a_mesh_at_rest_is_neither_stretched_nor_folded():
-    quality = ShapeJudge(MESH).judge(MESH.vertices, covariances(2e-3), 0.0)
+    quality = ShapeComparison(MESH).compare(MESH.vertices, covariances(2e-3), 0.0)
     assert (quality.stretch, quality.folded_share) == (pytest.approx(0, abs=1e-9), 0)
     assert quality.deviation_m == pytest.approx(np.sqrt(3) * 2e-3)
 
 
 def test_stretch_is_the_relative_change_of_the_edges():
-    quality = ShapeJudge(MESH).judge(MESH.vertices * (1.1, 1.1, 1.0), covariances(1e-3), 0.0)
+    quality = ShapeComparison(MESH).compare(MESH.vertices * (1.1, 1.1, 1.0), covariances(1e-3), 0.0)
     assert quality.stretch == pytest.approx(0.1)
 
 
@@ -29,11 +29,11 @@ def test_a_sheet_that_is_folded_in_half_has_folded_faces_along_one_line_only():
     right = half[:, 0] > 1e-6
     half[right, 0] *= -1
     half[right, 2] += 1e-3
-    folded = ShapeJudge(MESH).judge(half, covariances(1e-3), 0.0).folded_share
+    folded = ShapeComparison(MESH).compare(half, covariances(1e-3), 0.0).folded_share
     assert 0 < folded < 0.1
 
 
 def test_bending_is_no_fold():
     roll = MESH.vertices.copy()
     roll[:, 0], roll[:, 2] = 0.1 * np.sin(roll[:, 0] / 0.1), 1.1 - 0.1 * np.cos(roll[:, 0] / 0.1)
-    assert ShapeJudge(MESH).judge(roll, covariances(1e-3), 0.0).folded_share == 0
+    assert ShapeComparison(MESH).compare(roll, covariances(1e-3), 0.0).folded_share == 0

@@ -159,5 +159,5 @@ def test_a_folded_mesh_and_one_that_nothing_holds_are_degraded():
     status, reasons = judge([fit(1.0)], (), loose, 0.0, SETTINGS)
     assert status == Status.DEGRADED
     assert reasons[0].startswith("nothing holds the surface along itself, vertices are known to 20 mm so far")
-    unheld = ShapeQuality(stretch=0.01, folded_share=0.0, deviation_m=1e-3, unheld_m=0.2)
-    assert judge([fit(1.0)], (), unheld, 0.0, SETTINGS)[0] == Status.DEGRADED
+    alone = ShapeQuality(stretch=0.01, folded_share=0.0, deviation_m=1e-3, single_frame_deviation_m=0.2)
+    assert judge([fit(1.0)], (), alone, 0.0, SETTINGS)[0] == Status.DEGRADED

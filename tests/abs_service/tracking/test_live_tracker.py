@@ -16,13 +16,14 @@ from abs_service.bus.contract import IMAGES
 from abs_service.bus.frames import FrameSubscriber
 from abs_service.bus.health import Health
 from abs_service.bus.stamps import HeaderFactory, WallClock
+from abs_service.pairing.frame_set_queue import FrameSetQueue
 from abs_service.pairing.synchroniser import Synchroniser
 from abs_service.tracker.detection.regions import box
 from abs_service.tracker.optimizers import cma
 from abs_service.tracking.estimate_publisher import EstimatePublisher
-from abs_service.tracking.live_tracker import FrameSetQueue, LiveTracker
-from abs_service.tracking.monitors.noise_monitor import NoiseMonitor
+from abs_service.tracking.live_tracker import LiveTracker
 from abs_service.tracking.session import TrackingSession, streams
+from abs_service.tracking.tracker_health import TrackerHealth
 from drivers.contract.frame import Kind
 from drivers.encoding import codec
 from tests.abs_service.bus.loopback import LoopbackBus
@@ -46,12 +47,12 @@ class Bench:
         self.sets = FrameSetQueue(frames, Synchroniser(MEMBERS[0], MEMBERS, tolerance_ns), lambda: self.now_ns)
         self.tracking = TrackingSession(RIG, default_plan(optimizer=cma.Settings(generations=2), **parts))
         self.clocks = ClockOffsets(self.bus, lambda: self.now_ns, "here")
+        self.tracker_health = TrackerHealth(self.health, self.sets, self.clock)
         self.live = LiveTracker(
             self.tracking,
             self.sets,
             EstimatePublisher(self.bus, self.headers, "sheet", "nurbs", RIG.calib_id, view_hz),
-            self.health,
-            NoiseMonitor(self.health),
+            self.tracker_health,
             self.clock,
             self.clocks,
             budget_ms,
@@ -87,7 +88,7 @@ class Bench:
     @property
     def said(self):
         """The last health."""
-        self.live.report()
+        self.tracker_health.report()
         self.health.publish()
         return self.sent("health/track/sheet", Message)[-1]
 
@@ -205,7 +206,7 @@ def test_a_tracker_without_frames_is_an_error_until_they_come(bench):
     assert bench.said.level == Message.LEVEL_OK, "the first may take long"
     for _ in range(10):
         bench.now_ns += SECOND
-        bench.live.report()
+        bench.tracker_health.report()
     said = bench.said
     assert said.level == Message.LEVEL_ERROR
     assert said.message == "no estimate for 11 s: no frames come from the cameras"

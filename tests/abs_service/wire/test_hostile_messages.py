@@ -25,13 +25,13 @@ from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.commands.processes import track
 from abs_service.display.terminal.lines import JsonDisplay, PlainDisplay
 from abs_service.display.terminal.table import draw
+from abs_service.pairing.frame_set_queue import FrameSetQueue
 from abs_service.pairing.synchroniser import FOREIGN, Synchroniser
 from abs_service.recording.recorder import Recorder
 from abs_service.recording.recorder_settings import RecorderSettings
 from abs_service.supervision.rig_view import Display
 from abs_service.supervision.run_session import RunSession
 from abs_service.supervision.supervisor import Supervisor
-from abs_service.tracking.live_tracker import FrameSetQueue
 from abs_service.wire.checked_bus import CheckedBus
 from drivers.contract.capabilities import StreamInfo
 from drivers.contract.frame import Frame, Geometry, Kind

@@ -117,7 +117,7 @@ def register(samples: Samples, detection: InitialDetection) -> Pose:
     return T_ro
 
 
-def placement_deviation(samples: Samples) -> float:
+def registration_deviation(samples: Samples) -> float:
     """Standard deviation of the place of a registered surface along itself [m].
 
     Points that lie beside the surface by less than `REACH` draw on nothing, so that every place within it is alike.

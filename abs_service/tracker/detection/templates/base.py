@@ -36,7 +36,7 @@ class Sight(Protocol):
     """Knowledge of the surface's place and appearance from the template and the first depth image."""
 
     @property
-    def placement_m(self) -> float:
+    def registration_m(self) -> float:
         """Standard deviation of the place of the mesh at rest; 0 if the first depth image defines it [m]."""
         ...
 
@@ -52,7 +52,7 @@ class Sight(Protocol):
 class AllSeen:
     """Sight of a mesh that was made from the first depth image: it shows every vertex."""
 
-    placement_m: float = 0.0
+    registration_m: float = 0.0
 
     def seen(self, mesh: Mesh) -> NDArray[np.bool_]:
         """True for all vertices (n,)."""

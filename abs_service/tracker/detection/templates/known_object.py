@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from abs_service.tracker.detection.depth_view import at_points
 from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection
 from abs_service.tracker.detection.shapes.paint import NO_PAINT, Paint
-from abs_service.tracker.detection.shapes.registration import placement_deviation, register
+from abs_service.tracker.detection.shapes.registration import register, registration_deviation
 from abs_service.tracker.detection.shapes.samples import Samples
 from abs_service.tracker.detection.templates.base import BindsToMesh, Model_co, ModelSettings, Sight
 from abs_service.tracker.mesh import Mesh
@@ -41,7 +41,7 @@ class KnownObject:
         mesh = replace(self._mesh, vertices=pose.transform(T_ro, self._mesh.vertices))
         if not self._samples.is_closed:
             mesh = _towards(detection.camera.center, mesh)
-        return model.of_mesh(mesh), FirstSight(detection, self._paint, T_ro, placement_deviation(self._samples))
+        return model.of_mesh(mesh), FirstSight(detection, self._paint, T_ro, registration_deviation(self._samples))
 
 
 def _towards(center: NDArray[np.float64], mesh: Mesh) -> Mesh:
@@ -58,13 +58,13 @@ class FirstSight:
         detection: the first depth image.
         paint: the template's colours.
         T_ro: pose of the object.
-        placement_m: standard deviation of its place [m].
+        registration_m: standard deviation of its place [m].
     """
 
     detection: InitialDetection
     paint: Paint
     T_ro: Pose
-    placement_m: float
+    registration_m: float
 
     def seen(self, mesh: Mesh) -> NDArray[np.bool_]:
         """True for vertices (n,) that face the depth camera where a pixel of the object agrees with their distance."""

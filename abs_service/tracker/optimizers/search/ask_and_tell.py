@@ -1,7 +1,7 @@
 """Searches of one frame with an ask-and-tell sampler such as CMA-ES: warm start, generations, restarts."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Protocol
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from abs_service.tracker.optimizers.base import Budget, Costs, Outcome, Problem, Search, StartSearch, Stop
 from abs_service.tracker.optimizers.search.convergence import ConvergenceMonitor
 from abs_service.tracker.posterior.curvature import newton_step, search_metric
+from abs_service.tracker.terms.base import outlier_share
 
 #: Outlier share below which a solution is accepted without further exploration.
 ACCEPTED_OUTLIERS = 0.1
@@ -119,13 +120,14 @@ class AskAndTell:
 
     def follow(self, problem: Problem, start: NDArray[np.float64], budget: Budget) -> Search:
         """Searches in the metric of the curvature, from the best of none, half and all of a Newton step."""
-        quadratic = problem.linearize(start)
-        metric = search_metric(quadratic)
-        step = newton_step(quadratic, metric)
+        linearized = problem.linearize(start)
+        metric = search_metric(linearized.quadratic)
+        step = newton_step(linearized.quadratic, metric)
         origins = np.stack([start, start + step / 2, start + step])
         costs = yield origins
         best = int(np.argmin(costs))
-        return (yield from sample(origins[best], float(costs[best]), metric, self._sampler, self._schedule, budget))
+        found = yield from sample(origins[best], float(costs[best]), metric, self._sampler, self._schedule, budget)
+        return replace(found, linearized=linearized)
 
     def explore(self, problem: Problem, start: NDArray[np.float64], budget: Budget) -> Search:
         """Follows, then samples the priors with growing populations."""
@@ -198,8 +200,8 @@ def explore(
         restarts: maximum number of times that the population doubles.
         budget: for all searches together.
     """
-    best = yield from follow(problem, start, budget)
-    if problem.outlier_share(best.theta) < ACCEPTED_OUTLIERS:
+    best = (yield from follow(problem, start, budget)).compared(problem)
+    if outlier_share(best.fits) < ACCEPTED_OUTLIERS:
         return best
     start_cost = float((yield start[None])[0])
     metric = search_metric(problem.prior(start))
@@ -211,5 +213,5 @@ def explore(
         sampled = yield from sample(start, start_cost, metric, sampler, _EXPLORATION, budget)
         found = yield from follow(problem, sampled.theta, budget)
         failures = 0 if found.cost < best.cost - SIGNIFICANT else failures + 1
-        best = found if failures == 0 else best
+        best = found if failures == 0 else replace(best, linearized=found.linearized)
     return best

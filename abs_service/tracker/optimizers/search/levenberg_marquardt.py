@@ -25,9 +25,9 @@ def descend(problem: Problem, start: NDArray[np.float64], iterations: int, toler
     """
     theta, cost = start, float((yield start[None])[0])
     stop, damping, steps = None, 0.0, 0
-    quadratic = problem.linearize(theta)
+    linearized = problem.linearize(theta)
     while stop is None and steps < iterations:
-        step, decrease = _step(quadratic, damping)
+        step, decrease = _step(linearized.quadratic, damping)
         cost_after = float((yield (theta + step)[None])[0])
         better = cost_after < cost
         if better:
@@ -37,8 +37,8 @@ def descend(problem: Problem, start: NDArray[np.float64], iterations: int, toler
         if not better:
             damping = max(damping * GROWTH, FIRST_DAMPING)
         elif stop is None and steps < iterations:
-            quadratic = problem.linearize(theta)
-    return Outcome(theta, cost, NAME, stop or Stop.GENERATIONS, 0.0)
+            linearized = problem.linearize(theta)
+    return Outcome(theta, cost, NAME, stop or Stop.GENERATIONS, 0.0, linearized)
 
 
 def _step(quadratic: Quadratic, damping: float) -> tuple[NDArray[np.float64], float]:

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Annotated
 
+import numpy as np
 from annotated_types import Gt
 
 
@@ -22,3 +23,11 @@ class Settings:
     speed: Annotated[float, Gt(0)] = 0.3
     least_speed: Annotated[float, Gt(0)] = 0.02
     memory_s: Annotated[float, Gt(0)] = 0.1
+
+    def persistence(self, elapsed_s: float) -> float:
+        """Share of a velocity that is left after a time [s], 0…1."""
+        return float(np.exp(-elapsed_s / self.memory_s))
+
+    def limited(self, speed: float) -> float:
+        """A deviation of the rate of change [m/s] within its bounds."""
+        return float(np.clip(speed, self.least_speed, self.speed))

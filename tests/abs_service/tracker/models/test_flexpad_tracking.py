@@ -58,10 +58,10 @@ def test_the_truth_is_likelier_than_a_collapsed_sheet(value, collapse):
     tracker.track(frame_set(flat := simulation.expose(0)[0], 0), lambda: True)
     assert tracker.model is not None
     posterior = posterior_of(tracker.model, rig, flat)
-    posterior.observe(Observer(rig).observe(frame_set(bent.expose(1)[0], 1)))
+    frame = posterior.observe(Observer(rig).observe(frame_set(bent.expose(1)[0], 1)))
     truth = bend(e=value, w=value)
     surface = tracker.model.deform(np.stack([truth, truth + collapse * COLLAPSED]))
-    costs = posterior.objective.cost(surface) + posterior.stretch.cost(surface)
+    costs = frame.objective.cost(surface) + frame.stretch.cost(surface)
     assert costs[0] < costs[1] - 100
 
 

@@ -140,8 +140,7 @@ def test_what_only_deforms_the_shape_costs_nothing():
 
 
 def test_the_curvature_is_regular_although_pose_and_shape_can_do_the_same():
-    motion = MotionPrior(MODEL.rest, ChangeMetric(MODEL.scales, MODEL.roughness), PriorSettings())
-    motion.predict(0)
+    motion = MotionPrior(MODEL.rest, ChangeMetric(MODEL.scales, MODEL.roughness), PriorSettings()).predict(0)
     jacobian = MODEL.jacobian(MODEL.rest)
     measured = jacobian[:, 2] / 5e-3  # every vertex's z, to 5 mm
     parts = StretchPrior(MODEL.mesh, 0.02).linearize(MODEL.deform(MODEL.rest[None]), MODEL.sparse_jacobian(MODEL.rest))

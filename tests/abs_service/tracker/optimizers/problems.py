@@ -6,11 +6,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from abs_service.tracker.models.base import SparseJacobian
 from abs_service.tracker.optimizers.base import Budget, Outcome, Search
 from abs_service.tracker.posterior.curvature import Quadratic
+from abs_service.tracker.posterior.linearized_cost import LinearizedCost
+from abs_service.tracker.terms.base import SensorFit
 
 #: Step of the central differences.
 STEP = 1e-5
+
+#: Number of measurements, of which a share are outliers.
+MEASUREMENTS = 10**6
 
 
 @dataclass
@@ -20,7 +26,7 @@ class Known:
     Attributes:
         dimension: number of parameters.
         residuals: (population, m) of parameters (population, dim); the cost is half their squares' sum.
-        outlier_share_at: `Problem.outlier_share` of parameters (dim,).
+        outlier_share_at: share of outliers at parameters (dim,).
         deviation: of the prior, which `residuals` contains already.
     """
 
@@ -33,19 +39,22 @@ class Known:
         """See `Problem`."""
         return 0.5 * np.sum(self.residuals(thetas) ** 2, axis=1)
 
-    def linearize(self, theta: NDArray[np.float64]) -> Quadratic:
+    def linearize(self, theta: NDArray[np.float64]) -> LinearizedCost:
         """See `Problem`."""
         offsets = STEP * np.eye(self.dimension)
         jacobian = (self.residuals(theta + offsets) - self.residuals(theta - offsets)).T / (2 * STEP)
-        return Quadratic(jacobian.T @ self.residuals(theta[None])[0], jacobian.T @ jacobian)
+        quadratic = Quadratic(jacobian.T @ self.residuals(theta[None])[0], jacobian.T @ jacobian)
+        no_vertices = SparseJacobian.from_dense(np.zeros((0, 3, self.dimension)))
+        return LinearizedCost(theta, quadratic, self.prior(theta).curvature, [], no_vertices)
 
     def prior(self, theta: NDArray[np.float64]) -> Quadratic:
         """See `Problem`."""
         return Quadratic(theta / self.deviation**2, np.eye(self.dimension) / self.deviation**2)
 
-    def outlier_share(self, theta: NDArray[np.float64]) -> float:
+    def fits(self, theta: NDArray[np.float64]) -> tuple[SensorFit, ...]:
         """See `Problem`."""
-        return self.outlier_share_at(theta)
+        inliers = round(MEASUREMENTS * (1 - self.outlier_share_at(theta)))
+        return (SensorFit("", MEASUREMENTS, 0, MEASUREMENTS, inliers, 0.0, 1.0),)
 
 
 def minimize(problem: Known, search: Search, budget: Budget) -> Outcome:

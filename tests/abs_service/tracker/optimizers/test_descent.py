@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.optimizers.base import Budget, Outcome, Stop
 from abs_service.tracker.optimizers.search import levenberg_marquardt
-from abs_service.tracker.posterior.curvature import Quadratic
+from abs_service.tracker.posterior.linearized_cost import LinearizedCost
 from tests.abs_service.tracker.optimizers.problems import Known, linear, minimize, rosenbrock
 
 TARGET = np.array([0.3, -2.0, 1.0])
@@ -27,7 +27,7 @@ def counted(problem: Known) -> tuple[Known, list[NDArray[np.float64]]]:
     asked: list[NDArray[np.float64]] = []
 
     class Counted(Known):
-        def linearize(self, theta: NDArray[np.float64]) -> Quadratic:
+        def linearize(self, theta: NDArray[np.float64]) -> LinearizedCost:
             asked.append(theta)
             return super().linearize(theta)
 

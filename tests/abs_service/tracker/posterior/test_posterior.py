@@ -1,30 +1,54 @@
 """Linearisations of the cost of one frame."""
 
 import numpy as np
+import pytest
 
 from abs_service.tracker.posterior.curvature import search_metric
-from abs_service.tracker.posterior.posterior import REUSED_WITHIN
+from abs_service.tracker.posterior.linearized_cost import NEAR
 from abs_service.tracker.terms.linearization import stack
 from abs_service.tracking.observer import Observer
 from tests.abs_service.tracking.driving import frame_set, posterior_of
 from tests.abs_service.tracking.test_session import RIG, SHEET, drive, tracking
 
 
-def test_a_linearisation_is_moved_to_a_near_theta_and_made_anew_for_a_far_one():
+def test_a_linearisation_serves_a_near_optimum_and_is_made_anew_for_a_far_one():
     *_, step = drive(one := tracking(vertices=120), SHEET, [0, 1])
     assert one.model is not None
     theta, exposed = step.estimate.theta, SHEET.expose(1)[0]
     frame = posterior_of(one.model, RIG, exposed).observe(Observer(RIG).observe(frame_set(exposed, 1)))
     at = frame.linearize(theta)
-    metric = search_metric(at)
-    direction = metric @ np.ones(len(theta)) / np.sqrt(len(theta))  # one standard deviation
-    small, large = (size * direction * np.sqrt(2 * REUSED_WITHIN * len(theta)) for size in (0.99, 1.01))
-    near = frame.linearized_near(theta + small)
-    assert near.quadratic is at
-    sources = frame.linearized_near(theta).sensed, near.sensed
+    direction = search_metric(at.quadratic) @ np.ones(len(theta)) / np.sqrt(len(theta))  # one standard deviation
+    small, large = (size * direction * np.sqrt(2 * NEAR * len(theta)) for size in (0.99, 1.01))
+    assert frame.optimum(theta + small, at).linearized is at
+    np.testing.assert_array_equal(frame.optimum(theta + large, at).linearized.theta, theta + large)
+    sources = at.sensed, at.sensed_at(theta + small)
     before, after = (stack([part for parts in source for part in parts], len(theta)) for source in sources)
     np.testing.assert_array_equal(after.jacobian, before.jacobian)
     np.testing.assert_allclose(after.residual, before.residual + before.jacobian @ small, atol=1e-9)
-    far = frame.linearized_near(theta + large)
-    assert far.quadratic is not at
-    np.testing.assert_array_equal(far.theta, theta + large)
+
+
+def test_the_order_in_which_a_frame_is_asked_changes_nothing():
+    *_, step = drive(one := tracking(vertices=120), SHEET, [0, 1])
+    assert one.model is not None
+    theta, exposed = step.estimate.theta, SHEET.expose(1)[0]
+    frame = posterior_of(one.model, RIG, exposed).observe(Observer(RIG).observe(frame_set(exposed, 1)))
+    first = frame.optimum(theta, None)
+    fits = frame.fits(theta)
+    frame.linearize(theta + 1e-4)
+    frame.fits(theta + 1e-4)
+    frame.cost(theta[None] + 1e-3, one.model.deform(theta[None] + 1e-3))
+    again = frame.optimum(theta, None)
+    np.testing.assert_array_equal(again.inverse_curvature, first.inverse_curvature)
+    assert frame.fits(theta) == fits
+
+
+def test_the_posterior_of_a_frame_answers_no_more_once_the_next_is_observed():
+    *_, step = drive(one := tracking(vertices=120), SHEET, [0, 1])
+    assert one.model is not None
+    theta, exposed = step.estimate.theta, SHEET.expose(1)[0]
+    posterior = posterior_of(one.model, RIG, exposed)
+    observation = Observer(RIG).observe(frame_set(exposed, 1))
+    first, second = posterior.observe(observation), posterior.observe(observation)
+    assert len(second.fits(theta)) == 2
+    with pytest.raises(RuntimeError, match="after the next frame"):
+        first.fits(theta)

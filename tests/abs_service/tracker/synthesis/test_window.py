@@ -221,9 +221,9 @@ def test_a_mesh_that_moves_leaves_no_picture_behind(shifts):
 
 def test_the_motion_prior_reaches_as_far_as_its_deviation_allows():
     prior = MotionPrior(np.zeros(3), ChangeMetric(np.ones(3), np.zeros((0, 3))), Settings(speed=0.3))
-    prior.predict(0)
-    assert np.isinf(prior.reach_m)  # no motion is known in the first frame
-    prior.update(np.zeros(3), np.zeros((3, 3)))
-    prior.predict(100_000_000)
-    assert prior.reach_m == pytest.approx(4 * 0.3 * 0.1)
-    assert prior.cost(np.array([[prior.reach_m, 0, 0]]))[0] == pytest.approx(8)
+    first = prior.predict(0)
+    assert np.isinf(first.reach_m)  # no motion is known in the first frame
+    prior.update(first, np.zeros(3), np.zeros((3, 3)))
+    second = prior.predict(100_000_000)
+    assert second.reach_m == pytest.approx(4 * 0.3 * 0.1)
+    assert second.cost(np.array([[second.reach_m, 0, 0]]))[0] == pytest.approx(8)

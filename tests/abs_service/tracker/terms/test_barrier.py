@@ -94,7 +94,7 @@ def test_the_cost_is_the_likelihood(noise, share, interrupted):
     shifts = np.array([[0, 0, 0, 0, 0, -0.5], [0, 0, 0, 0, 0, 0.0]])  # across the beam, and beyond its end
     surface = Rigid(MESH).deform(shifts)
     reading = observation(barrier=BeamReading(interrupted))
-    objective.observe(reading, Surface(surface.vertices[:1], surface.normals[:1]))
+    objective = objective.observe(reading, Surface(surface.vertices[:1], surface.normals[:1]))
     right = np.array([1 - noise.miss, 1 - noise.false_alarm])
     agrees = np.array([interrupted, not interrupted])
     density = np.maximum((1 - share) * np.where(agrees, right, 1 - right), share / 2)
@@ -107,7 +107,7 @@ def test_in_the_euclidean_fitness_a_contradiction_costs_its_weight(interrupted):
     weights = euclidean.Settings(barrier_weight=3.5)
     objective = weights.build(Rig("r", {"barrier": sensor}), MESH, sparse(sensor.camera, MESH))
     surface = Rigid(MESH).deform(np.array([[0, 0, 0, 0, 0, -0.5], [0, 0, 0, 0, 0, 0.0]]))
-    objective.observe(observation(barrier=BeamReading(interrupted)), surface)
+    objective = objective.observe(observation(barrier=BeamReading(interrupted)), surface)
     np.testing.assert_allclose(objective.cost(surface), [0, 3.5] if interrupted else [3.5, 0], atol=1e-12)
 
 

@@ -99,7 +99,7 @@ def test_the_euclidean_cost_is_the_weighted_squares(seed, name):
     )
     image = ChannelImage(generator.uniform(0, 255, SHAPE).astype(np.float32), pattern)
     surface = as_surface((mesh.vertices, mesh.normals))
-    objective.observe(observation(color=image), surface)
+    objective = objective.observe(observation(color=image), surface)
     looks, expected = mesh.appearance_of("color"), 0.0
     for vertex, normal, look in zip(surface.vertices[0].T.astype(float), surface.normals[0].T, looks):
         pixel = reference.seen_pixel(CAMERA, vertex, normal)

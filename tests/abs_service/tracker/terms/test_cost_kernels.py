@@ -133,7 +133,7 @@ def test_the_color_cost_is_the_likelihood(seed):
     objective = likelihood.Settings(SHARE).build(
         Rig("r", {"color": sensor}), type(mesh)(*_replaced(mesh, colors)), sparse(CAMERA)
     )
-    objective.observe(observation(color=ColorImage(image)), in_sight(CAMERA, len(vertices)))
+    objective = objective.observe(observation(color=ColorImage(image)), in_sight(CAMERA, len(vertices)))
     expected = reference.color_cost(
         CAMERA, 12.0, image, colors.astype(float), vertices.astype(float), normals.astype(float), SHARE
     )
@@ -181,7 +181,9 @@ def test_the_euclidean_cost_is_exactly_the_weighted_squares(seed):
     rig = Rig("r", {"tof": Sensor("tof", CAMERA, StructuredLight()), "color": Sensor("color", CAMERA, GaussianColor())})
     mesh = sheet()
     objective = weights.build(rig, type(mesh)(*_replaced(mesh, colors)), sparse(CAMERA))
-    objective.observe(observation(tof=depth_image(distance), color=ColorImage(image)), in_sight(CAMERA, len(vertices)))
+    objective = objective.observe(
+        observation(tof=depth_image(distance), color=ColorImage(image)), in_sight(CAMERA, len(vertices))
+    )
     assert objective.cost(as_surface((vertices, normals)))[0] == pytest.approx(expected, abs=2e-3)
 
 
@@ -192,8 +194,8 @@ def test_a_missing_sensor_costs_nothing():
     depth = depth_image(np.ones((CAMERA.height, CAMERA.width)))
     surface = as_surface((mesh.vertices, mesh.normals))
     black = ColorImage(np.zeros((CAMERA.height, CAMERA.width, 3), np.uint8))
-    both.observe(observation(tof=depth, color=black), surface)
-    alone.observe(observation(tof=depth, missing=("color",)), surface)
+    both = both.observe(observation(tof=depth, color=black), surface)
+    alone = alone.observe(observation(tof=depth, missing=("color",)), surface)
     assert alone.cost(surface)[0] < both.cost(surface)[0]
     assert [fit.sensor for fit in alone.fits(surface)] == ["tof"]
 

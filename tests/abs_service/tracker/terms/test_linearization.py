@@ -189,7 +189,7 @@ def test_what_costs_less_than_an_outlier_is_linearized_whatever_the_objective(ob
     distance = plane_distance(FINE, NORMAL, 1.0)
     rig = Rig("r", {"tof": Sensor("tof", FINE, noise)})
     found = objective.build(rig, mesh, sparse(FINE, mesh))
-    found.observe(observation(0, (), tof=depth_image(distance)), as_surface((mesh.vertices, mesh.normals)))
+    found = found.observe(observation(0, (), tof=depth_image(distance)), as_surface((mesh.vertices, mesh.normals)))
     along = np.linalg.norm(mesh.vertices, axis=1, keepdims=True)
     nearer = as_surface((mesh.vertices * (1 - 0.01 * deviations / along), mesh.normals))
     costs = [
@@ -239,12 +239,12 @@ def test_stretch_rows_are_derivatives_of_the_stretch_cost():
 
 
 def test_motion_rows_are_derivatives_of_the_motion_cost():
-    prior = MotionPrior(
+    motion = MotionPrior(
         np.array([1.0, 2.0]), ChangeMetric(np.array([1.0, 3.0]), np.array([[1.0, -2.0]])), PriorSettings(speed=0.3)
     )
-    prior.predict(0)
-    assert not prior.linearize(prior.predicted).residual.any()
-    theta, step = prior.predicted + np.array([0.02, 0.01]), np.array([0.01, -0.02])
+    prior = motion.predict(0)
+    assert not prior.linearize(prior.theta).residual.any()
+    theta, step = prior.theta + np.array([0.02, 0.01]), np.array([0.01, -0.02])
     linear = prior.linearize(theta)
     for moved in (theta, theta + step):
         expected = 0.5 * np.sum((linear.residual + linear.jacobian @ (moved - theta)) ** 2)

@@ -1,4 +1,4 @@
-"""Covariance of Θ by the pose in which a template was found: it is laid over the first image as a rigid body."""
+"""Covariance of Θ by the registration of a template: it is laid over the first image as a rigid body."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from abs_service.tracker.models.base import DeformationModel
 
 
-def placement_covariance(model: DeformationModel, deviation: float) -> NDArray[np.float64]:
+def registration_covariance(model: DeformationModel, deviation: float) -> NDArray[np.float64]:
     """Covariance (dim, dim) of errors that displace and turn the mesh at rest as a whole.
 
     Args:

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from abs_service.tracker.posterior.correlation import BEYOND, DesignEffects
-from abs_service.tracker.posterior.covariance import leverages
+from abs_service.tracker.posterior.covariance.design_effect import BEYOND, DesignEffects
+from abs_service.tracker.posterior.covariance.sandwich import leverages
 from abs_service.tracker.terms.linearization import Linearization
 from tests.abs_service.tracker.scenes import flat, sheet
 

@@ -8,7 +8,7 @@ cancel as those of independent errors do. Kish's design effect (Survey Sampling,
 
 is 1 for independent errors, and the number of points in a cluster if they are equal. Correlation does not end at
 the border of a cluster: if it falls off exponentially with the distance, the effect of all neighbours is about
-1 + 4 (D − 1), which multiplies the squared residuals of the sandwich (`covariance`).
+1 + 4 (D − 1), which multiplies the squared residuals of the sandwich (`sandwich`).
 """
 
 from collections.abc import Sequence
@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.mesh import Mesh
-from abs_service.tracker.posterior.covariance import PerResidual, Sensed
+from abs_service.tracker.posterior.covariance.sandwich import PerResidual
+from abs_service.tracker.posterior.linearized_cost import Sensed
 from abs_service.tracker.terms.linearization import Part
 from calib.jit import kernel
 

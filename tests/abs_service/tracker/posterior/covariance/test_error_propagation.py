@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 
-from abs_service.tracker.models.base import SparseJacobian
-from abs_service.tracker.posterior.covariance import KEPT_PRIOR, unheld_deviation
-from abs_service.tracker.posterior.propagation import LASTING, ErrorPropagation
+from abs_service.tracker.posterior.covariance.error_propagation import LASTING, ErrorPropagation, FrameErrors, Motion
 
 DIM, FRAMES = 3, 40
 NONE = np.zeros((DIM, DIM))
+STILL = Motion(NONE, NONE, 0.0)
 PRECISION = np.array([[4.0, 0.5, 0.0], [0.5, 1.0, 0.0], [0.0, 0.0, 1.0]])
 
 
@@ -17,6 +16,11 @@ def setting() -> tuple[np.ndarray, np.ndarray]:
     rows = np.random.default_rng(0).standard_normal((12, DIM)) * (3.0, 1.0, 0.0)
     measured = rows.T @ rows
     return measured, np.asarray(np.linalg.inv(measured + PRECISION))
+
+
+def errors_of(inverse: np.ndarray, gradient: np.ndarray) -> FrameErrors:
+    """Errors of a frame of which nothing is shared."""
+    return FrameErrors(inverse, PRECISION, gradient, NONE)
 
 
 def test_it_is_the_covariance_of_the_errors_when_a_share_of_the_noise_is_that_of_the_first_frame():
@@ -32,7 +36,7 @@ def test_it_is_the_covariance_of_the_errors_when_a_share_of_the_noise_is_that_of
         errors.append(error)
     propagation, found = ErrorPropagation(NONE), np.eye(DIM)
     for _ in range(FRAMES):
-        found = propagation.update(step**2 * np.eye(DIM), NONE, 0.0, inverse, measured + PRECISION, NONE, PRECISION)
+        found = propagation.update(Motion(step**2 * np.eye(DIM), NONE, 0.0), errors_of(inverse, measured + PRECISION))
     scale = np.sqrt(np.outer(np.diag(found), np.diag(found)))
     np.testing.assert_allclose(np.cov(np.transpose(errors)) / scale, found / scale, atol=0.08)
 
@@ -40,8 +44,8 @@ def test_it_is_the_covariance_of_the_errors_when_a_share_of_the_noise_is_that_of
 def test_what_nothing_holds_grows_with_every_frame_and_what_is_measured_does_not():
     measured, inverse = setting()
     propagation, moved = ErrorPropagation(NONE), np.diag([0.1, 0.1, 0.2]) ** 2
-    scores = measured + PRECISION
-    found = [np.diag(propagation.update(NONE, moved, 0.0, inverse, scores, NONE, PRECISION)) for _ in range(FRAMES)]
+    motion, errors = Motion(NONE, moved, 0.0), errors_of(inverse, measured + PRECISION)
+    found = [np.diag(propagation.update(motion, errors)) for _ in range(FRAMES)]
     assert found[0][2] == pytest.approx(0, abs=1e-12)  # the first frame defines where the points are
     np.testing.assert_allclose(np.diff([variance[2] for variance in found]), 0.2**2, rtol=1e-6)
     assert found[-1][0] < 1.5 * found[5][0]
@@ -59,14 +63,14 @@ def test_a_motion_that_nothing_shows_goes_on_as_it_began():
     propagation, found = ErrorPropagation(NONE), NONE
     unmeasured = np.asarray(np.linalg.inv(PRECISION))  # with it, the gain is one
     for _ in range(frames + 1):
-        found = propagation.update(NONE, step**2 * np.eye(DIM), persistence, unmeasured, PRECISION, NONE, PRECISION)
+        found = propagation.update(Motion(NONE, step**2 * np.eye(DIM), persistence), errors_of(unmeasured, PRECISION))
     np.testing.assert_allclose(np.diag(found), np.var(ends, axis=0), rtol=0.08)
     assert found[0, 0] > 4 * frames * step**2
 
 
 def test_a_template_begins_with_the_error_of_its_place():
     _, inverse = setting()
-    found = ErrorPropagation(4 * np.eye(DIM)).update(NONE, NONE, 0.0, inverse, PRECISION, NONE, PRECISION)
+    found = ErrorPropagation(4 * np.eye(DIM)).update(STILL, errors_of(inverse, PRECISION))
     assert found[2, 2] == pytest.approx(4)  # nothing measures it
     assert found[0, 0] < 0.5
 
@@ -74,19 +78,7 @@ def test_a_template_begins_with_the_error_of_its_place():
 def test_after_a_relocation_it_begins_with_what_that_leaves_open():
     _, inverse = setting()
     propagation = ErrorPropagation(NONE)
-    propagation.update(NONE, NONE, 0.0, inverse, PRECISION, NONE, PRECISION)
+    propagation.update(STILL, errors_of(inverse, PRECISION))
     propagation.restart(25 * np.eye(DIM))
-    found = propagation.update(NONE, NONE, 0.0, inverse, PRECISION, NONE, PRECISION)
+    found = propagation.update(STILL, errors_of(inverse, PRECISION))
     assert found[2, 2] == pytest.approx(25)
-
-
-def test_a_direction_that_no_measurement_holds_is_found_in_a_single_frame():
-    """Points that only move along x and y with two parameters; the second is measured, the first is not."""
-    local = np.zeros((30, 3, 2))
-    local[:, 0, 0] = local[:, 1, 1] = 1.0
-    jacobian = SparseJacobian(local, np.zeros(30, np.int32), np.array([[0, 1]]), 2)
-    prior, measured = 1e4 * np.eye(2), np.diag([0.0, 1e6])
-    found = unheld_deviation(measured, prior, jacobian)
-    assert found == pytest.approx(np.sqrt(1 / (KEPT_PRIOR * 1e4) + 1 / (1e6 + KEPT_PRIOR * 1e4)), rel=1e-6)
-    held = unheld_deviation(1e6 * np.eye(2), prior, jacobian)
-    assert held == pytest.approx(np.sqrt(2e-6), rel=1e-3)

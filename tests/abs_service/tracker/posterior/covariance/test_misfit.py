@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from abs_service.tracker.posterior.misfit import Misfit
+from abs_service.tracker.posterior.covariance.misfit import Misfit
 from tests.abs_service.tracker.scenes import sheet
 
 MESH = sheet(21, 31)

@@ -1,0 +1,54 @@
+"""Covariance of the gradient of the cost, from the residuals: the middle of the sandwich estimator of Θ's covariance.
+
+At the optimum, JᵀJ + P is the curvature of the cost, with the Jacobian J of the sensors' normalised residuals r and the
+curvature P of the priors. Σ = (JᵀJ + P)⁻¹ is the covariance if the noise models are exact. They are not: a colour is
+read at the nearest pixel, which adds about (slope · pixel)² / 12 (uniform quantisation) to its variance on sharp print,
+and on smooth print a cautious model overestimates σ. The sandwich Σ B Σ with B = Jᵀ diag(r² / (1 − h)) J + P uses the
+squared residuals instead (White, Econometrica 50, 1982). The leverage h = diag(J Σ Jᵀ) is the share of its own noise
+that each residual loses to the fit (HC2 of MacKinnon and White, J. Econometrics 29, 1985): if the noise models are
+exact, r² / (1 − h) is 1 on average and the sandwich equals Σ.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.tracker.posterior.linearized_cost import Sensed
+
+#: Lower bound of 1 − h; below it, rounding errors dominate.
+LEAST_KEPT = 1e-6
+
+#: A value of each residual (m,), by source, in parts.
+PerResidual = Sequence[Sequence[NDArray[np.float64]]]
+
+
+def leverages(inverse: NDArray[np.float64], sensed: Sensed) -> PerResidual:
+    """Leverage h = diag(J Σ Jᵀ) of every residual, from Σ (dim, dim)."""
+    return [[part.leverage(inverse) for part in parts] for parts in sensed]
+
+
+def gradient_covariance(
+    priors: NDArray[np.float64], sensed: Sensed, leverage: PerResidual, effects: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Covariance (dim, dim) of the gradient: B = Jᵀ diag(D r² / (1 − h)) J + P.
+
+    Args:
+        priors: P (dim, dim).
+        sensed: r and J of the sensors.
+        leverage: h.
+        effects: design effect D (sources,) of the residuals of every source, see `design_effect`.
+    """
+    result = priors.copy()
+    for parts, shares, effect in zip(sensed, leverage, effects):
+        for part, share in zip(parts, shares):
+            part.add_square(part.residual**2 * (effect / np.maximum(1 - share, LEAST_KEPT)), result)
+    return result
+
+
+def shared_covariance(sensed: Sensed, dimension: int) -> NDArray[np.float64]:
+    """Covariance (dim, dim) of the gradient by errors that many residuals share, the same in all frames."""
+    result = np.zeros((dimension, dimension))
+    for part in (part for parts in sensed for part in parts if len(part.shared)):
+        result += part.shared.T @ part.shared
+    return result

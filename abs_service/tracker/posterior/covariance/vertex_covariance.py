@@ -1,0 +1,99 @@
+"""Covariance of every vertex: by the errors of Θ, by those of the initial mesh, and by the misfit of the model."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.tracker.models.base import DeformationModel, SparseJacobian, Surface
+from abs_service.tracker.posterior.covariance.mesh_noise import MeshNoise
+from abs_service.tracker.posterior.covariance.misfit import Misfit
+from abs_service.tracker.posterior.frame_posterior import FramePosterior
+from abs_service.tracker.posterior.optimum import Optimum
+from calib.jit import kernel
+
+
+class VertexCovariance:
+    """Covariance of the vertices of one mesh around their material points, over time.
+
+    Args:
+        model: the deformation model.
+    """
+
+    def __init__(self, model: DeformationModel):
+        self._mesh_noise = MeshNoise(model)
+        self._misfit = Misfit(model.mesh)
+        self._began = False
+
+    def restart(self) -> None:
+        """Restarts, after a relocation, with a frame in which nothing may have moved yet."""
+        self._began = False
+
+    def update(
+        self, optimum: Optimum, frame: FramePosterior, theta_covariance: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Covariance (n, 3, 3) [m²] of the vertices of a frame's estimate.
+
+        Args:
+            optimum: the estimate, and the cost around it.
+            frame: the frame's posterior.
+            theta_covariance: covariance (dim, dim) of the estimate.
+        """
+        near = optimum.linearized
+        if self._began and near.sensed:  # nothing has moved in the first frame, nothing is known in one without images
+            self._mesh_noise.update(frame, optimum.theta)
+        self._began = True
+        return (
+            propagated(near.sparse_jacobian, theta_covariance)
+            + along_normals(optimum.surface, self._mesh_noise.variance)
+            + isotropic(self._misfit.variance(*frame.misfit(optimum.surface)))
+        )
+
+
+def propagated(sparse_jacobian: SparseJacobian, covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Covariance D Σ Dᵀ (n, 3, 3) of every vertex, from its Jacobian D and the covariance Σ (dim, dim) of Θ."""
+    result = np.empty((len(sparse_jacobian.local), 3, 3))
+    of_points = sparse_jacobian.local, sparse_jacobian.group, sparse_jacobian.parameters
+    _propagate(*of_points, np.ascontiguousarray(covariance), result)
+    return result
+
+
+@kernel
+def _propagate(
+    local: NDArray[np.float64],
+    group: NDArray[np.int32],
+    parameters: NDArray[np.int64],
+    covariance: NDArray[np.float64],
+    result: NDArray[np.float64],
+) -> None:
+    """See `propagated`; points of a group that follow each other share one product of matrices."""
+    n, _, k = local.shape
+    part, first = np.empty((k, k)), 0
+    while first < n:
+        own, last = parameters[group[first]], first + 1
+        while last < n and group[last] == group[first]:
+            last += 1
+        for i in range(k):
+            line = covariance[own[i]]
+            for j in range(k):
+                part[i, j] = line[own[j]]
+        rows = local[first:last].reshape((3 * (last - first), k))
+        products = np.dot(rows, part)
+        for v in range(last - first):
+            square = result[first + v]
+            for i in range(3):
+                for j in range(i, 3):
+                    total = 0.0
+                    for d in range(k):
+                        total += products[3 * v + i, d] * rows[3 * v + j, d]
+                    square[i, j] = square[j, i] = total
+        first = last
+
+
+def along_normals(surface: Surface, variance: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Covariance (n, 3, 3) [m²] of errors along the normals of a population of one with a variance (n,) [m²]."""
+    normals = surface.normals[0].T.astype(np.float64)
+    return variance[:, None, None] * normals[:, :, None] * normals[:, None, :]
+
+
+def isotropic(variance: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Covariance (n, 3, 3) [m²] of errors with a variance (n,) [m²] in every direction."""
+    return variance[:, None, None] * np.eye(3)

@@ -1,0 +1,96 @@
+"""The cost of theta for one frame: likelihood of its measurements times the priors (eq. 16)."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.tracker.models.base import DeformationModel, SparseJacobian, Surface
+from abs_service.tracker.objectives.base import ObservedObjective
+from abs_service.tracker.posterior.curvature import Quadratic, gauss_newton, posterior_covariance
+from abs_service.tracker.posterior.linearized_cost import LinearizedCost
+from abs_service.tracker.posterior.optimum import Optimum
+from abs_service.tracker.posterior.priors.motion_prediction import MotionPrediction
+from abs_service.tracker.posterior.priors.shape_prior import ShapePrior
+from abs_service.tracker.posterior.priors.stretch_prior import StretchPrior
+from abs_service.tracker.terms.base import SensorFit
+from abs_service.tracker.terms.linearization import Part
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FramePosterior:
+    """The cost of theta for one observation; a function of theta alone, in whatever order it is asked.
+
+    Attributes:
+        model: the deformation model.
+        objective: the measurements.
+        stretch, shape: priors that hold for all frames.
+        motion: the motion prior of this frame.
+    """
+
+    model: DeformationModel
+    objective: ObservedObjective
+    stretch: StretchPrior
+    shape: ShapePrior
+    motion: MotionPrediction
+
+    @property
+    def dimension(self) -> int:
+        """Number of parameters."""
+        return len(self.motion.theta)
+
+    def with_motion(self, motion: MotionPrediction) -> "FramePosterior":
+        """The same measurements under another motion prior."""
+        return replace(self, motion=motion)
+
+    def cost(self, thetas: NDArray[np.float64], surface: Surface) -> NDArray[np.float64]:
+        """Negative log-posterior (population,) [nats].
+
+        Args:
+            thetas: candidates (population, dim).
+            surface: the mesh deformed by them.
+        """
+        priors = self.stretch.cost(surface) + self.shape.cost(thetas) + self.motion.cost(thetas)
+        return self.objective.cost(surface) + priors
+
+    def linearize(self, theta: NDArray[np.float64]) -> LinearizedCost:
+        """The cost near theta (dim,)."""
+        surface, sparse_jacobian = self.model.deform(theta[None]), self.model.sparse_jacobian(theta)
+        terms = self.objective.linearize(surface, sparse_jacobian)
+        sensed = [source.parts() for term in terms for source in term.sources()]
+        priors = gauss_newton(self._priors(surface, sparse_jacobian, theta), self.dimension)
+        quadratic = priors + gauss_newton([part for source in sensed for part in source], self.dimension)
+        return LinearizedCost(theta, quadratic, priors.curvature, sensed, sparse_jacobian)
+
+    def optimum(self, theta: NDArray[np.float64], known: LinearizedCost | None) -> Optimum:
+        """The optimum at theta (dim,), with what is known of the cost nearby if that holds there."""
+        near = known if known is not None and known.holds_at(theta) else self.linearize(theta)
+        return Optimum(theta, self.model.deform(theta[None]), near, posterior_covariance(near.quadratic))
+
+    def prior(self, theta: NDArray[np.float64]) -> Quadratic:
+        """Gauss–Newton approximation of the priors alone near theta (dim,)."""
+        surface, sparse_jacobian = self.model.deform(theta[None]), self.model.sparse_jacobian(theta)
+        return gauss_newton(self._priors(surface, sparse_jacobian, theta), self.dimension)
+
+    def cross_curvature(self, theta: NDArray[np.float64], offsets: NDArray[np.float64]) -> NDArray[np.float64]:
+        """JᵀJE (dim, n) at theta (dim,): derivatives with respect to theta, and to an offset (n, 3) [m] per vertex."""
+        surface, each = self.model.deform(theta[None]), np.arange(len(offsets))
+        single = SparseJacobian(
+            np.ascontiguousarray(offsets[:, :, None]), each.astype(np.int32), each[:, None], len(each)
+        )
+        by_theta = self.objective.linearize(surface, self.model.sparse_jacobian(theta))
+        by_offset = self.objective.linearize(surface, single)
+        pairs = zip(by_offset, by_theta)
+        return np.sum([one.transposed_times(other.jacobian, len(each)) for one, other in pairs], axis=0).T
+
+    def fits(self, theta: NDArray[np.float64]) -> tuple[SensorFit, ...]:
+        """Agreement of every contributing sensor with theta (dim,)."""
+        return tuple(self.objective.fits(self.model.deform(theta[None])))
+
+    def misfit(self, surface: Surface) -> NDArray[np.float64]:
+        """Signed distance of each vertex from its measurements, and its deviation by noise (2, n) [m]."""
+        return self.objective.misfit(surface)
+
+    def _priors(self, surface: Surface, sparse_jacobian: SparseJacobian, theta: NDArray[np.float64]) -> list[Part]:
+        rows = self.stretch.linearize(surface, sparse_jacobian)
+        return [*rows, self.shape.linearize(theta), self.motion.linearize(theta)]

@@ -1,0 +1,86 @@
+"""Motion prior of one frame: Θ is normal around its prediction."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.tracker.posterior.priors.change_metric import ChangeMetric
+from abs_service.tracker.posterior.priors.settings import Settings
+from abs_service.tracker.terms.linearization import Linearization
+
+#: Radius of the search around the prediction, in standard deviations of the widest motion prior.
+FARTHEST = 4.0
+
+#: Width of the prior in root mean squares of the innovations.
+MARGIN = 2.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MotionPrediction:
+    """Motion prior of one frame.
+
+    Attributes:
+        theta: predicted parameters (dim,).
+        speed: standard deviation v of the rate of change around the predicted one, per direction of Θ [m/s].
+        elapsed_s: time since the frame before [s].
+        is_first: True for the first frame, whose prediction is the detected shape.
+        metric: length of a change of theta.
+        settings: bounds of the width.
+    """
+
+    theta: NDArray[np.float64]
+    speed: float
+    elapsed_s: float
+    is_first: bool
+    metric: ChangeMetric
+    settings: Settings
+
+    @property
+    def reach_m(self) -> float:
+        """Radius around the predicted surface within which the surface is searched [m]."""
+        return np.inf if self.is_first else FARTHEST * self.settings.speed * self.elapsed_s
+
+    @property
+    def precision(self) -> NDArray[np.float64]:
+        """Inverse covariance W (dim, dim) of the parameters around the predicted ones."""
+        return self.metric.matrix / self._deviation_m**2
+
+    @property
+    def least_precision(self) -> NDArray[np.float64]:
+        """Inverse covariance (dim, dim) of the widest prior, that of an object whose motion is unknown."""
+        return self.metric.matrix / (self.settings.speed * self.elapsed_s) ** 2
+
+    @property
+    def persistence(self) -> float:
+        """Share of the last velocity that is predicted for this frame, 0…1."""
+        return self.settings.persistence(self.elapsed_s)
+
+    @property
+    def _deviation_m(self) -> float:
+        return self.speed * self.elapsed_s
+
+    def innovation(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Difference (dim,) of theta (dim,) and the prediction, as a rate of change of the surface [m/s]."""
+        return self.metric.root @ (theta - self.theta) / self.elapsed_s
+
+    def is_too_narrow(self, theta: NDArray[np.float64]) -> bool:
+        """True if theta (dim,) is beyond the prior and a wider one is allowed, as after a sudden motion."""
+        return not self.is_first and self.speed < self.settings.speed and self._mean_innovation(theta) > self.speed
+
+    def widened(self, theta: NDArray[np.float64]) -> "MotionPrediction":
+        """The prior that allows for theta (dim,), within the bounds of the settings."""
+        return replace(self, speed=self.settings.limited(MARGIN * self._mean_innovation(theta)))
+
+    def cost(self, thetas: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Negative log-density (population,) of parameters (population, dim), up to a constant."""
+        return self.metric.squares(thetas, self.theta) / (2 * self._deviation_m**2)
+
+    def linearize(self, theta: NDArray[np.float64]) -> Linearization:
+        """The normalised residuals of parameters (dim,), and their derivatives."""
+        rows = self.metric.root / self._deviation_m
+        return Linearization(rows @ (theta - self.theta), rows)
+
+    def _mean_innovation(self, theta: NDArray[np.float64]) -> float:
+        """Root mean square innovation of theta (dim,) [m/s]."""
+        return float(np.sqrt(np.mean(self.innovation(theta) ** 2)))
