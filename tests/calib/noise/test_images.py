@@ -100,7 +100,7 @@ def test_what_a_camera_errs_by_is_told_from_pictures_of_a_scene_that_rests(name,
 def test_two_pictures_are_enough():
     images = 100 + 3.0 * np.random.default_rng(1).standard_normal((2, 40_000))
     assert grey.fit(*image_noise.from_static_scene(images)).sigma == pytest.approx(3, rel=0.02)
-    with pytest.raises(NoiseError, match="at least 2 pictures of a scene in which nothing moves, not 1"):
+    with pytest.raises(NoiseError, match="at least 2 pictures of a static scene, not 1"):
         image_noise.from_static_scene(images[:1])
 
 
