@@ -45,6 +45,7 @@ from tests.abs_service.recording.recorder_rig import depth, read, recordings
 from tests.abs_service.wire.hostile import MODEL, TOPICS, samples
 from tests.abs_service.wire.test_edge import sample
 from tests.drivers.recording_sink import RecordingSink
+from tests.waiting import eventually
 
 HOSTILE = st.lists(samples(), min_size=1, max_size=5)
 S = 1_000_000_000
@@ -150,6 +151,7 @@ class Recording:
     """A recorder of a rig, and its health."""
 
     def __init__(self, directory):
+        self.directory = directory
         self.bus, self.health_bus = LoopbackBus(), LoopbackBus()
         clock = WallClock()
         self.health = Health(self.health_bus, "record", HeaderFactory("demo", clock))
@@ -161,6 +163,7 @@ class Recording:
         self.recorder.start()
         for one in hostile:
             self.bus.deliver(one)
+        assert eventually(lambda: any(self.directory.iterdir()))  # stopped before it began, it writes no file
         self.recorder.stop(10)
         self.recorder.report()
         return health_now(self.health, self.health_bus)
