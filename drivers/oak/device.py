@@ -8,8 +8,8 @@ from calib.camera import Camera
 from drivers.contract.capabilities import Capabilities, StreamInfo
 from drivers.contract.device import DeviceError, DeviceState, Sink
 from drivers.contract.frame_gate import FrameGate
-from drivers.oak.cameras.eeprom import EepromError
-from drivers.oak.cameras.heads import cameras
+from drivers.oak.eeprom import EepromError
+from drivers.oak.images.heads import cameras
 from drivers.oak.images.messages import QueueClosed
 from drivers.oak.images.picture import Picture, PictureError, frame, pixels
 from drivers.oak.roles import Role

@@ -5,7 +5,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from drivers.oak.cameras.eeprom import Extrinsics, extrinsics_of
+from drivers.oak.eeprom import Extrinsics, extrinsics_of
 from drivers.oak.images.picture import Picture, PictureError, number
 
 _NS = timedelta(microseconds=1)

@@ -14,7 +14,7 @@ from calib.camera import Camera
 from calib.lenses.fisheye import KannalaBrandt
 from calib.pose import Pose
 from drivers.contract.frame import Frame, Geometry, Kind
-from drivers.oak.cameras.eeprom import UNKNOWN, Extrinsics
+from drivers.oak.eeprom import UNKNOWN, Extrinsics
 from drivers.oak.images.lens import fitted
 from drivers.oak.roles import Role
 

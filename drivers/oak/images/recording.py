@@ -21,9 +21,9 @@ from calib.camera import Camera
 from calib.files import limited
 from drivers.contract.frame import Frame
 from drivers.encoding.foreign_recording import ForeignRecordingError
-from drivers.oak.cameras import eeprom
-from drivers.oak.cameras.eeprom import EepromError, Extrinsics, Poses, extrinsics_of
-from drivers.oak.cameras.heads import cameras
+from drivers.oak import eeprom
+from drivers.oak.eeprom import EepromError, Extrinsics, Poses, extrinsics_of
+from drivers.oak.images.heads import cameras
 from drivers.oak.images.picture import Picture, PictureError, frame, number
 from drivers.oak.roles import ROLES, Role
 

@@ -8,7 +8,7 @@ from drivers.contract.capabilities import ClockInfo, SyncRole
 from drivers.contract.clock import Stamp
 from drivers.contract.controls import Controls
 from drivers.contract.device import DeviceInfo
-from drivers.oak.cameras.eeprom import Poses
+from drivers.oak.eeprom import Poses
 from drivers.oak.images.messages import Queue
 from drivers.oak.images.picture import Picture
 from drivers.oak.roles import Role

@@ -11,14 +11,13 @@ from drivers.contract.capabilities import SyncRole
 from drivers.contract.clock import DeviceClock
 from drivers.contract.device import DeviceError, DeviceInfo, SdkMissingError
 from drivers.contract.discovery import UDEV_REMEDY, Availability, Found, choose
-from drivers.oak import library
+from drivers.oak import eeprom, library
 from drivers.oak.address import Address
-from drivers.oak.cameras import eeprom
-from drivers.oak.cameras.eeprom import EepromError
-from drivers.oak.controls import make
+from drivers.oak.eeprom import EepromError
 from drivers.oak.images.messages import OutputQueue
 from drivers.oak.range_profile import RangeProfile
 from drivers.oak.source.connection import CLOCK, Connection, synchronised
+from drivers.oak.source.controls import make
 from drivers.oak.source.pipelines import build
 
 #: Depth of the image queues; the newest images are kept.

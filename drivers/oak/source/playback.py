@@ -9,7 +9,7 @@ from drivers.contract.device import AddressError, DeviceInfo
 from drivers.encoding.foreign_recording import ForeignRecordingError
 from drivers.oak import library
 from drivers.oak.address import Address
-from drivers.oak.cameras.eeprom import EepromError
+from drivers.oak.eeprom import EepromError
 from drivers.oak.images import recording
 from drivers.oak.images.messages import OutputQueue
 from drivers.oak.roles import Role

@@ -14,9 +14,8 @@ import pytest
 
 from drivers.contract.device import AddressError, DeviceError, DeviceState, SdkMissingError
 from drivers.contract.frame import Kind
-from drivers.oak import discover, library, open_device
+from drivers.oak import discover, eeprom, library, open_device
 from drivers.oak.address import parse
-from drivers.oak.cameras import eeprom
 from drivers.oak.device import OakDevice
 from drivers.oak.images.messages import Queue, from_img_frame
 from drivers.oak.images.picture import Picture

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from calib import pose
-from drivers.oak.cameras.eeprom import EepromError, Extrinsics, Poses
-from drivers.oak.cameras.heads import cameras
+from drivers.oak.eeprom import EepromError, Extrinsics, Poses
+from drivers.oak.images.heads import cameras
 from drivers.oak.roles import ROLES
 from tests.drivers.oak.pictures import DEPTH
 

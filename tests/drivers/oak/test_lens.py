@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from calib import pose
-from drivers.oak.cameras.eeprom import Poses
-from drivers.oak.cameras.heads import cameras
+from drivers.oak.eeprom import Poses
+from drivers.oak.images.heads import cameras
 from drivers.oak.images.picture import PictureError, camera
 from drivers.oak.roles import ROLES
 from tests.drivers.oak.pictures import DEPTH

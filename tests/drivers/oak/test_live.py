@@ -10,10 +10,10 @@ from drivers.contract.discovery import Availability
 from drivers.contract.frame import Kind
 from drivers.oak import library
 from drivers.oak.address import parse
-from drivers.oak.controls import make
 from drivers.oak.range_profile import RangeProfile
 from drivers.oak.roles import ROLES
 from drivers.oak.source import live, pipelines
+from drivers.oak.source.controls import make
 
 try:
     dai = library.load()

@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 from calib import pose
 from drivers.contract.frame import Frame, Geometry, Kind
 from drivers.encoding.foreign_recording import ForeignRecordingError
-from drivers.oak.cameras import eeprom
-from drivers.oak.cameras.eeprom import EepromError
+from drivers.oak import eeprom
+from drivers.oak.eeprom import EepromError
 from drivers.oak.images.picture import PictureError, camera, frame, pixels
 from drivers.oak.images.recording import OakRecording
 from drivers.oak.roles import ROLES

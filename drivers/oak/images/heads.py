@@ -6,7 +6,7 @@ from calib import pose
 from calib.camera import Camera
 from calib.pose import Pose
 from drivers.contract.frame import Kind
-from drivers.oak.cameras.eeprom import NO_SOCKET, Extrinsics, Poses
+from drivers.oak.eeprom import NO_SOCKET, Extrinsics, Poses
 from drivers.oak.images.lens import OWN
 from drivers.oak.images.picture import Picture, PictureError, camera
 from drivers.oak.roles import REFERENCES, Role

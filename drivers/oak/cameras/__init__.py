@@ -1,1 +1,0 @@
-"""Cameras of an OAK: intrinsics and extrinsics from its factory calibration."""
