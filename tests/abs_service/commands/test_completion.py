@@ -51,7 +51,7 @@ def test_options_after_arguments(completed):
 
 def test_values(completed):
     assert completed("run", "--log-level", "") == ["debug", "info", "warning", "error"]
-    assert completed("import", "x", "--layout", "r") == ["realsense"]
+    assert completed("import", "x", "--layout", "r") == ["realsense", "ros2"]
     assert completed("completion", "b") == ["bash"]
 
 

@@ -149,7 +149,7 @@ def other_size(take: Take) -> None:
         (no_depth, "/camera/depth/image_raw: the encoding 'yuv422' is none of"),
         (not_connected, "/tf_static does not say where 'color_optical' is relative to 'depth_optical'"),
         (unknown_lens, "the lens 'omni' with 5 coefficients"),
-        (no_focal_length, "the camera is not calibrated: fx and fy must be positive"),
+        (no_focal_length, "the camera is not calibrated: fx = 0.0: must be positive and finite"),
         (other_size, "depth of 8 × 4 pixels is not what its camera takes"),
     ],
 )
