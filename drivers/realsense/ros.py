@@ -2,12 +2,11 @@
 
 import re
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from drivers.encoding.foreign_recording import ForeignRecordingError
+from drivers.encoding.rosbag_errors import rosbag_errors
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +34,7 @@ class Bag:
         Raises:
             ForeignRecordingError: the file cannot be read, or `rosbags` is not installed.
         """
-        with _translated_errors(self._path):
+        with rosbag_errors(self._path, "ROS 1"):
             from rosbags.rosbag1 import Reader  # noqa: PLC0415  an extra
 
             with Reader(self._path) as reader:
@@ -47,7 +46,7 @@ class Bag:
         Raises:
             ForeignRecordingError: as `counts`, and for a corrupt message.
         """
-        with _translated_errors(self._path):
+        with rosbag_errors(self._path, "ROS 1"):
             from rosbags.rosbag1 import Reader  # noqa: PLC0415  an extra
             from rosbags.typesys import Stores, get_typestore  # noqa: PLC0415
 
@@ -58,18 +57,3 @@ class Bag:
                 for connection, time_ns, data in reader.messages(wanted) if wanted else ():
                     content = types.deserialize_ros1(data, connection.msgtype)
                     yield Message(connection.topic, time_ns, content)
-
-
-@contextmanager
-def _translated_errors(path: Path) -> Iterator[None]:
-    """Translates exceptions into errors that name the file and the remedy."""
-    try:
-        yield
-    except ImportError as error:
-        raise ForeignRecordingError(
-            f"{path}: bags are read by rosbags, which the extra `import` of abs-service installs"
-        ) from error
-    except OSError as error:
-        raise ForeignRecordingError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except Exception as error:  # the parser raises arbitrary exceptions for corrupt bytes
-        raise ForeignRecordingError(f"{path}: this is no ROS 1 bag, or a damaged one: {error!r}") from error

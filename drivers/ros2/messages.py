@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from drivers.encoding.foreign_recording import ForeignRecordingError
+from drivers.encoding.rosbag_errors import rosbag_errors
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,20 +60,10 @@ class Bag:
     @contextmanager
     def _reader(self) -> Iterator[Any]:
         """Opens the bag; translates exceptions into errors that name the file and the remedy."""
-        try:
+        with rosbag_errors(self._path, "ROS 2"):
             from rosbags.highlevel import AnyReader  # noqa: PLC0415  an extra
             from rosbags.typesys import Stores, get_typestore  # noqa: PLC0415
 
             # SQLite files of older releases do not describe their messages; those used here are the same in all.
             with AnyReader([self._path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
                 yield reader
-        except ForeignRecordingError:
-            raise
-        except ImportError as error:
-            raise ForeignRecordingError(
-                f"{self._path}: bags are read by rosbags, which the extra `import` of abs-service installs"
-            ) from error
-        except OSError as error:
-            raise ForeignRecordingError(f"{self._path}: cannot be read: {error.strerror or error}") from error
-        except Exception as error:  # the parsers raise arbitrary exceptions for corrupt bytes
-            raise ForeignRecordingError(f"{self._path}: this is no ROS 2 bag, or a damaged one: {error!r}") from error
