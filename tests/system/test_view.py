@@ -26,7 +26,9 @@ OPTIONS = [
     "--use-angle=swiftshader",
 ]
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(400)]
+PATIENCE_S = 120  # a browser that renders in software, beside a rig, on a machine whose other core runs other tests
+
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(800)]
 
 
 @pytest.fixture
@@ -51,22 +53,23 @@ def port():
 
 def _opened(browser, port):
     """The page, once it says something, and how long that took [s]."""
-    page = browser.new_page(viewport={"width": 1280, "height": 800})
+    page = browser.new_page(viewport={"width": 640, "height": 480})  # small: every pixel is rendered in software
+    page.set_default_timeout(1e3 * PATIENCE_S)
     begin_s = time.monotonic()
     while True:
         try:
             page.goto(f"http://127.0.0.1:{port}")
             break
         except sync_api.Error:
-            assert time.monotonic() < begin_s + 20
+            assert time.monotonic() < begin_s + PATIENCE_S
             time.sleep(0.2)  # until the server listens
-    page.wait_for_selector(".abs-status", timeout=30_000)
+    page.wait_for_selector(".abs-status")
     return page, time.monotonic() - begin_s
 
 
-def _says(page, text, timeout_s=30.0):
+def _says(page, text):
     """Waits until the status or an answer holds a text."""
-    page.get_by_text(text).first.wait_for(timeout=1e3 * timeout_s)
+    page.get_by_text(text).first.wait_for()
 
 
 def _picture(page) -> bytes:
@@ -80,7 +83,7 @@ def _chosen_by_a_click(page, listener) -> int:
     _says(page, "Click the object")
     box = page.locator("canvas").first.bounding_box()
     page.mouse.click(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
-    wait_until(lambda: listener.states()[-1][1].mesh_version > version, 20, "a mesh of what was clicked")
+    wait_until(lambda: listener.states()[-1][1].mesh_version > version, PATIENCE_S, "a mesh of what was clicked")
     _says(page, "To keep this choice")
     return listener.states()[-1][1].mesh_version
 
@@ -94,22 +97,22 @@ def test_the_page_shows_a_mesh_that_moves_acts_and_connects_again(run, rig_file,
     page.get_by_role("checkbox").nth(1).click(force=True)  # without the measured points, only the mesh moves
     time.sleep(1.0)
     before = _picture(page)
-    wait_until(lambda: _picture(page) != before, 20, "motion of the mesh")
+    wait_until(lambda: _picture(page) != before, PATIENCE_S, "motion of the mesh")
 
     version = listener.states()[-1][1].mesh_version
     page.get_by_role("button", name="Reinitialise").click(force=True)
-    wait_until(lambda: listener.states()[-1][1].mesh_version > version, 20, "a new mesh")
+    wait_until(lambda: listener.states()[-1][1].mesh_version > version, PATIENCE_S, "a new mesh")
     _says(page, "New mesh, version")
     version = _chosen_by_a_click(page, listener)
     column, row = re.findall(r"\d+", page.inner_text("body").partition("pixel = ")[2])[:2]
     done = abs_service("reinitialize", rig_file, "sheet", "--seed", column, row)
     assert f'type = "seed"\npixel = [{column}, {row}]\n' in done.stdout
-    wait_until(lambda: listener.states()[-1][1].mesh_version > version, 20, "a new mesh from the command line")
+    wait_until(lambda: listener.states()[-1][1].mesh_version > version, PATIENCE_S, "a new mesh from the command line")
 
     page.get_by_role("button", name="Start recording").click(force=True)
     _says(page, "it records as long as it runs")
     page.get_by_role("tab", name="Images").click(force=True)
-    page.get_by_text("Residual", exact=True).wait_for(timeout=30_000)
+    page.get_by_text("Residual", exact=True).wait_for()
     page.locator("input[type=checkbox]:visible").first.click(force=True)
     _says(page, "residual up to")
     page.get_by_role("tab", name="Plots").click(force=True)
@@ -117,21 +120,21 @@ def test_the_page_shows_a_mesh_that_moves_acts_and_connects_again(run, rig_file,
 
     assert not page.get_by_text("lost its connection").first.is_visible()
     server.send_signal(signal.SIGTERM)
-    assert server.wait(20) == 0
+    assert server.wait(PATIENCE_S) == 0
     _says(page, "This page has lost its connection")
     said = len(listener.health("view"))
     launch("view", rig_file, "--port", port)
-    wait_until(lambda: len(listener.health("view")) > said, 30, "health of the second page")
-    page.get_by_text("lost its connection").first.wait_for(state="hidden", timeout=60_000)
-    _says(page, "Tracking", 60)
+    wait_until(lambda: len(listener.health("view")) > said, PATIENCE_S, "health of the second page")
+    page.get_by_text("lost its connection").first.wait_for(state="hidden")
+    _says(page, "Tracking")
 
     rig.send_signal(signal.SIGTERM)
-    rig.wait(20)
+    rig.wait(PATIENCE_S)
     _says(page, "Nothing heard from the rig")
     launch("run", rig_file, "--no-record", "--json")
     with RigListener(endpoint) as again:
         wait_until(again.tracks_since(0), START_S, "TRACKING")
-    _says(page, "Tracking", 60)
+    _says(page, "Tracking")
 
 
 def test_a_page_that_only_shows_has_no_buttons(run, rig_file, launch, browser, port):
