@@ -1,6 +1,6 @@
 """Interface of an experiment: its context, its goals and its findings.
 
-An experiment is a module, or a package, in one of the groups of `evaluation.__main__`, with
+An experiment is a module, or a package, in one of the groups of `evaluation.running`, with
 
     TITLE: str                                                  its question on one line: "E1: ten geometries …"
     Settings                                                    frozen dataclass; the defaults are the full experiment

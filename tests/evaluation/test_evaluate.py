@@ -12,7 +12,7 @@ import pytest
 
 from abs_service.report.content import Column, Level, Section, Table
 from abs_service.supervision.exit_codes import Exit
-from evaluation import __main__
+from evaluation import __main__, running
 from evaluation.experiment import Context, Findings, UnavailableError, at_least, at_most
 
 
@@ -29,9 +29,11 @@ def experiment(monkeypatch: pytest.MonkeyPatch) -> Callable[..., types.SimpleNam
     made: dict[str, object] = {}
 
     def add(name: str, run: Callable[[Settings, Context], Findings]) -> None:
-        made[name] = types.SimpleNamespace(TITLE=f"X: {name}", Settings=Settings, QUICK=Settings(3), run=run)
+        made[name] = types.SimpleNamespace(
+            __name__=f"evaluation.method.{name}", TITLE=f"X: {name}", Settings=Settings, QUICK=Settings(3), run=run
+        )
 
-    monkeypatch.setattr(__main__, "available", lambda: made)
+    monkeypatch.setattr(running, "available", lambda: made)
     return add  # type: ignore[return-value]
 
 
@@ -173,7 +175,7 @@ def test_folders_that_cannot_be_are_named(
 
 
 def test_every_experiment_of_the_program_is_complete() -> None:
-    for name, one in __main__.available().items():
+    for name, one in running.available().items():
         assert isinstance(one.QUICK, one.Settings), name
         assert one.TITLE, name
         assert callable(one.run), name
@@ -194,6 +196,17 @@ def test_what_could_not_be_measured_meets_no_goal() -> None:
 
 def test_the_header_of_every_experiment_states_goals_and_seeds():
     """Written before the run; see the rules in evaluation/README.md."""
-    headers = {name: one.__doc__.lower() for name, one in __main__.available().items()}
+    headers = {name: one.__doc__.lower() for name, one in running.available().items()}
     assert len(headers) > 10
     assert [name for name, text in headers.items() if "goal" not in text or "seeds" not in text] == []
+
+
+def test_a_group_is_all_of_its_experiments_and_two_run_beside_each_other(tmp_path: Path, capsys) -> None:
+    assert __main__.main(["inputs", "--quick", "--jobs", "0"]) == Exit.USER
+    assert "--jobs 0: must be 1 or more" in capsys.readouterr().err
+    code = __main__.main(["bayer", "inputs", "--quick", "--seed", "3", "--jobs", "2", "--out", str(tmp_path)])
+    assert code == Exit.OK
+    beside = json.loads((tmp_path / "bayer/report.json").read_text())
+    assert {path.name for path in tmp_path.iterdir() if path.is_dir()} >= {"bayer", "sensors", "warping"}
+    __main__.main(["bayer", "--quick", "--seed", "3", "--out", str(tmp_path / "alone")])
+    assert json.loads((tmp_path / "alone/bayer/report.json").read_text())["verdicts"] == beside["verdicts"]
