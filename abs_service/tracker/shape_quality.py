@@ -6,9 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.mesh import Mesh, area_vectors, edge_lengths
+from calib.jit import kernel
 
 #: Neighbouring faces are folded if their normals differ by more than 120°, and by less than 60° at rest.
 FOLDED_COSINE, UNFOLDED_COSINE = -0.5, 0.5
+
+#: Share of the edges that are stretched less than a mesh is said to be.
+STRETCHED = 0.95
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,12 +40,13 @@ class ShapeComparison:
     """
 
     def __init__(self, mesh: Mesh):
-        self._faces, self._edges = mesh.faces, mesh.edges
+        self._edges = mesh.edges
         self._lengths = edge_lengths(mesh.vertices, self._edges)
         pairs = _neighbors(mesh.faces)
         normals = _normals(mesh.vertices, mesh.faces)
         even = np.einsum("pi,pi->p", normals[pairs[:, 0]], normals[pairs[:, 1]]) > UNFOLDED_COSINE
         self._pairs = pairs[even]
+        self._corners = mesh.faces[self._pairs].reshape(-1, 6)
 
     def compare(
         self, vertices: NDArray[np.floating], vertex_covariance: NDArray[np.float64], single_frame_deviation_m: float
@@ -53,16 +58,61 @@ class ShapeComparison:
             vertex_covariance: of every vertex.
             single_frame_deviation_m: see `ShapeQuality`.
         """
-        stretch = np.abs(edge_lengths(vertices, self._edges) / self._lengths - 1)
-        normals = _normals(vertices, self._faces)
-        cosine = np.einsum("pi,pi->p", normals[self._pairs[:, 0]], normals[self._pairs[:, 1]])
-        variance = np.einsum("nii->n", vertex_covariance)
+        stretch, variance = np.empty(len(self._edges)), np.einsum("nii->n", vertex_covariance)
+        folded = compare_shapes(vertices, self._edges, self._lengths, self._corners, stretch)
         return ShapeQuality(
-            stretch=float(np.percentile(stretch, 95)),
-            folded_share=float(np.mean(cosine < FOLDED_COSINE)) if len(cosine) else 0.0,
-            deviation_m=float(np.sqrt(np.median(variance))),
+            stretch=percentile(stretch, STRETCHED),
+            folded_share=folded / len(self._pairs) if len(self._pairs) else 0.0,
+            deviation_m=float(np.sqrt(percentile(variance, 0.5))),
             single_frame_deviation_m=single_frame_deviation_m,
         )
+
+
+def percentile(values: NDArray[np.floating], share: float) -> float:
+    """The value below which a share of values (n,) lies, interpolated linearly as `np.quantile` does; NaN if one is."""
+    place = share * (len(values) - 1)
+    below, last = int(place), len(values) - 1
+    above = min(below + 1, last)
+    # A tenth of what `np.quantile` takes for so few values; NaN comes last.
+    lower, upper, largest = np.partition(values, (below, above, last))[[below, above, last]].tolist()
+    return lower + (upper - lower) * (place - below) if not np.isnan(largest) else largest
+
+
+@kernel
+def compare_shapes(
+    vertices: NDArray[np.floating],
+    edges: NDArray[np.int32],
+    lengths: NDArray[np.floating],
+    corners: NDArray[np.int32],
+    stretch: NDArray[np.float64],
+) -> int:
+    """Number of pairs of faces that are folded onto each other.
+
+    Args:
+        vertices: deformed ones (n, 3) [m].
+        edges, lengths: of the undeformed mesh (k, 2) and (k,) [m].
+        corners: of both faces of every pair (p, 6).
+        stretch: result, relative change of every edge's length (k,).
+    """
+    for e in range(edges.shape[0]):
+        square = 0.0
+        for i in range(3):
+            along = np.float64(vertices[edges[e, 0], i]) - np.float64(vertices[edges[e, 1], i])
+            square += along * along
+        stretch[e] = abs(np.sqrt(square) / lengths[e] - 1)
+    folded, normals = 0, np.empty((2, 3))
+    for p in range(corners.shape[0]):
+        for face in range(2):
+            a, b, c = corners[p, 3 * face], corners[p, 3 * face + 1], corners[p, 3 * face + 2]
+            x, y, z = np.float64(vertices[a, 0]), np.float64(vertices[a, 1]), np.float64(vertices[a, 2])
+            ux, uy, uz = vertices[b, 0] - x, vertices[b, 1] - y, vertices[b, 2] - z
+            wx, wy, wz = vertices[c, 0] - x, vertices[c, 1] - y, vertices[c, 2] - z
+            nx, ny, nz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
+            scale = 1 / max(np.sqrt(nx * nx + ny * ny + nz * nz), 1e-12)
+            normals[face, 0], normals[face, 1], normals[face, 2] = nx * scale, ny * scale, nz * scale
+        cosine = normals[0, 0] * normals[1, 0] + normals[0, 1] * normals[1, 1] + normals[0, 2] * normals[1, 2]
+        folded += 1 if cosine < FOLDED_COSINE else 0
+    return folded
 
 
 def _normals(vertices: NDArray[np.floating], faces: NDArray[np.int32]) -> NDArray[np.floating]:

@@ -2,8 +2,16 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from abs_service.tracker.posterior.covariance.error_propagation import LASTING, ErrorPropagation, FrameErrors, Motion
+from abs_service.tracker.posterior.covariance.error_propagation import (
+    LASTING,
+    ErrorPropagation,
+    FrameErrors,
+    Motion,
+    product,
+)
 
 DIM, FRAMES = 3, 40
 NONE = np.zeros((DIM, DIM))
@@ -82,3 +90,31 @@ def test_after_a_relocation_it_begins_with_what_that_leaves_open():
     propagation.restart(25 * np.eye(DIM))
     found = propagation.update(STILL, errors_of(inverse, PRECISION))
     assert found[2, 2] == pytest.approx(25)
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 9), st.integers(1, 9))
+def test_the_product_that_passes_over_zeros_is_that_of_numpy(seed, dim, columns):
+    generator = np.random.default_rng(seed)
+    sparse = generator.normal(size=(dim, dim)) * (generator.random((dim, dim)) < 0.3)
+    right = generator.normal(size=(columns, dim)).T  # in the other order of memory
+    np.testing.assert_allclose(product(sparse, right), sparse @ right, rtol=1e-12, atol=1e-12)
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_it_is_the_recursion_of_the_module(seed):
+    """E, V, C and R in plain NumPy, as the module's docstring has them, over some frames."""
+    generator = np.random.default_rng(seed)
+    error, velocity, cross, response, propagation = NONE, NONE, NONE, NONE, ErrorPropagation(NONE)
+    for frame in range(4):
+        rows = generator.normal(size=(5, 7, DIM))
+        q, u, w, b, shared = (part.T @ part for part in rows)
+        inverse, rho = np.linalg.inv(b + w), generator.random()
+        found = propagation.update(Motion(q, u, rho), FrameErrors(inverse, w, b + w, shared))
+        gain = inverse @ w
+        if frame:
+            velocity = rho**2 * velocity + ((1 - rho**2) if velocity.any() else 1.0) * u
+            error, cross = error + rho * (cross + cross.T) + velocity + q, rho * cross + velocity
+        error = gain @ error @ gain.T + (1 - LASTING) * inverse @ b @ inverse
+        cross, response = gain @ cross, gain @ response + inverse
+        expected = error + response @ (LASTING * b + shared) @ response.T
+        np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-12)

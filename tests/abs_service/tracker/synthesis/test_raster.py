@@ -1,0 +1,24 @@
+"""The distance image of a mesh, whole and at single pixels."""
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from abs_service.tracker.synthesis.rasterization.raster import Raster
+from calib.camera import Camera
+from calib.lenses.lens import Lens
+from tests.abs_service.tracker.scenes import flat, sheet
+
+CAMERA = Camera(80, 60, 150.0, 150.0, 39.5, 29.5, Lens(np.array([-0.15, 0.03, 1e-3, -1e-3])))
+MESH = sheet(9, 13, flat)
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(0, 300))
+def test_single_pixels_have_the_distances_of_the_whole_image(seed, count):
+    generator = np.random.default_rng(seed)
+    vertices = (MESH.vertices + generator.normal(size=MESH.vertices.shape) * 0.02).T.astype(np.float32)
+    vertices[:, generator.integers(vertices.shape[1])] *= -1  # behind the camera
+    rows, columns = generator.integers(CAMERA.height, size=count), generator.integers(CAMERA.width, size=count)
+    raster = Raster(CAMERA, MESH.faces)
+    found = raster.render_at(vertices, rows, columns)
+    np.testing.assert_allclose(found, raster.render(vertices)[rows, columns], rtol=1e-6)
