@@ -1,5 +1,6 @@
 """Messages of a tracker: estimates, mesh and topology."""
 
+import functools
 import hashlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -106,7 +107,7 @@ def state(header: common_pb2.Header, estimate: Estimate, identity: Identity, eff
         skipped=effort.skipped,
         mesh_version=identity.mesh_version,
         inlier_share=estimate.inlier_share,
-        covariance=estimate.covariance[np.triu_indices(len(estimate.theta))].tolist(),
+        covariance=estimate.covariance.ravel()[_upper_of(len(estimate.theta))].tolist(),
         covariance_valid=_is_known(estimate),
         samples=sum(fit.samples for fit in estimate.fits),
         clock_sigma_ns=max((source.t_sigma_ns for source in estimate.sources.values()), default=0),
@@ -177,6 +178,13 @@ def topology(header: common_pb2.Header, undeformed: Mesh, identity: Identity) ->
 def _is_known(estimate: Estimate) -> bool:
     """True if the covariances are valid, which they are not while the object is lost."""
     return estimate.status in (Status.TRACKING, Status.DEGRADED)
+
+
+@functools.cache
+def _upper_of(dimension: int) -> NDArray[np.intp]:
+    """Places of the upper triangle's entries in a flattened matrix (dim, dim), row by row."""
+    rows, columns = np.triu_indices(dimension)
+    return rows * dimension + columns
 
 
 def _upper(covariance: NDArray[np.float64]) -> bytes:

@@ -28,7 +28,7 @@ def single_frame_deviation(optimum: Optimum, prediction: MotionPrediction) -> fl
     rows = np.zeros((PROBES, 3, len(alone)))
     np.put_along_axis(rows, derivatives.parameters[derivatives.group[some]][:, None], derivatives.local[some], axis=2)
     white = whitened(alone, rows.reshape(-1, len(alone)).T)
-    return float(np.sqrt(np.median(np.sum(white**2, axis=0).reshape(PROBES, 3).sum(axis=1))))
+    return float(np.sqrt(np.median(np.einsum("ij,ij->j", white, white).reshape(PROBES, 3).sum(axis=1))))
 
 
 def unobserved_motion(

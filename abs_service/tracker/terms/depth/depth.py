@@ -21,7 +21,7 @@ from abs_service.tracker.terms.depth.depth_cost import (
 )
 from abs_service.tracker.terms.depth.outline import NoOutline, Outline
 from abs_service.tracker.terms.depth.texels import Unusable, texels
-from abs_service.tracker.terms.depth.visibility import Visibility, classify
+from abs_service.tracker.terms.depth.visibility import Visibility, classify, where
 from abs_service.tracker.terms.gradients import color_rows, depth_rows
 from abs_service.tracker.terms.linearization import NO_ROWS, PointLinearization, Together
 from abs_service.tracker.terms.vertex_counts import Sight
@@ -85,7 +85,7 @@ class DepthTerm:
         doubtful = self._outline.observe(distance, seen, expected, predicted, window)
         self._continuation.observe(seen.object, window)
         self._window, self._distance, self._foreground = window, distance, seen.foreground
-        free_m = np.where(doubtful, np.float32(0), seen.free_m)
+        free_m = where(~doubtful, seen.free_m)
         self._place(seen, doubtful, free_m)
         self._explain_pixels(seen, doubtful, free_m, predicted)
 

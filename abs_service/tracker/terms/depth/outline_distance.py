@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.synthesis.window import WHOLE, Window
 from abs_service.tracker.terms.depth.visibility import Visibility
+from calib.jit import kernel
 
 
 def _around(mask: NDArray[np.bool_], reach: int) -> Window:
@@ -29,8 +30,7 @@ def inwards(distance: NDArray[np.float32], seen: Visibility, reach: int) -> tupl
     """
     beside = (seen.free_m > 0) | (np.isnan(distance) & ~(seen.hole | seen.dropout))
     if seen.dropout.any():
-        votes = np.where(seen.dropout, np.int16(0), np.where(beside, np.int16(1), np.int16(-1)))
-        beside |= seen.dropout & (cv2.boxFilter(votes, -1, (3, 3), normalize=False) > 0)
+        beside |= outvoted(seen.dropout, beside)
     if not (beside.any() and seen.object.any()):
         return WHOLE, np.full(distance.shape, np.nan, np.float32)
     part = _around(~beside, reach)
@@ -38,6 +38,33 @@ def inwards(distance: NDArray[np.float32], seen: Visibility, reach: int) -> tupl
     to_inside, to_outside = (
         cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5) for mask in (outside, ~outside)
     )
-    away = np.where(outside, 0.5 - to_inside, to_outside - 0.5).astype(np.float32)
+    # Each pixel is at no distance from its own side, so one difference serves both.
+    away = np.subtract(to_outside, to_inside)
+    away += np.subtract(outside, np.float32(0.5), dtype=np.float32)
     away[seen.foreground[part] | seen.hole[part]] = np.nan
     return part, away
+
+
+def outvoted(dropout: NDArray[np.bool_], beside: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Dropouts (height, width) most of whose eight neighbours with a return lie beside the object."""
+    result = np.zeros(dropout.shape, np.bool_)
+    _vote(dropout, beside, result)
+    return result
+
+
+@kernel
+def _vote(dropout: NDArray[np.bool_], beside: NDArray[np.bool_], result: NDArray[np.bool_]) -> None:
+    """Writes what `outvoted` returns into False; beyond the border, the image is its mirror image."""
+    height, width = dropout.shape
+    for row in range(height):
+        for column in range(width):
+            if not dropout[row, column]:
+                continue
+            votes = 0
+            for down in range(-1, 2):
+                y = height - 1 - abs(height - 1 - abs(row + down))
+                for right in range(-1, 2):
+                    x = width - 1 - abs(width - 1 - abs(column + right))
+                    if not dropout[y, x]:
+                        votes += 1 if beside[y, x] else -1
+            result[row, column] = votes > 0

@@ -79,12 +79,12 @@ def classify(
     near = _extended(predicted)
     shown, before, solid, behind, missing = (np.empty(distance.shape, np.bool_) for _ in range(5))
     _compare(distance, near, labels, is_object, shown, before, solid, behind, missing)
-    foreground = before & (cv2.dilate(solid.view(np.uint8), np.ones((3, 3))) > 0)
+    foreground = before & (cv2.dilate(solid.view(np.uint8), np.ones((3, 3))) > 0) if solid.any() else nothing
     hole, past, single = nothing, nothing, missing & dropout
     if missing.any():
         hole, past = _holes(missing & ~single, np.isfinite(predicted), near / focal, empty)
     away = _depth_inside(~shown) * near / np.float32(focal)
-    return Visibility(shown, foreground, hole, single, np.where(behind | past, away, np.float32(0)))
+    return Visibility(shown, foreground, hole, single, where(behind | past, away))
 
 
 @kernel
@@ -128,6 +128,20 @@ def _compare(
             solid[row, column] = is_before and label > 0
             behind[row, column] = not is_shown and beyond > AGREEMENT_M
             missing[row, column] = not np.isfinite(distance[row, column])
+
+
+def where(mask: NDArray[np.bool_], values: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Values (height, width) in a mask, zeros elsewhere."""
+    result = np.empty(values.shape, np.float32)
+    _select(mask.ravel(), values.ravel(), result.ravel())
+    return result
+
+
+@kernel
+def _select(mask: NDArray[np.bool_], values: NDArray[np.float32], result: NDArray[np.float32]) -> None:
+    """What `where` returns; `numpy.where` takes five times as long for a mask with a ragged edge."""
+    for k in range(mask.size):
+        result[k] = values[k] if mask[k] else np.float32(0)
 
 
 def _holes(

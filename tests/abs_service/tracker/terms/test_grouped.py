@@ -8,7 +8,7 @@ from abs_service.tracker.terms.grouped import GroupedLinearization
 from abs_service.tracker.terms.linearization import Linearization
 
 #: Parameters of theta, and of every group.
-DIM, OWN = 11, 4
+DIM, OWN = 11, 5
 
 
 def drawn(generator: np.random.Generator, counts: list[int]) -> GroupedLinearization:

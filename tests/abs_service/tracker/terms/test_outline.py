@@ -15,7 +15,7 @@ from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.objectives import likelihood
 from abs_service.tracker.synthesis.projection import optics
 from abs_service.tracker.terms.base import Bounds
-from abs_service.tracker.terms.depth.outline_distance import inwards
+from abs_service.tracker.terms.depth.outline_distance import inwards, outvoted
 from abs_service.tracker.terms.depth.rim import Rim, look_up, read
 from abs_service.tracker.terms.depth.rim_cost import FARTHEST, rim_cost
 from abs_service.tracker.terms.depth.visibility import classify
@@ -211,3 +211,12 @@ def test_distances_near_the_outline_do_not_depend_on_how_far_the_image_goes_on()
     beyond = everywhere.copy()
     beyond[part] = -3
     assert np.nanmax(beyond) <= -3
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(2, 9), st.integers(2, 9))
+def test_dropouts_go_with_most_of_their_neighbours(seed, height, width):
+    generator = np.random.default_rng(seed)
+    dropout, beside = generator.random((2, height, width)) < 0.5
+    votes = np.where(dropout, 0, np.where(beside, 1, -1))
+    around = np.lib.stride_tricks.sliding_window_view(np.pad(votes, 1, mode="reflect"), (3, 3)).sum(axis=(2, 3))
+    np.testing.assert_array_equal(outvoted(dropout, beside), dropout & (around > 0))

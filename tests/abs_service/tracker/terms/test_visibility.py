@@ -11,7 +11,7 @@ from abs_service.tracker.synthesis.window import WHOLE
 from abs_service.tracker.terms.base import Bounds
 from abs_service.tracker.terms.depth.background import Background
 from abs_service.tracker.terms.depth.depth import FREE_SCALE_M, DepthTerm
-from abs_service.tracker.terms.depth.visibility import classify
+from abs_service.tracker.terms.depth.visibility import classify, where
 from abs_service.tracker.terms.photometric.color import ColorTerm
 from abs_service.tracker.terms.photometric.shadow import Shadow
 from calib import pose
@@ -206,3 +206,11 @@ def test_missing_returns_of_an_object_that_fills_the_image_are_holes():
     distance[10:14, 20:30] = np.nan
     seen = classify(distance, np.full((48, 64), 1.0, np.float32), 150.0)
     assert np.array_equal(seen.hole, np.isnan(distance))
+
+
+@pytest.mark.parametrize("shape", [(0, 3), (1, 1), (7, 9)])
+def test_values_in_a_mask_are_those_of_numpy(shape):
+    generator = np.random.default_rng(0)
+    values, mask = generator.normal(size=shape).astype(np.float32), generator.random(shape) < 0.5
+    values[generator.random(shape) < 0.2] = np.nan
+    np.testing.assert_array_equal(where(mask, values), np.where(mask, values, np.float32(0)))
