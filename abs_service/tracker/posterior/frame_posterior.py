@@ -14,7 +14,6 @@ from abs_service.tracker.posterior.priors.motion_prediction import MotionPredict
 from abs_service.tracker.posterior.priors.shape_prior import ShapePrior
 from abs_service.tracker.posterior.priors.stretch_prior import StretchPrior
 from abs_service.tracker.terms.base import SensorFit
-from abs_service.tracker.terms.linearization import Part
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,7 +57,7 @@ class FramePosterior:
         surface, sparse_jacobian = self.model.deform(theta[None]), self.model.sparse_jacobian(theta)
         terms = self.objective.linearize(surface, sparse_jacobian)
         sensed = [source.parts() for term in terms for source in term.sources()]
-        priors = gauss_newton(self._priors(surface, sparse_jacobian, theta), self.dimension)
+        priors = self._priors(surface, sparse_jacobian, theta)
         quadratic = priors + gauss_newton([part for source in sensed for part in source], self.dimension)
         return LinearizedCost(theta, quadratic, priors.curvature, sensed, sparse_jacobian)
 
@@ -70,7 +69,7 @@ class FramePosterior:
     def prior(self, theta: NDArray[np.float64]) -> Quadratic:
         """Gauss–Newton approximation of the priors alone near theta (dim,)."""
         surface, sparse_jacobian = self.model.deform(theta[None]), self.model.sparse_jacobian(theta)
-        return gauss_newton(self._priors(surface, sparse_jacobian, theta), self.dimension)
+        return self._priors(surface, sparse_jacobian, theta)
 
     def cross_curvature(self, theta: NDArray[np.float64], offsets: NDArray[np.float64]) -> NDArray[np.float64]:
         """JᵀJE (dim, n) at theta (dim,): derivatives with respect to theta, and to an offset (n, 3) [m] per vertex."""
@@ -91,6 +90,7 @@ class FramePosterior:
         """Signed distance of each vertex from its measurements, and its deviation by noise (2, n) [m]."""
         return self.objective.misfit(surface)
 
-    def _priors(self, surface: Surface, sparse_jacobian: SparseJacobian, theta: NDArray[np.float64]) -> list[Part]:
-        rows = self.stretch.linearize(surface, sparse_jacobian)
-        return [*rows, self.shape.linearize(theta), self.motion.linearize(theta)]
+    def _priors(self, surface: Surface, sparse_jacobian: SparseJacobian, theta: NDArray[np.float64]) -> Quadratic:
+        rows, precision = self.stretch.linearize(surface, sparse_jacobian), self.motion.precision
+        motion = Quadratic(precision @ (theta - self.motion.theta), precision)
+        return gauss_newton([*rows, self.shape.linearize(theta)], self.dimension) + motion

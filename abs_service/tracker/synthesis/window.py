@@ -118,7 +118,8 @@ class Placed(Generic[Number]):
         """The image (height + 2, width + 2) with other values; valid until the next call."""
         if self._image.shape != (height + 2, width + 2):
             self._image = np.zeros((height + 2, width + 2), self._image.dtype)
-        within(self._image, self._window)[:] = 0
+        for top, bottom, left, right in _without(*(limits(one, (height, width)) for one in (self._window, window))):
+            within(self._image, (slice(top, bottom), slice(left, right)))[:] = 0
         within(self._image, window)[:] = values
         self._window = window
         return self._image

@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.posterior.priors.change_metric import ChangeMetric
 from abs_service.tracker.posterior.priors.settings import Settings
-from abs_service.tracker.terms.linearization import Linearization
 
 #: Radius of the search around the prediction, in standard deviations of the widest motion prior.
 FARTHEST = 4.0
@@ -75,11 +74,6 @@ class MotionPrediction:
     def cost(self, thetas: NDArray[np.float64]) -> NDArray[np.float64]:
         """Negative log-density (population,) of parameters (population, dim), up to a constant."""
         return self.metric.squares(thetas, self.theta) / (2 * self._deviation_m**2)
-
-    def linearize(self, theta: NDArray[np.float64]) -> Linearization:
-        """The normalised residuals of parameters (dim,), and their derivatives."""
-        rows = self.metric.root / self._deviation_m
-        return Linearization(rows @ (theta - self.theta), rows)
 
     def _mean_innovation(self, theta: NDArray[np.float64]) -> float:
         """Root mean square innovation of theta (dim,) [m/s]."""

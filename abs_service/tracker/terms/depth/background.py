@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.synthesis.window import Window
+from calib.jit import kernel
 
 #: A connected area of missing returns is background if it shares so many pixels with that of the first image.
 MIN_PIXELS = 10
@@ -63,6 +64,27 @@ class Background:
             self._empty[window] = missing & (near == 0)
         empty = self._empty[window]
         count, labels = cv2.connectedComponents(missing.view(np.uint8), connectivity=4)
-        shared = np.bincount(labels[empty & missing], minlength=count)
-        shared[0] = 0
-        return (shared >= MIN_PIXELS)[np.asarray(labels, np.intp)]
+        shared, result = np.zeros(count, np.int64), np.empty(missing.shape, np.bool_)
+        _mark_shared(np.asarray(labels, np.int32), np.ascontiguousarray(empty), shared, result)
+        return result
+
+
+@kernel
+def _mark_shared(
+    labels: NDArray[np.int32], empty: NDArray[np.bool_], shared: NDArray[np.int64], result: NDArray[np.bool_]
+) -> None:
+    """Marks the areas that share enough pixels with the background.
+
+    Args:
+        labels: of the areas (rows, columns), 0 for none.
+        empty: background (rows, columns) of the first image.
+        shared: number of pixels that every area shares with it (areas,), zeros at the start.
+        result: see above (rows, columns).
+    """
+    for row in range(labels.shape[0]):
+        for column in range(labels.shape[1]):
+            if empty[row, column] and labels[row, column] > 0:
+                shared[labels[row, column]] += 1
+    for row in range(labels.shape[0]):
+        for column in range(labels.shape[1]):
+            result[row, column] = labels[row, column] > 0 and shared[labels[row, column]] >= MIN_PIXELS

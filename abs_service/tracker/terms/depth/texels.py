@@ -145,8 +145,8 @@ class TexelsOnDemand:
 
     def explain(self, unusable: Unusable) -> float:
         """Remembers what is unusable, and renders some pixels on the object."""
-        shown = np.flatnonzero(unusable.shown)
-        rows, columns = np.divmod(shown[:: max(len(shown) // SAMPLED, 1)], unusable.shown.shape[1])
+        step = max(int(np.count_nonzero(unusable.shown)) // SAMPLED, 1)
+        rows, columns = np.divmod(every(step, unusable.shown), unusable.shown.shape[1])
         top, left = corner(self._window)
         some = ((rows + top + 1) * self._texture.shape[1] + columns + left + 1).astype(np.int32)
         texture = self.at(some[None])
@@ -172,6 +172,25 @@ class TexelsOnDemand:
     def shape(self) -> tuple[int, int]:
         """Height and width of the view."""
         return self._texture.shape[0] - 2, self._texture.shape[1] - 2
+
+
+def every(step: int, mask: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Places of the first, and then of every `step`-th pixel of a mask (height, width), in the flattened image."""
+    places = np.empty(-(-int(np.count_nonzero(mask)) // step), np.int64)
+    _count_off(step, mask.ravel(), places)
+    return places
+
+
+@kernel
+def _count_off(step: int, mask: NDArray[np.bool_], places: NDArray[np.int64]) -> None:
+    """Writes what `every` returns."""
+    count, left = 0, 1
+    for k in range(mask.size):
+        if mask[k]:
+            left -= 1
+            if left == 0:
+                places[count] = k
+                count, left = count + 1, step
 
 
 @kernel

@@ -1,5 +1,7 @@
 """Linearisations of the cost of one frame."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -40,6 +42,20 @@ def test_the_order_in_which_a_frame_is_asked_changes_nothing():
     again = frame.optimum(theta, None)
     np.testing.assert_array_equal(again.inverse_curvature, first.inverse_curvature)
     assert frame.fits(theta) == fits
+
+
+def test_the_motion_prior_adds_its_own_gradient_and_precision_to_the_other_priors():
+    *_, step = drive(one := tracking(vertices=120), SHEET, [0, 1])
+    assert one.model is not None
+    theta, exposed = step.estimate.theta, SHEET.expose(1)[0]
+    frame = posterior_of(one.model, RIG, exposed).observe(Observer(RIG).observe(frame_set(exposed, 1)))
+    motion, narrow = frame.motion, frame.with_motion(replace(frame.motion, speed=frame.motion.speed / 2))
+    rows = motion.metric.root / (motion.speed * motion.elapsed_s)  # of residuals whose half squares are the cost
+    residual = rows @ (theta - motion.theta)
+    assert motion.cost(theta[None])[0] == pytest.approx(residual @ residual / 2, rel=1e-9)
+    wide, added = frame.prior(theta), narrow.prior(theta)  # four times the precision: three times it is added
+    np.testing.assert_allclose(added.curvature - wide.curvature, 3 * rows.T @ rows, rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(added.gradient - wide.gradient, 3 * rows.T @ residual, rtol=1e-6, atol=1e-6)
 
 
 def test_the_posterior_of_a_frame_answers_no_more_once_the_next_is_observed():
