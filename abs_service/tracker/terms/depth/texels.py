@@ -13,7 +13,7 @@ from abs_service.pairing.images import DepthImage
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.synthesis.window import Bordered, Window, corner, within
 from abs_service.tracker.terms.base import Bounds
-from abs_service.tracker.terms.depth.depth_cost import distances, median_inlier_cost, settle, write_constants
+from abs_service.tracker.terms.depth.depth_cost import distances, every, median_inlier_cost, settle, write_constants
 from calib.jit import kernel
 from calib.noise.base import DepthNoise
 from calib.noise.texture import corrected_distances, write_pixels, write_texture
@@ -172,25 +172,6 @@ class TexelsOnDemand:
     def shape(self) -> tuple[int, int]:
         """Height and width of the view."""
         return self._texture.shape[0] - 2, self._texture.shape[1] - 2
-
-
-def every(step: int, mask: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Places of the first, and then of every `step`-th pixel of a mask (height, width), in the flattened image."""
-    places = np.empty(-(-int(np.count_nonzero(mask)) // step), np.int64)
-    _count_off(step, mask.ravel(), places)
-    return places
-
-
-@kernel
-def _count_off(step: int, mask: NDArray[np.bool_], places: NDArray[np.int64]) -> None:
-    """Writes what `every` returns."""
-    count, left = 0, 1
-    for k in range(mask.size):
-        if mask[k]:
-            left -= 1
-            if left == 0:
-                places[count] = k
-                count, left = count + 1, step
 
 
 @kernel

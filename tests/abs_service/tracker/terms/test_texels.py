@@ -6,7 +6,8 @@ from hypothesis import strategies as st
 
 from abs_service.pairing.images import DepthImage
 from abs_service.tracker.synthesis.window import Bordered
-from abs_service.tracker.terms.depth.texels import TexelsOnDemand, Unusable, WholeTexels, every
+from abs_service.tracker.terms.depth.depth_cost import every
+from abs_service.tracker.terms.depth.texels import TexelsOnDemand, Unusable, WholeTexels
 from calib.noise.tof_amplitude import TofAmplitude
 from tests.abs_service.tracker.scenes import CAMERA, sparse
 

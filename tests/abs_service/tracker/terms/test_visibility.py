@@ -1,7 +1,10 @@
 """Occluded vertices and pixels are ignored in the cost."""
 
+import cv2
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from abs_service.pairing.images import ColorImage
 from abs_service.tracker.models.base import Surface
@@ -9,7 +12,7 @@ from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.synthesis.rasterization.raster import Raster
 from abs_service.tracker.synthesis.window import WHOLE
 from abs_service.tracker.terms.base import Bounds
-from abs_service.tracker.terms.depth.background import Background
+from abs_service.tracker.terms.depth.background import MIN_PIXELS, Background
 from abs_service.tracker.terms.depth.depth import FREE_SCALE_M, DepthTerm
 from abs_service.tracker.terms.depth.visibility import classify, where
 from abs_service.tracker.terms.photometric.color import ColorTerm
@@ -214,3 +217,15 @@ def test_values_in_a_mask_are_those_of_numpy(shape):
     values, mask = generator.normal(size=shape).astype(np.float32), generator.random(shape) < 0.5
     values[generator.random(shape) < 0.2] = np.nan
     np.testing.assert_array_equal(where(mask, values), np.where(mask, values, np.float32(0)))
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_missing_returns_are_background_if_their_area_shares_enough_pixels_with_that_of_the_first_image(seed):
+    generator = np.random.default_rng(seed)
+    first, later = generator.random((2, 12, 14)) < generator.uniform(0.3, 0.9)
+    expected, background = np.zeros_like(first), Background()
+    background.observe(first, expected, WHOLE, first.shape)
+    labels = np.asarray(cv2.connectedComponents(later.view(np.uint8), connectivity=4)[1], np.intp)
+    shared = np.bincount(labels[first & later], minlength=labels.max() + 1)
+    areas = later & (shared >= MIN_PIXELS)[labels]
+    np.testing.assert_array_equal(background.observe(later, expected, WHOLE, first.shape), areas)
