@@ -145,7 +145,7 @@ def test_the_curvature_is_regular_although_pose_and_shape_can_do_the_same():
     measured = jacobian[:, 2] / 5e-3  # every vertex's z, to 5 mm
     parts = StretchPrior(MODEL.mesh, 0.02).linearize(MODEL.deform(MODEL.rest[None]), MODEL.sparse_jacobian(MODEL.rest))
     stretch = stack(parts, 54).jacobian
-    rows = np.concatenate([measured, stretch, MODEL.prior, np.linalg.cholesky(motion.precision).T])
+    rows = np.concatenate([measured, stretch, MODEL.prior, np.linalg.cholesky(motion.precision).T], dtype=np.float64)
     metric = search_metric(gauss_newton([Linearization(np.zeros(len(rows)), rows)], 54))
     np.testing.assert_allclose(metric.T @ rows.T @ rows @ metric, np.eye(54), atol=1e-6)
     deviation = np.sqrt(np.diag(metric @ metric.T))
