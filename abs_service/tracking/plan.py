@@ -6,7 +6,7 @@ from typing import Protocol
 import numpy as np
 
 from abs_service.pairing.observation import Observation
-from abs_service.tracker import status
+from abs_service.tracker import resolution, status
 from abs_service.tracker.appearance import with_appearance
 from abs_service.tracker.detection.initial_detection import InitialDetection
 from abs_service.tracker.detection.regions.base import Region
@@ -90,7 +90,7 @@ class Plan:
         reference: sensor from whose depth image the initial mesh is built.
         model, region, synthesis, objective, optimizer: settings of the exchangeable parts.
         evaluations: maximum number of cost evaluations per frame.
-        vertices: approximate number of vertices of the mesh.
+        vertices: approximate number of vertices of the mesh; "auto": as many as the object's pixels resolve.
         priors, status, reinitialization, vertex_offsets: settings of the fixed parts.
         template: settings of the object's known shape.
         seed: seed of the search; equal seeds and frame sets result in equal estimates.
@@ -103,13 +103,18 @@ class Plan:
     objective: ObjectiveSettings
     optimizer: OptimizerSettings
     evaluations: int
-    vertices: int
+    vertices: resolution.Vertices
     priors: priors.Settings
     status: status.Settings
     reinitialization: loss_monitor.Settings
     vertex_offsets: VertexOffsetSettings = field(default_factory=VertexOffsetSettings)
     template: TemplateSettings = field(default_factory=first_image.Settings)
     seed: int = 0
+
+
+def build_template(settings: TemplateSettings, vertices: resolution.Vertices) -> Template:
+    """The template, whose mesh has a usual number of vertices if none is given."""
+    return settings.build(resolution.TEMPLATE_VERTICES if vertices == "auto" else vertices)
 
 
 def make_posterior(

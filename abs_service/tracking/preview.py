@@ -17,7 +17,7 @@ from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import ModelError
 from abs_service.tracker.terms.depth.first_rim import classified_rim
 from abs_service.tracking.observer import Observer
-from abs_service.tracking.plan import Plan, make_tracker
+from abs_service.tracking.plan import Plan, build_template, make_tracker
 from calib.camera import Camera
 from calib.rig import Rig
 from drivers.contract.frame import FrameSet
@@ -88,7 +88,8 @@ def preview(frame_sets: Iterable[FrameSet], rig: Rig, plan: Plan) -> Preview:
         PreviewError: the reference sensor delivers no depth image.
         ObservationError: the frames do not fit the rig.
     """
-    observer, region, template = Observer(rig), plan.region.build(), plan.template.build(plan.vertices)
+    observer, region = Observer(rig), plan.region.build()
+    template = build_template(plan.template, plan.vertices)
     first: Preview | None = None
     number = -1
     for number, frames in enumerate(frame_sets):

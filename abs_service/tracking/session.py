@@ -19,7 +19,7 @@ from abs_service.tracking.monitors import loss_monitor
 from abs_service.tracking.monitors.growth_monitor import LEAST_GROWTH, GrowthMonitor
 from abs_service.tracking.observer import Observer
 from abs_service.tracking.offsets.vertex_offsets import FixedOffsets, VertexOffsets
-from abs_service.tracking.plan import Plan, make_tracker
+from abs_service.tracking.plan import Plan, build_template, make_tracker
 from calib.noise.base import ImageNoise
 from calib.rig import Rig, Sensor
 from drivers.contract.frame import FrameSet
@@ -73,7 +73,7 @@ class TrackingSession:
         self._rig = rig
         self._plan = plan
         self._region = self._configured = plan.region.build()
-        self._template = plan.template.build(plan.vertices)
+        self._template = build_template(plan.template, plan.vertices)
         self._observer = Observer(rig)
         self._tracker: Tracker | None = None
         self._vertex_offsets: VertexOffsets = FixedOffsets()

@@ -1,7 +1,7 @@
 """Our own trackers on the peers' terms: the same template in its first pose, then depth images alone."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -89,7 +89,7 @@ class Template:
             turned = Sheet(pose.from_rotation_vector(self.first.turn, self.first.center), *SIZE)
             settings = flexpad.Settings()
             return flexpad.FlexPad(turned, SIDE**2, settings.minimum_radius_m, settings.bend_deviation)
-        return self.setup.surface.of_mesh(template(self.first))
+        return self.setup.surface.of_mesh(replace(template(self.first), pixel_deviation=detection.deviation))
 
 
 def template(state: SheetState) -> Mesh:
