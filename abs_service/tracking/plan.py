@@ -1,5 +1,6 @@
 """The settings of one tracker's parts, and a tracker built from them on the first observation of its object."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
@@ -13,7 +14,7 @@ from abs_service.tracker.detection.regions.base import Region
 from abs_service.tracker.detection.templates import first_image
 from abs_service.tracker.detection.templates.base import ALL_SEEN, Sight, Template
 from abs_service.tracker.mesh import Mesh
-from abs_service.tracker.models.base import DeformationModel
+from abs_service.tracker.models.base import DeformationModel, HasDerived
 from abs_service.tracker.objectives.base import Objective
 from abs_service.tracker.optimizers.base import Optimizer
 from abs_service.tracker.posterior.posterior import Posterior
@@ -134,6 +135,17 @@ def make_posterior(
         MotionPrior(model.rest, ChangeMetric(model.scales, model.roughness), plan.priors),
     )
     return posterior, mesh
+
+
+def derived(plan: Plan, model: DeformationModel) -> Mapping[str, tuple[float, ...]]:
+    """Numbers in use that follow from the first image unless keys of the tracker give them, by key."""
+    parts = {"model": model, "objective": plan.objective}
+    found = {f"{part}.{key}": numbers for part, made in parts.items() for key, numbers in _derived(made).items()}
+    return {"mesh.vertices": (float(len(model.mesh.vertices)),), **found}
+
+
+def _derived(part: object) -> Mapping[str, tuple[float, ...]]:
+    return part.derived if isinstance(part, HasDerived) else {}
 
 
 def make_tracker(

@@ -139,6 +139,7 @@ class Nurbs:
         scales: ones (dim,), because every parameter is a length.
         roughness: second differences (k, dim) of the control points' displacements along u and w, and mixed ones.
         prior: none (0, dim).
+        derived: numbers of control points along the long and the short side, and degree, by their keys.
     """
 
     def __init__(
@@ -152,6 +153,7 @@ class Nurbs:
         offset: NDArray[np.float64],
     ):
         shape = control.shape[:2]
+        self.derived = {"control_points": tuple(map(float, shape)), "degree": (float(degree),)}
         span, self._span_control = spline.support(u, w, shape, degree)
         order = np.argsort(span, kind="stable")
         ordered = mesh.reordered(order)
