@@ -22,11 +22,9 @@ MAX_VERTICES = 450
 #: A coarser grid loses too much of a small object at its rim.
 MIN_VERTICES = 100
 
-#: Knot spans along the long side if the sensor's noise is unknown.
-USUAL_SPANS = 3
-
-#: Largest number of knot spans along the long side: the time of a frame grows with the square of Θ's dimension.
-MAX_SPANS = 4
+#: Largest number of knot spans along the long side, and their number if the sensor's noise is unknown. The time of a
+#: frame grows with the square of Θ's dimension; a fourth span gained nothing where noise allows for one.
+MAX_SPANS = 3
 
 #: Minimum number of cells of the mesh's grid in a span; fewer vertices do not determine its control points.
 MIN_CELLS = 3.0
@@ -81,7 +79,7 @@ def spans(
         noise = deviation_m**2 * (first + degree) * (second + degree) / measurements
         return spline_error(longest, bend_rad, spans, degree) ** 2 + noise
 
-    best = min(range(1, MAX_SPANS + 1), key=square_error) if deviation_m > 0 else USUAL_SPANS
+    best = min(range(1, MAX_SPANS + 1), key=square_error) if deviation_m > 0 else MAX_SPANS
     first, second = (
         min(wanted, max(int(count / MIN_CELLS), 1)) for wanted, count in zip(on_sides(best), cells, strict=True)
     )

@@ -25,7 +25,7 @@ class Settings:
 
     Attributes:
         control_points: numbers of control points along the object's long and short side; Θ has three values for each.
-            "auto": 1 to 4 knot spans along the long side, so that the mean square error of a frame is least for the
+            "auto": 1 to 3 knot spans along the long side, so that the mean square error of a frame is least for the
             bend, the object's size, the number of vertices and the sensor's noise, and as many per length along the
             short side; fewer where the mesh is too coarse for them.
         degree: polynomial degree of the splines. "auto": 3, or less if a side has too few control points or cells of
