@@ -9,12 +9,11 @@ import scipy  # its parts are imported when they are first used
 #: Approximate number of vertices of a mesh; "auto": as many as the object's pixels resolve.
 Vertices = Literal["auto"] | int
 
-#: Number of vertices of a template's mesh, which is made before the object is seen.
-TEMPLATE_VERTICES = 300
+#: Usual number of vertices; that of a template's mesh, which is made before the object is seen.
+USUAL_VERTICES = 300
 
-#: Two vertices that are a pixel's diagonal, √2, apart are never in the same pixel; a square grid then has a vertex for
-#: every two pixels.
-PIXELS_PER_VERTEX = 2.0
+#: A larger mesh has a vertex for so many pixels: the mean of its distance in the first image is over more than that.
+PIXELS_PER_VERTEX = 4.0
 
 #: A larger mesh takes more time for each frame.
 MAX_VERTICES = 450
@@ -34,8 +33,9 @@ CUBIC = 3
 
 
 def vertices(pixels: int) -> int:
-    """Number of vertices for an object of so many pixels in the first depth image."""
-    return round(min(max(pixels / PIXELS_PER_VERTEX, MIN_VERTICES), MAX_VERTICES))
+    """Number of vertices for an object of so many pixels in the first depth image: never more than it has pixels."""
+    wanted = min(max(pixels / PIXELS_PER_VERTEX, USUAL_VERTICES), MAX_VERTICES)
+    return round(min(wanted, max(pixels, MIN_VERTICES)))
 
 
 def degree(cells: Iterable[float]) -> int:
