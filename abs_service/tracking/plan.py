@@ -10,11 +10,12 @@ from abs_service.pairing.observation import Observation
 from abs_service.tracker import resolution, status
 from abs_service.tracker.appearance import with_appearance
 from abs_service.tracker.detection.initial_detection import InitialDetection
+from abs_service.tracker.detection.plausibility import ExtentError, warnings
 from abs_service.tracker.detection.regions.base import Region
 from abs_service.tracker.detection.templates import first_image
 from abs_service.tracker.detection.templates.base import ALL_SEEN, Sight, Template
 from abs_service.tracker.mesh import Mesh
-from abs_service.tracker.models.base import DeformationModel, HasDerived
+from abs_service.tracker.models.base import DeformationModel, HasDerived, ModelError
 from abs_service.tracker.objectives.base import Objective
 from abs_service.tracker.optimizers.base import Optimizer
 from abs_service.tracker.posterior.posterior import Posterior
@@ -155,9 +156,15 @@ def make_tracker(
 
     Raises:
         DetectionError: the model finds no object of its kind, or the template another one.
+        ExtentError: the model cannot be built from the object, which fills the image.
         ModelError: the model cannot be built from the object.
     """
-    model, sight = template.bind(plan.model, detection)
+    try:
+        model, sight = template.bind(plan.model, detection)
+    except ModelError as error:
+        if doubts := warnings(detection):
+            raise ExtentError(f"{', '.join(doubts)} No model can be made of it: {error}") from error
+        raise
     posterior, mesh = make_posterior(plan, rig, model, observation, sight)
     optimizer = plan.optimizer.build(posterior.dimension, np.random.default_rng(plan.seed))
     return Tracker(model, posterior, optimizer, plan.evaluations, plan.status, sight.registration_m), mesh

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from abs_service.pairing.images import DepthImage
 from abs_service.pairing.observation import Observation
 from abs_service.tracker.detection.initial_detection import DetectionError
-from abs_service.tracker.detection.plausibility import warnings
+from abs_service.tracker.detection.plausibility import ExtentError, warnings
 from abs_service.tracker.detection.regions.base import Region
 from abs_service.tracker.detection.segmentation import detect_object
 from abs_service.tracker.detection.templates.base import Template
@@ -119,7 +119,8 @@ def _look(
         selected = np.isfinite(detection.distance)
         tracker, _ = make_tracker(plan, template, rig, detection, observation)
     except (DetectionError, ModelError) as error:
-        return Preview(number, camera, image.distance, selected, None, str(error))
+        doubts = (str(error),) if isinstance(error, ExtentError) else ()
+        return Preview(number, camera, image.distance, selected, None, str(error), doubts)
     model, first = tracker.model, tracker.track(observation, lambda: True)
     surface = model.deform(model.rest[None])
     rim, classes = classified_rim(camera, model.mesh, surface, detection.surroundings)

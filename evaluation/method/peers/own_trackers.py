@@ -53,7 +53,7 @@ class Setup:
 #: A search that never samples: what the descent alone is worth.
 DESCENT = hybrid.Settings(fallback_above=0.999, fallback_until=0.998)
 
-#: What the rows are called. By default, the sheet gets 6 × 5 control points of degree 3. 5 × 4 can bend to ±120° along
+#: What the rows are called. By default, the sheet gets 5 × 4 control points of degree 3. They can bend to ±120° along
 #: the long side without stretching (0.1 mm off); 4 × 4 of degree 2, the paper's, cannot (0.8 mm, and 3 % stretched).
 SETUPS: Mapping[str, Setup] = {
     "hybrid, NURBS by default": Setup("nurbs", hybrid.Settings()),
