@@ -163,7 +163,7 @@ def make_tracker(
         model, sight = template.bind(plan.model, detection)
     except ModelError as error:
         if doubts := warnings(detection):
-            raise ExtentError(f"{', '.join(doubts)} No model can be made of it: {error}") from error
+            raise ExtentError(f"{', '.join(doubts)} The model cannot be made of it") from error
         raise
     posterior, mesh = make_posterior(plan, rig, model, observation, sight)
     optimizer = plan.optimizer.build(posterior.dimension, np.random.default_rng(plan.seed))
