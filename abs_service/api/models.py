@@ -16,20 +16,23 @@ def Nurbs(
     long: int | None = None,
     short: int | None = None,
     *,
-    degree: int = _DEFAULT.degree,
+    degree: int | None = None,
     weights: tuple[tuple[float, ...], ...] = _DEFAULT.weights,
     margin: float = _DEFAULT.margin,
     smoothing: float = _DEFAULT.smoothing,
+    bend_deg: float = _DEFAULT.bend_deg,
 ) -> nurbs.Settings:
     """A NURBS surface of any smooth shape; theta lists x, y, z of its control points row by row [m].
 
     Args:
         long, short: control points along the object's long and short side, 3 to 12; without both of them, they are
-            derived from the object's proportions and the mesh.
-        degree: polynomial degree of the splines, 1 to 4.
+            derived from the object's size and proportions, the bend, the mesh and the sensor's noise.
+        degree: polynomial degree of the splines, 1 to 4; None: 3, or less if there are too few control points for it.
         weights: weight of every control point, a table of `long` rows and `short` columns; empty: all 1.
         margin: share of the object's size by which the rest surface extends beyond it on every side.
         smoothing: weight of the bending of the rest surface when it is fitted to the vertices.
+        bend_deg: angle between the normals of the two ends of the long side that the surface can follow, if the control
+            points are derived.
 
     Raises:
         ArgumentError: weights of another shape, or one of `long` and `short` without the other.
@@ -38,7 +41,12 @@ def Nurbs(
         raise ArgumentError(f"long = {long}, short = {short}: give both, or neither")
     try:
         return nurbs.Settings(
-            "auto" if long is None or short is None else (long, short), degree, weights, margin, smoothing
+            "auto" if long is None or short is None else (long, short),
+            "auto" if degree is None else degree,
+            weights,
+            margin,
+            smoothing,
+            bend_deg,
         )
     except ValueError as error:
         raise ArgumentError(f"Nurbs: {error}") from error

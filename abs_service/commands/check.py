@@ -32,6 +32,7 @@ from abs_service.config import addresses, plugins
 from abs_service.config.positions import located
 from abs_service.config.problems import Key, Problem
 from abs_service.supervision.exit_codes import Exit, is_for_user
+from abs_service.tracking.plan import build_template
 from calib.files import limited
 from drivers.contract.capabilities import StreamInfo
 from drivers.replay import Recording
@@ -136,7 +137,7 @@ def _unusable_parts(rig: config.ServiceConfig, streams: Mapping[str, list[Stream
         with _noting(("trackers", name, "region"), problems):
             tracker.region.build()
         with _noting(("trackers", name, "template"), problems):
-            tracker.template.build(tracker.mesh.vertices)
+            build_template(tracker.template, tracker.mesh.vertices)
     return problems
 
 
@@ -153,7 +154,7 @@ def text(found: dict[str, Any]) -> str:
         lines.append(f"  sensor   {name}: {streams}; noise {sensor['noise'] or 'unknown, only recorded'}{texture}")
         lines.append(f"           {'':<{len(name)}}  {_camera_text(sensor['camera'])}")
     for name, tracker in found["trackers"].items():
-        what = f"{tracker['model']} from {', '.join(tracker['sensors'])}, {tracker['vertices']} vertices"
+        what = f"{tracker['model']} from {', '.join(tracker['sensors'])}, {_vertices_text(tracker['vertices'])}"
         how = f"{tracker['objective']}, {tracker['optimizer']}, paced by {tracker['reference']}"
         lines.append(f"  tracker  {name}: {what}; {how}")
     lines += [f"  publishes {key} …" for key in found["publishes"]]
@@ -217,6 +218,10 @@ def _tracker(rig: config.ServiceConfig, name: str) -> dict[str, Any]:
     }
     reference = "/".join(rig.reference(name))
     return {"sensors": list(tracker.sensors), "reference": reference, "vertices": tracker.mesh.vertices, **parts}
+
+
+def _vertices_text(vertices: str | int) -> str:
+    return "vertices by its size in the image" if vertices == "auto" else f"{vertices} vertices"
 
 
 @contextmanager

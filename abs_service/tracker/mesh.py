@@ -22,6 +22,8 @@ class Mesh:
             light. At the points of the synthesis, mostly the vertices; NaN where unknown.
         deviation: standard deviation (n,) [m] of the vertices along their normals, from the noise of the measurement
             that they were made from; one number () if it is the same for all.
+        pixel_deviation: standard deviation of a single distance of the object by the noise model of the sensor that
+            measured it, median [m]; 0 if unknown.
         is_complete: True if the mesh ends where the object does, as that of a template; one made from an image ends a
             little before.
     """
@@ -33,6 +35,7 @@ class Mesh:
     appearance: Mapping[str, NDArray[np.float32]] = field(default_factory=dict)
     deviation: NDArray[np.float64] = field(default_factory=lambda: np.zeros(()))
     is_complete: bool = False
+    pixel_deviation: float = 0.0
 
     def appearance_of(self, sensor: str) -> NDArray[np.float32]:
         """Appearance in a sensor at the points of its synthesis; defaults to the vertices' colours."""
@@ -65,7 +68,7 @@ class Mesh:
         appearance = {sensor: values[order] for sensor, values in self.appearance.items()}
         deviation = np.broadcast_to(self.deviation, len(order))[order]
         ordered = self.vertices[order], place[self.faces], self.colors[order], self.chart[order]
-        return Mesh(*ordered, appearance, deviation, self.is_complete)
+        return Mesh(*ordered, appearance, deviation, self.is_complete, self.pixel_deviation)
 
 
 def area_vectors(vertices: NDArray[np.floating], faces: NDArray[np.int32]) -> NDArray[np.floating]:

@@ -48,7 +48,8 @@ class EstimatePublisher:
             offset: of that clock; stamps need it.
         """
         if tracking.mesh is not None and tracking.mesh_version != self._identity.mesh_version:
-            self._identity = estimate_messages.with_mesh(self._identity, tracking.mesh, tracking.mesh_version)
+            made = tracking.mesh, tracking.mesh_version, tracking.derived
+            self._identity = estimate_messages.with_mesh(self._identity, *made)
             # Numbered by itself, or a recorder would take the estimates in between for topologies that it missed.
             header = self._header(tracking.made_ns, host_clock, offset, tracking.mesh_version)
             self._topology_message = estimate_messages.topology(header, tracking.mesh, self._identity)

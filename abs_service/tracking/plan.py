@@ -1,19 +1,21 @@
 """The settings of one tracker's parts, and a tracker built from them on the first observation of its object."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
 
 from abs_service.pairing.observation import Observation
-from abs_service.tracker import status
+from abs_service.tracker import resolution, status
 from abs_service.tracker.appearance import with_appearance
 from abs_service.tracker.detection.initial_detection import InitialDetection
+from abs_service.tracker.detection.plausibility import ExtentError, warnings
 from abs_service.tracker.detection.regions.base import Region
 from abs_service.tracker.detection.templates import first_image
 from abs_service.tracker.detection.templates.base import ALL_SEEN, Sight, Template
 from abs_service.tracker.mesh import Mesh
-from abs_service.tracker.models.base import DeformationModel
+from abs_service.tracker.models.base import DeformationModel, HasDerived, ModelError
 from abs_service.tracker.objectives.base import Objective
 from abs_service.tracker.optimizers.base import Optimizer
 from abs_service.tracker.posterior.posterior import Posterior
@@ -90,7 +92,7 @@ class Plan:
         reference: sensor from whose depth image the initial mesh is built.
         model, region, synthesis, objective, optimizer: settings of the exchangeable parts.
         evaluations: maximum number of cost evaluations per frame.
-        vertices: approximate number of vertices of the mesh.
+        vertices: approximate number of vertices of the mesh; "auto": as many as the object's pixels resolve.
         priors, status, reinitialization, vertex_offsets: settings of the fixed parts.
         template: settings of the object's known shape.
         seed: seed of the search; equal seeds and frame sets result in equal estimates.
@@ -103,13 +105,18 @@ class Plan:
     objective: ObjectiveSettings
     optimizer: OptimizerSettings
     evaluations: int
-    vertices: int
+    vertices: resolution.Vertices
     priors: priors.Settings
     status: status.Settings
     reinitialization: loss_monitor.Settings
     vertex_offsets: VertexOffsetSettings = field(default_factory=VertexOffsetSettings)
     template: TemplateSettings = field(default_factory=first_image.Settings)
     seed: int = 0
+
+
+def build_template(settings: TemplateSettings, vertices: resolution.Vertices) -> Template:
+    """The template, whose mesh has a usual number of vertices if none is given."""
+    return settings.build(resolution.USUAL_VERTICES if vertices == "auto" else vertices)
 
 
 def make_posterior(
@@ -131,6 +138,17 @@ def make_posterior(
     return posterior, mesh
 
 
+def derived(plan: Plan, model: DeformationModel) -> Mapping[str, tuple[float, ...]]:
+    """Numbers in use that follow from the first image unless keys of the tracker give them, by key."""
+    parts = {"model": model, "objective": plan.objective}
+    found = {f"{part}.{key}": numbers for part, made in parts.items() for key, numbers in _derived(made).items()}
+    return {"mesh.vertices": (float(len(model.mesh.vertices)),), **found}
+
+
+def _derived(part: object) -> Mapping[str, tuple[float, ...]]:
+    return part.derived if isinstance(part, HasDerived) else {}
+
+
 def make_tracker(
     plan: Plan, template: Template, rig: Rig, detection: InitialDetection, observation: Observation
 ) -> tuple[Tracker, Mesh]:
@@ -138,9 +156,15 @@ def make_tracker(
 
     Raises:
         DetectionError: the model finds no object of its kind, or the template another one.
+        ExtentError: the model cannot be built from the object, which fills the image.
         ModelError: the model cannot be built from the object.
     """
-    model, sight = template.bind(plan.model, detection)
+    try:
+        model, sight = template.bind(plan.model, detection)
+    except ModelError as error:
+        if doubts := warnings(detection):
+            raise ExtentError(f"{', '.join(doubts)} The model cannot be made of it") from error
+        raise
     posterior, mesh = make_posterior(plan, rig, model, observation, sight)
     optimizer = plan.optimizer.build(posterior.dimension, np.random.default_rng(plan.seed))
     return Tracker(model, posterior, optimizer, plan.evaluations, plan.status, sight.registration_m), mesh

@@ -1,7 +1,7 @@
 """Preview of a tracker: selected pixels, mesh and classes of the mesh's rim."""
 
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from abs_service.pairing.images import DepthImage
 from abs_service.pairing.observation import Observation
 from abs_service.tracker.detection.initial_detection import DetectionError
-from abs_service.tracker.detection.plausibility import warnings
+from abs_service.tracker.detection.plausibility import ExtentError, warnings
 from abs_service.tracker.detection.regions.base import Region
 from abs_service.tracker.detection.segmentation import detect_object
 from abs_service.tracker.detection.templates.base import Template
@@ -17,7 +17,7 @@ from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import ModelError
 from abs_service.tracker.terms.depth.first_rim import classified_rim
 from abs_service.tracking.observer import Observer
-from abs_service.tracking.plan import Plan, make_tracker
+from abs_service.tracking.plan import Plan, build_template, derived, make_tracker
 from calib.camera import Camera
 from calib.rig import Rig
 from drivers.contract.frame import FrameSet
@@ -65,6 +65,7 @@ class Preview:
         found: the mesh made from them; None if there is none.
         reason: why the first depth image shows no object; "" if it does.
         warnings: doubts about the object, and why tracking would not begin with the status TRACKING.
+        derived: numbers that follow from this image unless keys give them, by key.
     """
 
     number: int
@@ -74,6 +75,7 @@ class Preview:
     found: FoundMesh | None
     reason: str
     warnings: tuple[str, ...] = ()
+    derived: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
 
 
 def preview(frame_sets: Iterable[FrameSet], rig: Rig, plan: Plan) -> Preview:
@@ -88,7 +90,8 @@ def preview(frame_sets: Iterable[FrameSet], rig: Rig, plan: Plan) -> Preview:
         PreviewError: the reference sensor delivers no depth image.
         ObservationError: the frames do not fit the rig.
     """
-    observer, region, template = Observer(rig), plan.region.build(), plan.template.build(plan.vertices)
+    observer, region = Observer(rig), plan.region.build()
+    template = build_template(plan.template, plan.vertices)
     first: Preview | None = None
     number = -1
     for number, frames in enumerate(frame_sets):
@@ -116,10 +119,11 @@ def _look(
         selected = np.isfinite(detection.distance)
         tracker, _ = make_tracker(plan, template, rig, detection, observation)
     except (DetectionError, ModelError) as error:
-        return Preview(number, camera, image.distance, selected, None, str(error))
+        doubts = (str(error),) if isinstance(error, ExtentError) else ()
+        return Preview(number, camera, image.distance, selected, None, str(error), doubts)
     model, first = tracker.model, tracker.track(observation, lambda: True)
     surface = model.deform(model.rest[None])
     rim, classes = classified_rim(camera, model.mesh, surface, detection.surroundings)
     found = FoundMesh(model.mesh, surface.vertices[0].T.astype(np.float64), rim.outer, classes)
     doubts = warnings(detection) + tuple(f"it would begin {first.status}: {reason}" for reason in first.reasons)
-    return Preview(number, camera, image.distance, selected, found, "", doubts)
+    return Preview(number, camera, image.distance, selected, found, "", doubts, derived(plan, model))

@@ -94,7 +94,7 @@ class OfflineTracker:
         mesh, version = self._tracking.mesh, self._tracking.mesh_version
         if mesh is None or version == self._identity.mesh_version:
             return
-        self._identity = estimate_messages.with_mesh(self._identity, mesh, version)
+        self._identity = estimate_messages.with_mesh(self._identity, mesh, version, self._tracking.derived)
         header = self._headers.at(self._tracking.made_ns, version, keys.RIG_FRAME)
         topology = estimate_messages.topology(header, mesh, self._identity)
         topic = f"/{keys.topology(self._name)}"

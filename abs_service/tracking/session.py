@@ -1,6 +1,6 @@
 """A tracker over time: initial detection, tracking, loss and renewed detection."""
 
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import replace
 from enum import Enum, auto
 from typing import NamedTuple
@@ -19,7 +19,7 @@ from abs_service.tracking.monitors import loss_monitor
 from abs_service.tracking.monitors.growth_monitor import LEAST_GROWTH, GrowthMonitor
 from abs_service.tracking.observer import Observer
 from abs_service.tracking.offsets.vertex_offsets import FixedOffsets, VertexOffsets
-from abs_service.tracking.plan import Plan, make_tracker
+from abs_service.tracking.plan import Plan, build_template, derived, make_tracker
 from calib.noise.base import ImageNoise
 from calib.rig import Rig, Sensor
 from drivers.contract.frame import FrameSet
@@ -73,7 +73,7 @@ class TrackingSession:
         self._rig = rig
         self._plan = plan
         self._region = self._configured = plan.region.build()
-        self._template = plan.template.build(plan.vertices)
+        self._template = build_template(plan.template, plan.vertices)
         self._observer = Observer(rig)
         self._tracker: Tracker | None = None
         self._vertex_offsets: VertexOffsets = FixedOffsets()
@@ -88,6 +88,11 @@ class TrackingSession:
     def model(self) -> DeformationModel | None:
         """The deformation model; None before the first detection."""
         return None if self._tracker is None else self._tracker.model
+
+    @property
+    def derived(self) -> Mapping[str, tuple[float, ...]]:
+        """Numbers that follow from the first image unless keys give them, by key; empty before the first detection."""
+        return {} if self._tracker is None else derived(self._plan, self._tracker.model)
 
     def track(self, frames: FrameSet, in_time: Callable[[], bool]) -> Estimate:
         """The estimate for a frame set.

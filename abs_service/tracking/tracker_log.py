@@ -33,6 +33,7 @@ class EstimateReport:
         age_ms: from the exposure to the publication [ms]; None offline.
         generations, evaluations: of the search.
         skipped: frame sets passed over before this one.
+        derived: numbers that follow from the first image unless a key gives them, by their key in the rig file.
         shares: what every sensor that contributed shows of the vertices.
     """
 
@@ -51,6 +52,7 @@ class EstimateReport:
     generations: int
     evaluations: int
     skipped: int
+    derived: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     shares: Mapping[str, SensorShares] = field(default_factory=dict)
 
     def as_dict(self) -> dict[str, Any]:
@@ -168,6 +170,7 @@ class TrackerLog:
             generations=state.generations,
             evaluations=state.evaluations,
             skipped=state.skipped,
+            derived={key: tuple(numbers.values) for key, numbers in state.derived.items()},
             shares={one.sensor: SensorShares.of(one) for one in state.sensors if not one.missing},
         )
         self.last, self.estimates, self.skipped = report, self.estimates + 1, self.skipped + report.skipped

@@ -3,10 +3,11 @@
 import functools
 import hashlib
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from absmsg.v1 import common_pb2, deformation_state_pb2, deformed_mesh_pb2
+from absmsg.v1.sensor_model_pb2 import NumberList
 from numpy.typing import NDArray
 
 from abs_service.pairing.observation import Source
@@ -45,6 +46,7 @@ class Identity:
         model_id: hash of model and mesh.
         calib_id: hash of the rig's calibration.
         mesh_version: counts the tracker's meshes.
+        derived: numbers that follow from the first image unless a key gives them, by key.
     """
 
     tracker: str
@@ -52,6 +54,7 @@ class Identity:
     model_id: str
     calib_id: str
     mesh_version: int
+    derived: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,12 +77,12 @@ class Effort:
     dropped: Mapping[str, int]
 
 
-def with_mesh(identity: Identity, mesh: Mesh, version: int) -> Identity:
+def with_mesh(identity: Identity, mesh: Mesh, version: int, derived: Mapping[str, tuple[float, ...]]) -> Identity:
     """The identity with a new mesh; `model_id` is equal where Θ means the same: same model, same undeformed mesh."""
     digest = hashlib.sha256(identity.model.encode())
     digest.update(mesh.vertices.astype("<f8").tobytes())
     digest.update(mesh.faces.astype("<i4").tobytes())
-    return replace(identity, model_id=digest.hexdigest()[:16], mesh_version=version)
+    return replace(identity, model_id=digest.hexdigest()[:16], mesh_version=version, derived=derived)
 
 
 def state(header: common_pb2.Header, estimate: Estimate, identity: Identity, effort: Effort) -> State:
@@ -116,6 +119,7 @@ def state(header: common_pb2.Header, estimate: Estimate, identity: Identity, eff
         folded_share=estimate.shape.folded_share,
         deviation_m=estimate.shape.deviation_m,
         warnings=estimate.warnings,
+        derived={key: NumberList(values=numbers) for key, numbers in identity.derived.items()},
     )
 
 

@@ -69,4 +69,10 @@ def draw(settings: config.ServiceConfig, name: str, path: Path, source: Source) 
         print(f"abs-service: note: {name} finds nothing to track: {seen.reason}", file=sys.stderr)
     for doubt in seen.warnings:
         print(f"abs-service: note: {name}: {doubt}", file=sys.stderr)
-    return f"wrote {own}"
+    numbers = ", ".join(f"{key} = {_toml(values)}" for key, values in seen.derived.items())
+    return f"wrote {own}" + (f"; {name} has {numbers}" if numbers else "")
+
+
+def _toml(numbers: tuple[float, ...]) -> str:
+    one, *others = (f"{number:g}" for number in numbers)
+    return f"[{', '.join((one, *others))}]" if others else one

@@ -63,7 +63,7 @@ def grid_mesh(detection: InitialDetection) -> Mesh:
     position_of = np.full(rows * columns, -1, np.int32)
     position_of[used] = np.arange(len(used), dtype=np.int32)
     unknown = np.full((len(used), 3), np.nan, np.float32)
-    mesh = Mesh(positions[used], position_of[faces], unknown, chart[used])
+    mesh = Mesh(positions[used], position_of[faces], unknown, chart[used], pixel_deviation=detection.deviation)
     sight = (positions[used] - camera.center) / at_grid[used, None]
     return replace(mesh, deviation=deviation[used] * np.abs(np.einsum("ni,ni->n", mesh.normals, sight)))
 

@@ -26,7 +26,7 @@ SCENE_MARGIN = 0.08
 
 
 class ExtentError(DetectionError):
-    """Impossible size of the object, or of everything in sight: the distances have the wrong unit."""
+    """Impossible extent of the object or of all in sight: the distances have the wrong unit, or the region is wrong."""
 
 
 def check_extent(points: NDArray[np.float64], what: str, largest: float, sensor: str) -> None:

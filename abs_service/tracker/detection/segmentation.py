@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from abs_service.pairing.images import ColorImage, DepthImage
 from abs_service.pairing.observation import Observation
+from abs_service.tracker import resolution
 from abs_service.tracker.detection.depth_view import DepthView
 from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection
 from abs_service.tracker.detection.plausibility import LARGEST_M, LARGEST_SCENE_M, MAX_POINTS, check_extent
@@ -14,9 +15,11 @@ from calib.rig import Rig
 
 
 def detect_object(
-    observation: Observation, rig: Rig, reference: str, region: Region, vertices: int
+    observation: Observation, rig: Rig, reference: str, region: Region, vertices: resolution.Vertices
 ) -> InitialDetection:
     """Segments the reference sensor's depth image by a region, for a mesh of about `vertices` vertices.
+
+    "auto" is as many as the object's pixels resolve.
 
     Raises:
         DetectionError: there is no depth image, or no object in it, or its size is impossible.
@@ -32,7 +35,8 @@ def detect_object(
     check_extent(view.points_r[inside], "the object", LARGEST_M, sensor.head)
     distance = np.where(inside, view.distance, np.nan).astype(np.float32)
     deviation = _median_deviation(sensor.noise, image, inside)
-    return InitialDetection(distance, sensor.camera, vertices, view.distance, deviation)
+    count = resolution.vertices(int(np.isfinite(distance).sum())) if vertices == "auto" else vertices
+    return InitialDetection(distance, sensor.camera, count, view.distance, deviation)
 
 
 def _median_deviation(noise: DepthNoise, image: DepthImage, inside: NDArray[np.bool_]) -> float:

@@ -1,7 +1,8 @@
 """Interface of deformation models, and the surfaces and Jacobians that they compute."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,6 +58,16 @@ class SparseJacobian:
 
 class ModelError(ValueError):
     """A model cannot be built from these settings and this mesh."""
+
+
+@runtime_checkable
+class HasDerived(Protocol):
+    """A part with numbers that follow from sensor and first image unless its keys give them."""
+
+    @property
+    def derived(self) -> Mapping[str, tuple[float, ...]]:
+        """These numbers, as they are in use, by key."""
+        ...
 
 
 class DeformationModel(Protocol):

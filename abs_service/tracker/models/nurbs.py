@@ -7,6 +7,7 @@ import numpy as np
 from annotated_types import Interval
 from numpy.typing import NDArray
 
+from abs_service.tracker import resolution
 from abs_service.tracker.detection.grid_mesh import grid_mesh
 from abs_service.tracker.detection.initial_detection import InitialDetection
 from abs_service.tracker.mesh import Mesh, edge_lengths
@@ -14,12 +15,6 @@ from abs_service.tracker.models.base import BOARD, ModelError, SparseJacobian, S
 from abs_service.tracker.models.parts import binding, spline
 from abs_service.tracker.models.parts.bspline_patches import Patches
 from calib.jit import kernel
-
-#: Knot spans along the long side of an object for `control_points = "auto"`.
-SPANS = 3
-
-#: Least number of cells of the mesh's grid in a span; fewer vertices do not determine its control points.
-MIN_CELLS = 3.0
 
 ControlPoints = Annotated[int, Interval(ge=3, le=12)]
 
@@ -30,9 +25,13 @@ class Settings:
 
     Attributes:
         control_points: numbers of control points along the object's long and short side; Θ has three values for each.
-            "auto": three knot spans along the long side, as many per length along the short side, fewer where the mesh
-            is too coarse for them.
-        degree: polynomial degree of the splines.
+            "auto": 1 to 3 knot spans along the long side, so that the mean square error of a frame is least for the
+            bend, the object's size, the number of vertices and the sensor's noise, and as many per length along the
+            short side; fewer where the mesh is too coarse for them.
+        degree: polynomial degree of the splines. "auto": 3, or less if a side has too few control points or cells of
+            the mesh for it.
+        bend_deg: angle between the normals of the two ends of the long side that the surface can follow, for
+            `control_points = "auto"`. A camera sees a sheet that is bent by up to half a turn from end to end.
         margin: share of the object's size by which the rest surface extends beyond it on every side.
         weights: weight of every control point, a table of as many rows and columns; a larger weight than that of the
             neighbours pulls the surface towards the point. Empty: all 1, a plain B-spline surface.
@@ -44,10 +43,11 @@ class Settings:
     has_offsets: ClassVar[bool] = True
 
     control_points: Literal["auto"] | tuple[ControlPoints, ControlPoints] = "auto"
-    degree: Annotated[int, Interval(ge=1, le=4)] = 3
+    degree: Literal["auto"] | Annotated[int, Interval(ge=1, le=4)] = "auto"
     weights: tuple[tuple[Annotated[float, Interval(gt=0, le=1000)], ...], ...] = ()
     margin: Annotated[float, Interval(gt=0, le=0.5)] = 0.08
     smoothing: Annotated[float, Interval(gt=0, le=1)] = 1e-3
+    bend_deg: Annotated[float, Interval(gt=0, le=1080)] = 180.0
 
     def __post_init__(self) -> None:
         if self.control_points == "auto":
@@ -83,30 +83,33 @@ class Settings:
                 a closed body.
         """
         binding.check_chart(mesh)
-        shape = derived_shape(mesh, self.degree) if self.control_points == "auto" else self.control_points
-        if min(shape) <= self.degree:
+        shape, degree = self.derived(mesh)
+        if min(shape) <= degree:
             raise ModelError(
-                f"control_points = {list(shape)} is too few for degree = {self.degree}: "
-                f"each direction needs at least {self.degree + 1}"
+                f"control_points = {list(shape)} is too few for degree = {degree}: "
+                f"each direction needs at least {degree + 1}"
             )
         weights = np.array(self.weights) if self.weights else np.ones(shape)
         u, w = binding.chart_parameters(mesh, self.margin)
-        control = binding.fit_control_points(mesh.vertices, u, w, weights, self.degree, self.smoothing)
-        u, w, offset = binding.bind(mesh.vertices, control, weights, self.degree, u, w)
-        return Nurbs(mesh, control, weights, self.degree, u, w, offset)
+        control = binding.fit_control_points(mesh.vertices, u, w, weights, degree, self.smoothing)
+        u, w, offset = binding.bind(mesh.vertices, control, weights, degree, u, w)
+        return Nurbs(mesh, control, weights, degree, u, w, offset)
+
+    def derived(self, mesh: Mesh) -> tuple[tuple[int, int], int]:
+        """Numbers of control points along the long and the short side of a mesh, and the degree of the splines."""
+        lengths, cells = _sides(mesh)
+        if self.control_points != "auto":
+            usual = min(resolution.CUBIC, min(self.control_points) - 1)
+            return self.control_points, usual if self.degree == "auto" else self.degree
+        degree = resolution.degree(cells) if self.degree == "auto" else self.degree
+        bend_rad, noise_m = np.deg2rad(self.bend_deg), mesh.pixel_deviation
+        along, across = resolution.spans(lengths, cells, len(mesh.vertices), noise_m, float(bend_rad), degree)
+        # Three control points are the least that a side may have.
+        return (max(along + degree, 3), max(across + degree, 3)), degree
 
 
-def derived_shape(mesh: Mesh, degree: int) -> tuple[int, int]:
-    """Numbers of control points along the long and the short side of a mesh, for `control_points = "auto"`."""
-    lengths, cells = _sides(mesh)
-    wanted = np.clip(np.round(SPANS * lengths / lengths.max()), 1, SPANS)
-    spans = np.clip(np.floor(cells / MIN_CELLS), 1, wanted).astype(int)
-    # Three control points are the least that a side may have.
-    return max(int(spans[0]) + degree, 3), max(int(spans[1]) + degree, 3)
-
-
-def _sides(mesh: Mesh) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Lengths (2,) of the mesh along the axes of its chart [m], and numbers (2,) of edges on them, both approximate."""
+def _sides(mesh: Mesh) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Lengths of the mesh along the axes of its chart [m], and numbers of edges on them, both approximate."""
     edges, size = mesh.edges, np.ptp(mesh.chart, axis=0)
     steps = np.abs(mesh.chart[edges[:, 1]] - mesh.chart[edges[:, 0]])
     lengths = edge_lengths(mesh.vertices, edges)
@@ -114,7 +117,9 @@ def _sides(mesh: Mesh) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     along = [own if own.any() else np.ones_like(own) for own in along]  # a mesh without edges along its chart
     step = np.array([np.median(steps[own, axis]) for axis, own in enumerate(along)])
     length = np.array([np.median(lengths[own]) for own in along])
-    return size / step * length, size / step
+    cells = size / step
+    along_m, across_m = (cells * length).tolist()
+    return (along_m, across_m), (float(cells[0]), float(cells[1]))
 
 
 def second_differences(rows: int, columns: int) -> NDArray[np.float64]:
@@ -134,6 +139,7 @@ class Nurbs:
         scales: ones (dim,), because every parameter is a length.
         roughness: second differences (k, dim) of the control points' displacements along u and w, and mixed ones.
         prior: none (0, dim).
+        derived: numbers of control points along the long and the short side, and degree, by their keys.
     """
 
     def __init__(
@@ -147,6 +153,7 @@ class Nurbs:
         offset: NDArray[np.float64],
     ):
         shape = control.shape[:2]
+        self.derived = {"control_points": tuple(map(float, shape)), "degree": (float(degree),)}
         span, self._span_control = spline.support(u, w, shape, degree)
         order = np.argsort(span, kind="stable")
         ordered = mesh.reordered(order)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.detection.initial_detection import InitialDetection
 from abs_service.tracker.mesh import Mesh
-from abs_service.tracker.models.base import DeformationModel, SparseJacobian, Surface
+from abs_service.tracker.models.base import DeformationModel, HasDerived, SparseJacobian, Surface
 from calib import pose
 from calib.jit import kernel, prange
 
@@ -66,10 +66,13 @@ class Posed:
         scales: the rotation [rad] that moves the farthest vertex by one metre, one metre, the shape's own.
         roughness: the shape's own.
         prior: the shape's own, then one row per rigid motion that the shape contains.
+        derived: numbers of the shape that follow from the first image, by their keys; empty if it has none.
     """
 
     def __init__(self, shape: DeformationModel):
         self.mesh = shape.mesh
+        known = shape.derived if isinstance(shape, HasDerived) else {}
+        self.derived = {f"shape.{key}": numbers for key, numbers in known.items()}
         self._shape = shape
         self._centroid = shape.mesh.vertices.mean(axis=0)
         radius = max(np.linalg.norm(shape.mesh.vertices - self._centroid, axis=1).max(), 1e-3)

@@ -1,5 +1,6 @@
 """The negative log-likelihood of all measurements under the sensors' own noise models (eqs. 16–22); no weights."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
@@ -44,10 +45,15 @@ class Settings:
     texture_registration_px: Annotated[float, Ge(0)] = 0.0
     outline_px: Literal["auto"] | Annotated[float, Interval(ge=0, le=3)] = "auto"
 
+    @property
+    def derived(self) -> Mapping[str, tuple[float, ...]]:
+        """Standard deviation of the outline in use [px], by its key."""
+        return {"outline_px": (OUTLINE_PX if self.outline_px == "auto" else self.outline_px,)}
+
     def build(self, rig: Rig, mesh: Mesh, synthesizer: Synthesizer) -> TermSum:
         """The likelihood of a mesh in a rig."""
         registration_noise = TextureRegistrationNoise(self.texture_registration_px)
-        outline_px = OUTLINE_PX if self.outline_px == "auto" else self.outline_px
+        outline_px = self.derived["outline_px"][0]
         terms: list[Term] = []
         for sensor in rig.sensors.values():
             comparison = Comparison(self.bounds(sensor), registration_noise, outline_px)

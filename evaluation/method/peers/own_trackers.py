@@ -1,7 +1,7 @@
 """Our own trackers on the peers' terms: the same template in its first pose, then depth images alone."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,7 +53,7 @@ class Setup:
 #: A search that never samples: what the descent alone is worth.
 DESCENT = hybrid.Settings(fallback_above=0.999, fallback_until=0.998)
 
-#: What the rows are called. By default, the sheet gets 6 × 5 control points of degree 3. 5 × 4 can bend to ±120° along
+#: What the rows are called. By default, the sheet gets 5 × 4 control points of degree 3. They can bend to ±120° along
 #: the long side without stretching (0.1 mm off); 4 × 4 of degree 2, the paper's, cannot (0.8 mm, and 3 % stretched).
 SETUPS: Mapping[str, Setup] = {
     "hybrid, NURBS by default": Setup("nurbs", hybrid.Settings()),
@@ -89,7 +89,7 @@ class Template:
             turned = Sheet(pose.from_rotation_vector(self.first.turn, self.first.center), *SIZE)
             settings = flexpad.Settings()
             return flexpad.FlexPad(turned, SIDE**2, settings.minimum_radius_m, settings.bend_deviation)
-        return self.setup.surface.of_mesh(template(self.first))
+        return self.setup.surface.of_mesh(replace(template(self.first), pixel_deviation=detection.deviation))
 
 
 def template(state: SheetState) -> Mesh:

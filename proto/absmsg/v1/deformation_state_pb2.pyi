@@ -1,4 +1,5 @@
 from absmsg.v1 import common_pb2 as _common_pb2
+from absmsg.v1 import sensor_model_pb2 as _sensor_model_pb2
 from google.protobuf.internal import containers as _containers
 from google.protobuf.internal import enum_type_wrapper as _enum_type_wrapper
 from google.protobuf import descriptor as _descriptor
@@ -9,7 +10,7 @@ from typing import ClassVar as _ClassVar, Optional as _Optional, Union as _Union
 DESCRIPTOR: _descriptor.FileDescriptor
 
 class DeformationState(_message.Message):
-    __slots__ = ("header", "tracker", "status", "reasons", "model", "model_id", "calib_id", "theta", "log_likelihood", "search_deviation", "generations", "evaluations", "solve_ms", "age_ms", "skipped", "mesh_version", "sensors", "inlier_share", "covariance", "covariance_valid", "samples", "clock_sigma_ns", "searcher", "stop", "budget_evaluations", "budget_ms", "stretch", "folded_share", "deviation_m", "warnings", "age_error_ms")
+    __slots__ = ("header", "tracker", "status", "reasons", "model", "model_id", "calib_id", "theta", "log_likelihood", "search_deviation", "generations", "evaluations", "solve_ms", "age_ms", "skipped", "mesh_version", "sensors", "inlier_share", "covariance", "covariance_valid", "samples", "clock_sigma_ns", "searcher", "stop", "budget_evaluations", "budget_ms", "stretch", "folded_share", "deviation_m", "warnings", "derived", "age_error_ms")
     class Status(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         STATUS_UNSPECIFIED: _ClassVar[DeformationState.Status]
@@ -81,6 +82,13 @@ class DeformationState(_message.Message):
         unexplained_share: float
         unexplained_at_first: float
         def __init__(self, sensor: _Optional[str] = ..., seq: _Optional[int] = ..., t_host_ns: _Optional[int] = ..., samples: _Optional[int] = ..., mean_log_likelihood: _Optional[float] = ..., normalized_residual: _Optional[float] = ..., missing: _Optional[bool] = ..., dropped: _Optional[int] = ..., visible: _Optional[int] = ..., occluded: _Optional[int] = ..., rim_visible: _Optional[int] = ..., rim_outside: _Optional[int] = ..., rim_inside: _Optional[int] = ..., rim_occluded: _Optional[int] = ..., agreeing_share: _Optional[float] = ..., disagreeing_share: _Optional[float] = ..., no_return_share: _Optional[float] = ..., occluder_share: _Optional[float] = ..., self_occluded_share: _Optional[float] = ..., outside_share: _Optional[float] = ..., unexplained_share: _Optional[float] = ..., unexplained_at_first: _Optional[float] = ...) -> None: ...
+    class DerivedEntry(_message.Message):
+        __slots__ = ("key", "value")
+        KEY_FIELD_NUMBER: _ClassVar[int]
+        VALUE_FIELD_NUMBER: _ClassVar[int]
+        key: str
+        value: _sensor_model_pb2.NumberList
+        def __init__(self, key: _Optional[str] = ..., value: _Optional[_Union[_sensor_model_pb2.NumberList, _Mapping]] = ...) -> None: ...
     HEADER_FIELD_NUMBER: _ClassVar[int]
     TRACKER_FIELD_NUMBER: _ClassVar[int]
     STATUS_FIELD_NUMBER: _ClassVar[int]
@@ -111,6 +119,7 @@ class DeformationState(_message.Message):
     FOLDED_SHARE_FIELD_NUMBER: _ClassVar[int]
     DEVIATION_M_FIELD_NUMBER: _ClassVar[int]
     WARNINGS_FIELD_NUMBER: _ClassVar[int]
+    DERIVED_FIELD_NUMBER: _ClassVar[int]
     AGE_ERROR_MS_FIELD_NUMBER: _ClassVar[int]
     header: _common_pb2.Header
     tracker: str
@@ -142,5 +151,6 @@ class DeformationState(_message.Message):
     folded_share: float
     deviation_m: float
     warnings: _containers.RepeatedScalarFieldContainer[str]
+    derived: _containers.MessageMap[str, _sensor_model_pb2.NumberList]
     age_error_ms: float
-    def __init__(self, header: _Optional[_Union[_common_pb2.Header, _Mapping]] = ..., tracker: _Optional[str] = ..., status: _Optional[_Union[DeformationState.Status, str]] = ..., reasons: _Optional[_Iterable[str]] = ..., model: _Optional[str] = ..., model_id: _Optional[str] = ..., calib_id: _Optional[str] = ..., theta: _Optional[_Iterable[float]] = ..., log_likelihood: _Optional[float] = ..., search_deviation: _Optional[float] = ..., generations: _Optional[int] = ..., evaluations: _Optional[int] = ..., solve_ms: _Optional[float] = ..., age_ms: _Optional[float] = ..., skipped: _Optional[int] = ..., mesh_version: _Optional[int] = ..., sensors: _Optional[_Iterable[_Union[DeformationState.Sensor, _Mapping]]] = ..., inlier_share: _Optional[float] = ..., covariance: _Optional[_Iterable[float]] = ..., covariance_valid: _Optional[bool] = ..., samples: _Optional[int] = ..., clock_sigma_ns: _Optional[int] = ..., searcher: _Optional[str] = ..., stop: _Optional[_Union[DeformationState.Stop, str]] = ..., budget_evaluations: _Optional[int] = ..., budget_ms: _Optional[float] = ..., stretch: _Optional[float] = ..., folded_share: _Optional[float] = ..., deviation_m: _Optional[float] = ..., warnings: _Optional[_Iterable[str]] = ..., age_error_ms: _Optional[float] = ...) -> None: ...
+    def __init__(self, header: _Optional[_Union[_common_pb2.Header, _Mapping]] = ..., tracker: _Optional[str] = ..., status: _Optional[_Union[DeformationState.Status, str]] = ..., reasons: _Optional[_Iterable[str]] = ..., model: _Optional[str] = ..., model_id: _Optional[str] = ..., calib_id: _Optional[str] = ..., theta: _Optional[_Iterable[float]] = ..., log_likelihood: _Optional[float] = ..., search_deviation: _Optional[float] = ..., generations: _Optional[int] = ..., evaluations: _Optional[int] = ..., solve_ms: _Optional[float] = ..., age_ms: _Optional[float] = ..., skipped: _Optional[int] = ..., mesh_version: _Optional[int] = ..., sensors: _Optional[_Iterable[_Union[DeformationState.Sensor, _Mapping]]] = ..., inlier_share: _Optional[float] = ..., covariance: _Optional[_Iterable[float]] = ..., covariance_valid: _Optional[bool] = ..., samples: _Optional[int] = ..., clock_sigma_ns: _Optional[int] = ..., searcher: _Optional[str] = ..., stop: _Optional[_Union[DeformationState.Stop, str]] = ..., budget_evaluations: _Optional[int] = ..., budget_ms: _Optional[float] = ..., stretch: _Optional[float] = ..., folded_share: _Optional[float] = ..., deviation_m: _Optional[float] = ..., warnings: _Optional[_Iterable[str]] = ..., derived: _Optional[_Mapping[str, _sensor_model_pb2.NumberList]] = ..., age_error_ms: _Optional[float] = ...) -> None: ...

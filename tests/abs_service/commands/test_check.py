@@ -45,7 +45,7 @@ def test_what_a_configuration_describes(checked, tmp_path):
         'describes rig "bench"',
         "device   sim: simulated://sheet?seed=1&sensors=tof",
         "sensor   tof: depth 176×144 16UC1 30 Hz, amplitude 176×144 16UC1 30 Hz; noise gaussian_polynomial",
-        "tracker  sheet: rigid from tof, 300 vertices; likelihood, hybrid, paced by tof/depth",
+        "tracker  sheet: rigid from tof, vertices by its size in the image; likelihood, hybrid, paced by tof/depth",
         "publishes abs/bench/sheet/state",
         "images: 3 MB/s sent, recorded 3",
         "connect to tcp/127.0.0.1:7447",

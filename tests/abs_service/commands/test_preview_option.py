@@ -61,7 +61,10 @@ def test_replay_draws_what_it_tracks_then(recording, tmp_path, capsys):
     assert cli.main(["replay", str(recording), *options]) == Exit.OK
     captured = capsys.readouterr()
     assert [json.loads(line)["status"] for line in captured.out.splitlines()] == ["TRACKING"] * 2
-    assert f"wrote {picture}\n" in captured.err
+    line = next(line for line in captured.err.splitlines() if line.startswith(f"wrote {picture}; sheet has "))
+    derived = json.loads(captured.out.splitlines()[0])["derived"]
+    assert f"mesh.vertices = {derived['mesh.vertices'][0]:.0f}, model.control_points = [" in line
+    assert line.endswith("model.degree = 3, objective.outline_px = 0.5")
     assert out.exists()
     assert size(picture) == (6 * 160 + LEGEND, 6 * 120 + LINE)
     for color in (CLASS_COLORS[RimClass.FREE], REGION, NO_RETURN):
@@ -94,7 +97,7 @@ def test_check_draws_what_a_simulated_device_shows(tmp_path, capsys):
     (tmp_path / "rig.toml").write_text(RIG)
     picture = tmp_path / "first.png"
     assert cli.main(["check", str(tmp_path / "rig.toml"), "--picture", str(picture)]) == Exit.OK
-    assert capsys.readouterr().out.endswith(f"wrote {picture}\n")
+    assert f"wrote {picture}; sheet has mesh.vertices = " in capsys.readouterr().out
     assert has(picture, REGION)
 
 

@@ -125,7 +125,7 @@ def test_one_json_object_per_estimate(recording, tmp_path, capsys):
         assert set(line) >= {*wanted, "generations", "evaluations"}
         assert (line["tracker"], line["seq"], line["status"], line["reasons"]) == ("sheet", k, "TRACKING", [])
         assert line["stamp"].startswith("2023-11-14T22:13:2")
-        assert len(line["theta"]) == 90
+        assert len(line["theta"]) == 60
         assert 0 < line["surface_mm"] <= line["error_mm"] < 3
         assert line["error_mm"] / 2 < line["vertex_sigma_mm"] < 4
         assert line["solve_ms"] > 0

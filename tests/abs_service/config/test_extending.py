@@ -41,10 +41,12 @@ reference = "tof/depth"
 [trackers.warm]
 sensors = ["tof", "thermal"]
 model = { type = "translation" }
+mesh = { vertices = 300 }
 
 [trackers.cold]
 sensors = ["tof"]
 model = { type = "translation" }
+mesh = { vertices = 300 }
 
 [record]
 """

@@ -115,11 +115,18 @@ def test_every_reason_to_stop_has_its_word(stop):
 
 
 def test_theta_of_another_mesh_or_model_has_another_id():
-    first = estimate_messages.with_mesh(IDENTITY, MESH, 1)
-    moved = estimate_messages.with_mesh(IDENTITY, replace(MESH, vertices=MESH.vertices + 1e-6), 2)
-    rigid = estimate_messages.with_mesh(replace(IDENTITY, model="rigid"), MESH, 1)
+    first = estimate_messages.with_mesh(IDENTITY, MESH, 1, {})
+    moved = estimate_messages.with_mesh(IDENTITY, replace(MESH, vertices=MESH.vertices + 1e-6), 2, {})
+    rigid = estimate_messages.with_mesh(replace(IDENTITY, model="rigid"), MESH, 1, {})
     assert len({first.model_id, moved.model_id, rigid.model_id}) == 3
     assert moved.mesh_version == 2
+
+
+def test_what_followed_from_the_first_image_is_published():
+    made = estimate_messages.with_mesh(IDENTITY, MESH, 1, {"model.control_points": (5.0, 4.0), "mesh.vertices": (3.0,)})
+    state = estimate_messages.state(Header(), ESTIMATE, made, Effort(1.0, 24.0, 2.0, 0.5, 0, {}))
+    assert list(state.derived["model.control_points"].values) == [5.0, 4.0]
+    assert list(state.derived["mesh.vertices"].values) == [3.0]
 
 
 def test_colors_travel_only_if_a_sensor_saw_some():

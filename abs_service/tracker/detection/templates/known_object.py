@@ -38,7 +38,8 @@ class KnownObject:
         if not isinstance(model, BindsToMesh):
             raise DetectionError("the model finds its object by itself and cannot be bound to a template")
         T_ro = register(self._samples, detection)
-        mesh = replace(self._mesh, vertices=pose.transform(T_ro, self._mesh.vertices))
+        vertices = pose.transform(T_ro, self._mesh.vertices)
+        mesh = replace(self._mesh, vertices=vertices, pixel_deviation=detection.deviation)
         if not self._samples.is_closed:
             mesh = _towards(detection.camera.center, mesh)
         return model.of_mesh(mesh), FirstSight(detection, self._paint, T_ro, registration_deviation(self._samples))

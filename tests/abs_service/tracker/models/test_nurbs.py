@@ -227,6 +227,27 @@ def test_control_points_follow_from_the_proportions_and_the_mesh(rows, columns, 
         assert len(Settings().of_mesh(one).rest) == 3 * shape[0] * shape[1]
 
 
+@pytest.mark.parametrize(
+    ("deviation", "bend", "shape"), [(1e-3, 180, (6, 5)), (5e-3, 180, (5, 4)), (5e-3, 360, (6, 5))]
+)
+def test_control_points_follow_from_noise_and_bend(deviation, bend, shape):
+    mesh = replace(sheet(17, 25, flat), pixel_deviation=deviation)
+    model = Settings(bend_deg=bend).of_mesh(mesh)
+    assert model.derived == {"control_points": shape, "degree": (3,)}
+    assert len(model.rest) == 3 * shape[0] * shape[1]
+
+
+@pytest.mark.parametrize(("given", "degree"), [((3, 3), 2), ((3, 6), 2), ((4, 4), 3), ((6, 6), 3)])
+def test_the_degree_follows_from_given_control_points(given, degree):
+    assert Settings(given).of_mesh(MESH).derived == {"control_points": given, "degree": (degree,)}
+
+
+def test_given_numbers_override_what_is_derived():
+    mesh = replace(sheet(17, 25, flat), pixel_deviation=5e-3)
+    assert Settings((4, 7), 2).of_mesh(mesh).derived == {"control_points": (4, 7), "degree": (2,)}
+    assert Settings(degree=2).of_mesh(mesh).derived["degree"] == (2,)
+
+
 @pytest.mark.parametrize("weights", [((1.0,) * 4,) * 3, ((1.0,) * 3,) * 4, ((1.0,) * 4, (1.0,) * 3) * 2])
 def test_weights_that_are_not_one_per_control_point_are_refused(weights):
     with pytest.raises(
