@@ -59,12 +59,13 @@ class RosNode:
             message: makes it.
             qos: of the topic, equal in every call.
         """
-        with self._lock:
-            if topic not in self._publishers:
-                self._publishers[topic] = self._declare(topic, name, qos)
-            publisher = self._publishers[topic]
-        if qos.transient_local or publisher.is_wanted():
-            publisher.put(cdr.serialized(message()), self._clock())
+        try:
+            publisher = self._publisher(topic, name, qos)
+            if qos.transient_local or publisher.is_wanted():
+                publisher.put(cdr.serialized(message()), self._clock())
+        except zenoh.ZError:
+            if not self._session.is_closed():  # what is on its way at the end is nobody's any more
+                raise
 
     def close(self) -> None:
         """Leaves the graph."""
@@ -77,6 +78,12 @@ class RosNode:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+    def _publisher(self, topic: str, name: str, qos: Qos) -> "_Publisher":
+        with self._lock:
+            if topic not in self._publishers:
+                self._publishers[topic] = self._declare(topic, name, qos)
+            return self._publishers[topic]
 
     def _declare(self, topic: str, name: str, qos: Qos) -> "_Publisher":
         type_hash = cdr.type_hash(name)

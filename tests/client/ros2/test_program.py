@@ -22,7 +22,7 @@ def started(*arguments, environment=None):
 def test_it_publishes_until_it_is_told_to_end(bus, endpoint, ros_router, number):
     router, session = ros_router
     with started("--endpoint", endpoint, "--router", router, environment={"ROS_DOMAIN_ID": "7"}) as process:
-        assert process.stdout.readline() == f"rig demo at {endpoint}: to ROS domain 7 at {router}\n"
+        assert next(iter(process.stdout or ())) == f"rig demo at {endpoint}: to ROS domain 7 at {router}\n"
         (token,) = [str(one.ok.key_expr) for one in session.liveliness().get("@ros2_lv/**") if one.ok]
         process.send_signal(number)
         output, errors = process.communicate(timeout=TIMEOUT_S)

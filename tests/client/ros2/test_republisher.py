@@ -5,6 +5,7 @@ import struct
 import threading
 import time
 from contextlib import ExitStack, contextmanager
+from typing import Any
 
 import numpy as np
 import pytest
@@ -46,7 +47,7 @@ class Listener:
         self._samples = queue.SimpleQueue()
         self._subscriber = session.declare_subscriber(self.key, self._samples.put)
 
-    def next(self):
+    def next(self) -> tuple[Any, int, int, bytes]:
         """A message, and sequence number, time and identity of its publisher."""
         one = self._samples.get(timeout=WAIT_S)
         number, time_ns, size, identity = struct.unpack("<qqB16s", one.attachment.to_bytes())
@@ -104,7 +105,7 @@ def test_depth_images_arrive_in_metres_along_the_axis_with_their_camera(bus, in_
     with imaging(bus):
         image, *_ = depth.next()
         camera, *_ = info.next()
-    radial = np.where(FRAME.data == FRAME.invalid, np.nan, FRAME.data * np.float32(FRAME.scale))
+    radial = np.where(FRAME.data == FRAME.invalid, np.nan, np.multiply(FRAME.data, FRAME.scale))
     v, u = np.mgrid[0:HEIGHT, 0:WIDTH]
     wanted = radial / np.hypot(1, np.hypot((u - WIDTH / 2) / WIDTH, (v - HEIGHT / 2) / WIDTH))
     np.testing.assert_allclose(image.data.view("<f4").reshape(HEIGHT, WIDTH), wanted, rtol=1e-5)
@@ -168,7 +169,8 @@ def test_poses_are_there_for_a_node_that_comes_later(bus, in_ros, ros_router):
     )
     one = samples.get(timeout=WAIT_S)
     late.undeclare()
-    (pose,) = TYPES.deserialize_cdr(one.payload.to_bytes(), "tf2_msgs/msg/TFMessage").transforms
+    message: Any = TYPES.deserialize_cdr(one.payload.to_bytes(), "tf2_msgs/msg/TFMessage")
+    (pose,) = message.transforms
     assert (pose.header.frame_id, pose.child_frame_id, pose.transform.rotation.w) == ("demo", "demo/tof", 1)
 
 
