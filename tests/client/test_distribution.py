@@ -38,7 +38,7 @@ def test_the_wheel_holds_the_client_and_the_messages_of_the_service(wheel):
     archive = zipfile.ZipFile(wheel)
     names = set(archive.namelist())
     assert {name.split("/")[0] for name in names if ".dist-info/" not in name} == {"abs_client", "absmsg"}
-    assert {"abs_client/py.typed", "absmsg/py.typed"} <= names
+    assert {"abs_client/py.typed", "abs_client/web/page.html", "absmsg/py.typed"} <= names
     for path in (ROOT / "proto").rglob("*_pb2.py"):
         assert archive.read(str(path.relative_to(ROOT / "proto"))) == path.read_bytes()
 
@@ -58,7 +58,7 @@ def test_what_the_client_imports_is_required():
     own = {"abs_client", "absmsg", "pytest", *sys.stdlib_module_names}
     needed = {"foxglove_schemas_protobuf", "google", "numpy", "zenoh"}
     assert {name.split(".")[0] for name in named} - own == needed | EXTRAS
-    assert EXTRAS == {"rosbags", "xxhash"}
+    assert {"rosbags", "xxhash"} == EXTRAS
 
 
 @pytest.mark.slow
