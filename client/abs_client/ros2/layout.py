@@ -1,6 +1,6 @@
 """Keys, liveliness tokens and attachments of rmw_zenoh, as its releases from 0.2.4 on write and read them.
 
-Source: `docs/design.md`, `liveliness_utils.cpp` and `attachment_helpers.cpp` of ros2/rmw_zenoh, branch jazzy.
+Source: `design.md`, `liveliness_utils.cpp` and `attachment_helpers.cpp` of ros2/rmw_zenoh, branch jazzy.
 """
 
 import re
@@ -83,7 +83,7 @@ def gid(token: str) -> bytes:
 
 
 def attachment(sequence_number: int, time_ns: int, identity: bytes) -> bytes:
-    """What a message has with it.
+    """The bytes that travel beside a message.
 
     Args:
         sequence_number: of the message, the first has 1.

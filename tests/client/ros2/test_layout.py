@@ -1,6 +1,6 @@
 """Keys, tokens and attachments, byte for byte as rmw_zenoh's documents and source have them.
 
-Keys and tokens are the examples of docs/design.md (branch jazzy). Identities are what `simplified_xxhash3.cpp` of that
+Keys and tokens are the examples of design.md (branch jazzy). Identities are what `simplified_xxhash3.cpp` of that
 repository, compiled, made of the tokens. Type hashes are those that other implementations list for these types.
 """
 

@@ -1,4 +1,4 @@
-"""What arrives of a rig, as ROS messages."""
+"""Messages of a rig as ROS messages."""
 
 import numpy as np
 import pytest
