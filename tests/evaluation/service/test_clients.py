@@ -35,4 +35,4 @@ def test_every_program_receives(monkeypatch):
     found = clients.run(clients.Settings(duration_s=1.0), Context(1))
     assert {"Python, abs_client", "Python, zenoh", "ROS 2's layout, abs-ros2"} <= found.values.keys()
     assert all(len(ages) > 10 and 0 < np.median(ages) < 5000 for ages in found.values.values())
-    assert len(found.sections[0].body[0].rows) == len(found.values)
+    assert len(found.sections[0].blocks[0].rows) == len(found.values)
