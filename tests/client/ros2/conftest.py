@@ -2,12 +2,14 @@
 
 import json
 import socket
+from importlib.util import find_spec
 
 import pytest
 import zenoh
 
-pytest.importorskip("rosbags", reason="needs rosbags: make all")
-pytest.importorskip("xxhash", reason="needs xxhash: make all")
+MISSING = [name for name in ("rosbags", "xxhash") if find_spec(name) is None]
+#: Without the client's extra there is nothing here to test; `make all` installs it, so CI always has it.
+collect_ignore_glob = ["test_*.py"] if MISSING else []
 
 
 @pytest.fixture
