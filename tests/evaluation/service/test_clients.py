@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from abs_service.report.content import Table
 from evaluation.experiment import Context
 from evaluation.service import clients
 from evaluation.service.clients.programs import Program, ages_ms
@@ -35,4 +36,6 @@ def test_every_program_receives(monkeypatch):
     found = clients.run(clients.Settings(duration_s=1.0), Context(1))
     assert {"Python, abs_client", "Python, zenoh", "ROS 2's layout, abs-ros2"} <= found.values.keys()
     assert all(len(ages) > 10 and 0 < np.median(ages) < 5000 for ages in found.values.values())
-    assert len(found.sections[0].blocks[0].rows) == len(found.values)
+    table = found.sections[0].blocks[0]
+    assert isinstance(table, Table)
+    assert [row[0] for row in table.rows] == list(found.values)
