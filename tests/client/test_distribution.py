@@ -17,11 +17,12 @@ import abs_service
 ROOT = Path(__file__).parents[2]
 SERVICE = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
 CLIENT = tomllib.loads((ROOT / "client" / "pyproject.toml").read_text("utf-8"))["project"]
+EXTRAS = {Requirement(line).name for lines in CLIENT["optional-dependencies"].values() for line in lines}
 NEEDED = sorted(Requirement(line).name for line in CLIENT["dependencies"])
 IMPORTS = """
 import sys
 import abs_client, abs_client.pytest_plugin
-heavy = {"abs_service", "calib", "cv2", "drivers", "llvmlite", "matplotlib", "numba", "pydantic", "scipy"}
+heavy = {"abs_service", "calib", "cv2", "drivers", "llvmlite", "matplotlib", "numba", "pydantic", "rosbags", "scipy"}
 print(sorted(heavy & set(sys.modules)), abs_client.__file__)
 """
 
@@ -37,7 +38,7 @@ def test_the_wheel_holds_the_client_and_the_messages_of_the_service(wheel):
     archive = zipfile.ZipFile(wheel)
     names = set(archive.namelist())
     assert {name.split("/")[0] for name in names if ".dist-info/" not in name} == {"abs_client", "absmsg"}
-    assert {"abs_client/py.typed", "absmsg/py.typed"} <= names
+    assert {"abs_client/py.typed", "abs_client/web/page.html", "absmsg/py.typed"} <= names
     for path in (ROOT / "proto").rglob("*_pb2.py"):
         assert archive.read(str(path.relative_to(ROOT / "proto"))) == path.read_bytes()
 
@@ -55,7 +56,9 @@ def test_what_the_client_imports_is_required():
     plain = {alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names}
     named = plain | {node.module or "" for node in nodes if isinstance(node, ast.ImportFrom)}
     own = {"abs_client", "absmsg", "pytest", *sys.stdlib_module_names}
-    assert {name.split(".")[0] for name in named} - own == {"foxglove_schemas_protobuf", "google", "numpy", "zenoh"}
+    needed = {"foxglove_schemas_protobuf", "google", "numpy", "zenoh"}
+    assert {name.split(".")[0] for name in named} - own == needed | EXTRAS
+    assert {"rosbags", "xxhash"} == EXTRAS
 
 
 @pytest.mark.slow

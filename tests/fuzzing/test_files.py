@@ -17,7 +17,7 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
 from abs_service.calibration.files import exchange, target_file
-from abs_service.commands.images import camera_file
+from abs_service.commands.images import camera_file, open3d_folder
 from abs_service.config import ConfigError, load, load_calibration
 from abs_service.export import viewers
 from abs_service.export.errors import ExportError
@@ -43,6 +43,7 @@ PARTS = (
 )
 SUFFIXES = (".png", ".jpg", ".tiff", ".pgm", ".bmp", ".webp")
 CAMERA = Camera(640, 480, 500.0, 501.0, 319.5, 239.5)
+INTRINSICS = b'{"width": 4, "height": 3, "intrinsic_matrix": [4, 0, 0, 0, 4, 0, 1.5, 1, 1], "depth_scale": 1000}'
 FORMATS = ("kalibr", "ros", "opencv", "depthai", "mrcal")
 
 
@@ -105,6 +106,7 @@ TARGETS = (
     Target("configuration", RIG, load, (ConfigError,)),
     Target("calibration", CALIBRATION + TABLE, load_calibration, (ConfigError,)),
     Target("camera file", b"[depth]\n" + TABLE, camera_file.load, (camera_file.CameraFileError,)),
+    Target("intrinsics of Open3D", INTRINSICS, open3d_folder.read, (camera_file.CameraFileError,)),
     Target("board", BOARD, target_file.read, (target_file.TargetFileError,)),
     Target("noise maps", npz(), lambda path: maps.load(path, set()), (NoiseError,)),
     Target("recording", recording(), replayed, (DeviceError,)),

@@ -4,6 +4,7 @@
   abs-service import data/cloth --layout pairs --camera cloth.toml --depth 'd*.png' --color 'c*.jpg' --out cloth.mcap
   abs-service import data/cloth --layout pairs --camera cloth.toml --frames 200:319 --out cloth.mcap
   abs-service import rgbd_dataset_freiburg1_xyz --layout tum --out xyz.mcap
+  abs-service import dataset/realsense --layout open3d --out scan.mcap
   abs-service import kinect.mkv --layout azure --out kinect.mcap
 
 Recordings of other programs bring their own calibration: `azure` (Azure Kinect, MKV), `o3r` (ifm O3R, buffers of its
@@ -12,11 +13,14 @@ See docs/how-to/devices.md.
 
 Folders hold images. Layout `pairs`: images of one exposure share the last number in their names. They carry no time, so
 the recording begins in 1970. Layout `tum`: the lists depth.txt and rgb.txt of the TUM RGB-D benchmark name the images
-and their times. --frames 200:319 takes a part, both ends included; 200:319:5 every fifth; 7,9,20: has several ranges.
-Numbers are those in the names (`pairs`) or count the lines of depth.txt from 0 (`tum`).
+and their times. Layout `open3d`: what Open3D's recorders write, with color/, depth/ and camera_intrinsic.json or
+intrinsic.json; like `pairs`, without times. --frames 200:319 takes a part, both ends included; 200:319:5 every fifth;
+7,9,20: has several ranges. Numbers are those in the names (`pairs`, `open3d`) or count the lines of depth.txt from 0
+(`tum`).
 
-Depth images have one channel of 16 bits, in millimetres (`pairs`) or 1/5000 m (`tum`), colour images have 8 bits. The
-camera file says what took them; without a table `color` in it there are no colour images:
+Depth images have one channel of 16 bits, in millimetres (`pairs`; `open3d` if its file does not tell) or 1/5000 m
+(`tum`), colour images have 8 bits. The camera file says what took them; without a table `color` in it there are no
+colour images:
 
   [depth]
   width = 320
@@ -39,7 +43,7 @@ import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from abs_service.commands.images import camera_file, frame_numbers, import_file
+from abs_service.commands.images import camera_file, frame_numbers, import_file, open3d_folder
 from abs_service.commands.images.camera_file import CameraFile
 from abs_service.supervision.exit_codes import Exit
 from calib.files import limited, nested
@@ -50,7 +54,9 @@ from drivers.image_folder.listing import ImageFile, ImageFolderError, by_list, b
 from drivers.opening import open_recording
 
 #: Metres per unit of depth images whose camera file does not tell.
-DEPTH_SCALES = {"pairs": 0.001, "tum": 1 / 5000}
+DEPTH_SCALES = {"open3d": 0.001, "pairs": 0.001, "tum": 1 / 5000}
+#: Depth and colour images of the layouts whose images are numbered.
+PATTERNS = {"open3d": ("depth/*.png", "color/*"), "pairs": ("depth_*.png", "color_*.png")}
 #: Layouts that are one file and know their cameras.
 RECORDINGS = ("azure", "o3r", "oak", "realsense", "ros2")
 
@@ -66,19 +72,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out", type=Path, required=True, metavar="FILE.mcap", help="recording to write; must not exist"
     )
-    parser.add_argument("--camera", type=Path, metavar="FILE", help="camera file, TOML or JSON (pairs; tum: optional)")
-    parser.add_argument("--depth", default="depth_*.png", metavar="GLOB", help="depth images (pairs; %(default)s)")
-    parser.add_argument("--color", default="color_*.png", metavar="GLOB", help="colour images (pairs; %(default)s)")
+    parser.add_argument(
+        "--camera", type=Path, metavar="FILE", help="camera file, TOML or JSON (pairs; tum, open3d: optional)"
+    )
+    parser.add_argument("--depth", metavar="GLOB", help="depth images (pairs: depth_*.png, open3d: depth/*.png)")
+    parser.add_argument("--color", metavar="GLOB", help="colour images (pairs: color_*.png, open3d: color/*)")
     parser.add_argument("--mask", metavar="GLOB", help="images, black or transparent where depth is left out (pairs)")
     parser.add_argument(
-        "--rate", type=_rate, default=30.0, metavar="HZ", help="exposures per second (pairs; %(default)g)"
+        "--rate", type=_rate, default=30.0, metavar="HZ", help="exposures per second (pairs, open3d; %(default)g)"
     )
     parser.add_argument(
         "--frames",
         type=frame_numbers.parse,
         default=frame_numbers.ALL,
         metavar="FIRST:LAST[:STEP]",
-        help="numbers of the exposures to import (pairs, tum; default: all)",
+        help="numbers of the exposures to import (pairs, open3d, tum; default: all)",
     )
     parser.add_argument("--rig", type=Path, metavar="FILE", help="configuration to attach, for a replay without one")
 
@@ -120,6 +128,8 @@ def _cameras(arguments: argparse.Namespace) -> CameraFile:
         return camera_file.load(arguments.camera)
     if arguments.layout == "tum":
         return camera_file.TUM
+    if arguments.layout == "open3d":
+        return open3d_folder.load(arguments.path)
     raise ImportOptionError("--camera: layout pairs needs a camera file; `abs-service import --help` shows one")
 
 
@@ -139,14 +149,16 @@ def _rig(path: Path | None) -> bytes:
 
 def _streams(arguments: argparse.Namespace, cameras: CameraFile) -> Mapping[str, Images]:
     """The images to import, by sensor name."""
-    numbered = arguments.layout == "pairs"
-    if arguments.mask is not None and not numbered:
+    numbered = arguments.layout in PATTERNS
+    if arguments.mask is not None and arguments.layout != "pairs":
         raise ImportOptionError("--mask: only layout pairs has masks")
     folder, rate = arguments.path, arguments.rate
     if not folder.is_dir():
         raise ImageFolderError(f"{folder}: no such folder")
     depth = cameras.depth
-    files = arguments.frames.of(by_number(folder, arguments.depth, rate) if numbered else by_list(folder, "depth.txt"))
+    depth_names, color_names = PATTERNS.get(arguments.layout, ("", ""))
+    depth_names, color_names = arguments.depth or depth_names, arguments.color or color_names
+    files = arguments.frames.of(by_number(folder, depth_names, rate) if numbered else by_list(folder, "depth.txt"))
     streams: dict[str, Images] = {
         "depth": DepthImages(
             files=files,
@@ -158,7 +170,7 @@ def _streams(arguments: argparse.Namespace, cameras: CameraFile) -> Mapping[str,
         )
     }
     if cameras.color is not None:
-        colors = by_number(folder, arguments.color, rate) if numbered else by_list(folder, "rgb.txt")
+        colors = by_number(folder, color_names, rate) if numbered else by_list(folder, "rgb.txt")
         if numbered:
             colors = arguments.frames.of(colors)
         elif arguments.frames is not frame_numbers.ALL:

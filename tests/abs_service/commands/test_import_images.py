@@ -107,6 +107,49 @@ def test_a_benchmark_sequence_needs_no_camera_file(tmp_path: Path) -> None:
     assert Recording(tmp_path / "out.mcap").cameras["depth"].fx == 525
 
 
+def open3d(folder: Path, name: str, **changes: object) -> list[str]:
+    """A folder as Open3D's recorders write it; the arguments that import it."""
+    for sensor, image in (("depth/000007.png", np.full((3, 4), 2000, np.uint16)), ("color/000007.jpg", None)):
+        (folder / sensor).parent.mkdir()
+        cv2.imwrite(str(folder / sensor), np.zeros((3, 4, 3), np.uint8) if image is None else image)
+    matrix = [4.0, 0, 0, 0, 5.0, 0, 1.5, 1.0, 1]  # column by column
+    given = {"width": 4, "height": 3, "intrinsic_matrix": matrix, "serial_number": "1"} | changes
+    (folder / name).write_text(json.dumps(given))
+    return ["import", str(folder), "--layout", "open3d", "--out", str(folder / "out.mcap")]
+
+
+@pytest.mark.parametrize(
+    ("name", "changes", "metres"),
+    [("camera_intrinsic.json", {}, 2.0), ("intrinsic.json", {"depth_scale": 4000.0, "fps": 30.0}, 0.5)],
+)
+def test_a_folder_of_open3d_brings_its_camera(tmp_path: Path, name, changes, metres) -> None:
+    assert cli.main(open3d(tmp_path, name, **changes)) == Exit.OK
+    depth, color = frames_of(tmp_path / "out.mcap")
+    assert (depth.si()[0, 0], depth.seq, depth.kind, color.kind) == (metres, 7, Kind.DEPTH, Kind.COLOR)
+    cameras = Recording(tmp_path / "out.mcap").cameras
+    for camera in (cameras["depth"], cameras["color"]):
+        assert (camera.fx, camera.fy, camera.cx, camera.cy, camera.lens.is_pinhole) == (4, 5, 1.5, 1, True)
+
+
+@pytest.mark.parametrize(
+    ("changes", "complaint"),
+    [
+        ({"intrinsic_matrix": [1, 2]}, "camera_intrinsic.json:\n  intrinsic_matrix"),
+        ({"depth_scale": 0}, "camera_intrinsic.json:\n  depth_scale"),
+        ({"width": None}, "camera_intrinsic.json:\n  width"),
+    ],
+)
+def test_wrong_intrinsics_of_open3d_are_named(tmp_path: Path, capsys, changes, complaint) -> None:
+    assert cli.main(open3d(tmp_path, "camera_intrinsic.json", **changes)) == Exit.USER
+    assert complaint in capsys.readouterr().err
+
+
+def test_a_folder_of_open3d_without_intrinsics_is_refused(tmp_path: Path, capsys) -> None:
+    arguments = open3d(tmp_path, "other.json")
+    assert cli.main(arguments) == Exit.USER
+    assert "has neither camera_intrinsic.json nor intrinsic.json" in capsys.readouterr().err
+
+
 def test_a_recording_of_another_program_brings_its_calibration(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
