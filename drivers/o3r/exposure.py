@@ -31,7 +31,7 @@ _INVALID = {Kind.DEPTH: 0.0, Kind.DEVIATION: 0.0, Kind.AMPLITUDE: -1.0}
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Exposure:
-    """What one message contains.
+    """Contents of one message.
 
     Attributes:
         number: of the exposure, counted by the head.

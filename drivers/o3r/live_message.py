@@ -44,7 +44,7 @@ def decoded(ifm3d: Any, message: Any) -> Exposure:
 
 
 def _digits(lengths: NDArray[Any], distance_m: float) -> NDArray[np.uint16]:
-    """What the head sent: ifm3d multiplies it with the step [m]. Half the bytes, and nothing is lost."""
+    """Digits as the head sent them: ifm3d multiplies them by the step [m]. Half the bytes, and nothing is lost."""
     return np.rint(lengths / np.float32(distance_m)).astype("<u2")
 
 
