@@ -13,6 +13,7 @@ from drivers.contract.capabilities import Capabilities, StreamInfo
 from drivers.contract.clock import DeviceClock
 from drivers.contract.controls import Controls
 from drivers.contract.device import DeviceError, DeviceInfo, DeviceState, Sink
+from drivers.contract.frame import Frame, Kind
 from drivers.contract.frame_gate import FrameGate
 from drivers.contract.frame_queue import FrameQueue
 from drivers.o3r import live_message
@@ -47,11 +48,7 @@ class O3rDevice:
         self._link = link
         self._clock = clock
         self._calib_id = first.camera.calib_id
-        streams = tuple(
-            StreamInfo(*frame.key, frame.kind, frame.encoding, width, height, link.head.rate_hz, CLOCK)
-            for frame in first.frames(self._calib_id, link.head.mode)
-            for height, width in [frame.data.shape]
-        )
+        streams = tuple(_info(frame, link.head.rate_hz) for frame in first.frames(self._calib_id, link.head.mode))
         self.capabilities = Capabilities(streams)
         self._gate = FrameGate(streams, causes=["missing", "overrun", "undecodable"])
         self._lock = threading.RLock()
@@ -140,3 +137,10 @@ class O3rDevice:
         times = {"t_host_ns": stamp.t_host_ns, "t_sigma_ns": stamp.t_sigma_ns, "t_arrival_ns": t_arrival_ns}
         for frame in frames:
             self._gate.deliver(replace(frame, **times, epoch=self._gate.epoch))
+
+
+def _info(frame: Frame, rate_hz: float) -> StreamInfo:
+    height, width = frame.data.shape
+    # Flags are no measurements, and how deviations come about is the head's affair: both may repeat.
+    noisy = frame.kind in {Kind.DEPTH, Kind.AMPLITUDE}
+    return StreamInfo(*frame.key, frame.kind, frame.encoding, width, height, rate_hz, CLOCK, noisy)

@@ -84,6 +84,8 @@ def test_points_are_those_that_ifm3d_computes_for_the_user(unit: UnitProcess) ->
 def test_every_stream_tells_what_the_head_measured(unit: UnitProcess) -> None:
     device, sink = open_device(unit.uri(), time.monotonic_ns), RecordingSink()
     assert (device.info.model, device.info.serial, device.info.firmware) == ("ifm O3R222", SERIALS[0], "1.4.30")
+    may_repeat = {stream.stream for stream in device.capabilities.streams if not stream.noisy}
+    assert may_repeat == {"deviation", "confidence"}
     device.start(sink)
     sink.wait(lambda: len(sink.frames) >= 40)
     device.close()
