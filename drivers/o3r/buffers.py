@@ -2,28 +2,28 @@
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from calib.camera import Camera
 from calib.files import limited
-from drivers.contract.frame import ENCODINGS, Frame, Geometry, Kind
+from drivers.contract.frame import Frame
 from drivers.encoding.foreign_recording import ForeignRecordingError
 from drivers.o3r import tof_info
 from drivers.o3r.chunks import Chunk, ChunkError, ChunkType, messages
-from drivers.o3r.tof_info import TofInfo
+from drivers.o3r.exposure import SENSOR, Exposure
 
 #: Largest file, which is read as a whole [bytes].
 LARGEST = 1 << 32
 
-#: Name of the only sensor.
-SENSOR = "depth"
-
-#: Kind and chunk of the other images, by stream name.
-_STREAMS: Mapping[str, tuple[Kind, ChunkType]] = {
-    "deviation": (Kind.DEVIATION, ChunkType.DISTANCE_NOISE),
-    "amplitude": (Kind.AMPLITUDE, ChunkType.NORMALIZED_AMPLITUDE),
-    "confidence": (Kind.CONFIDENCE, ChunkType.CONFIDENCE),
+#: Chunk of the images, by stream name.
+_STREAMS: Mapping[str, ChunkType] = {
+    "depth": ChunkType.DISTANCE,
+    "deviation": ChunkType.DISTANCE_NOISE,
+    "amplitude": ChunkType.NORMALIZED_AMPLITUDE,
+    "confidence": ChunkType.CONFIDENCE,
 }
 
 _NEEDED = (ChunkType.DISTANCE, ChunkType.TOF_INFO)
@@ -50,67 +50,39 @@ class O3rBuffers:
             lacking = [kind.name for chunks in self._exposures for kind in _NEEDED if kind not in chunks]
             if lacking or not self._exposures:
                 raise ChunkError(f"there is no chunk {lacking[0] if lacking else 'at all'}")
-            first = self._exposures[0]
-            distance = first[ChunkType.DISTANCE]
-            camera = _info(first).camera(distance.width, distance.height)
+            camera = exposure(self._exposures[0]).camera
         except OSError as error:
             raise ForeignRecordingError(f"{path}: cannot be read: {error.strerror}") from error
         except ChunkError as error:
             raise ForeignRecordingError(f"{path}: {error}") from error
         self.cameras: Mapping[str, Camera] = {SENSOR: camera}
-        images = {ChunkType.DISTANCE, *(chunk for _, chunk in _STREAMS.values())}
-        self.total = sum(len(images & chunks.keys()) for chunks in self._exposures)
+        self.total = sum(len(set(_STREAMS.values()) & chunks.keys()) for chunks in self._exposures)
 
     def frames(self) -> Iterator[Frame]:
         """All images; those of one exposure share sequence number and time."""
         try:
             for chunks in self._exposures:
-                yield from exposure(chunks, self.cameras[SENSOR].calib_id)
+                yield from exposure(chunks).frames(self.cameras[SENSOR].calib_id)
         except ChunkError as error:
             raise ForeignRecordingError(f"{self._path}: {error}") from error
 
 
-def exposure(chunks: Mapping[int, Chunk], calib_id: str) -> Iterator[Frame]:
-    """Frames of one message with distances and TOF_INFO.
+def exposure(chunks: Mapping[int, Chunk]) -> Exposure:
+    """Exposure of one message with distances and TOF_INFO.
 
     Raises:
         ChunkError: a malformed chunk.
     """
-    info = _info(chunks)
-    yield _frame(chunks[ChunkType.DISTANCE], "depth", Kind.DEPTH, info, calib_id)
-    for stream, (kind, chunk) in _STREAMS.items():
-        if chunk in chunks:
-            yield _frame(chunks[chunk], stream, kind, info, calib_id)
+    distance, info = chunks[ChunkType.DISTANCE], tof_info.parse(bytes(chunks[ChunkType.TOF_INFO].content))
+    images = {stream: chunks[kind].image() for stream, kind in _STREAMS.items() if kind in chunks}
+    if "amplitude" in images:
+        images["amplitude"] = _amplitudes(images["amplitude"], info.amplitude)
+    return Exposure(distance.frame, distance.time_ns, info, images)
 
 
-def _info(chunks: Mapping[int, Chunk]) -> TofInfo:
-    return tof_info.parse(bytes(chunks[ChunkType.TOF_INFO].content))
-
-
-def _frame(chunk: Chunk, stream: str, kind: Kind, info: TofInfo, calib_id: str) -> Frame:
-    encodings = ("16UC1", "32FC1") if kind != Kind.CONFIDENCE else ("mono8", "mono16")
-    image = chunk.image()
-    encoding = next((name for name in encodings if ENCODINGS[name][0] == image.dtype), "")
-    if not encoding:
-        raise ChunkError(f"chunk {chunk.type}: {stream} must be one of {encodings}, not {image.dtype}")
-    is_length, digits = kind in {Kind.DEPTH, Kind.DEVIATION}, np.issubdtype(image.dtype, np.integer)
-    scale = {Kind.DEPTH: info.distance_m, Kind.DEVIATION: info.distance_m, Kind.AMPLITUDE: info.amplitude}
-    return Frame(
-        sensor=SENSOR,
-        stream=stream,
-        kind=kind,
-        data=image,
-        encoding=encoding,
-        t_host_ns=chunk.time_ns,
-        t_arrival_ns=chunk.time_ns,
-        seq=chunk.frame,
-        scale=scale.get(kind, 1.0) if digits else 1.0,
-        geometry=Geometry.RADIAL if kind == Kind.DEPTH else Geometry.NONE,
-        invalid=0.0 if is_length else None,
-        t_device_ticks=chunk.time_ns,
-        tick_hz=1e9,
-        clock_domain="o3r",
-        exposure_s=info.exposure_s,
-        temperature_c=info.temperature_c,
-        calib_id=calib_id,
-    )
+def _amplitudes(image: NDArray[Any], step: float) -> NDArray[np.float32]:
+    """Amplitudes from digits, which are one more than their roots; 0 means none, which becomes -1. Source: ifm3d."""
+    if not np.issubdtype(image.dtype, np.integer):
+        return image
+    root = image.astype(np.float32) - np.float32(1.0)
+    return np.where(root >= 0, root * root * np.float32(step), np.float32(-1.0))

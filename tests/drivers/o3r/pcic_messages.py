@@ -5,6 +5,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+#: fx, fy, mx, my of one without distortion, and its skew.
+PINHOLE = (9.0, 8.0, 4.5, 3.25, 0.0)
 #: fx, fy, mx, my, skew, k1, k2, p1, p2, k3 of a head with 8 × 6 pixels.
 LENS = (9.0, 8.0, 4.5, 3.25, 0.0, -0.2, 0.05, 0.001, -0.002, -0.006)
 
@@ -15,7 +17,7 @@ def tof_info(model: int = 1, lens: Sequence[float] = LENS, *, newer: bool = True
     parts = [
         struct.pack("<I", 4 if newer else 1),
         np.array([0.00025, 0.5, 0.1, 0.2, 0.3, 1, 2, 3, 0.1, 0.2, 0.3], "<f4").tobytes(),
-        struct.pack("<I", 0) + np.full(32, 7, "<f4").tobytes(),
+        struct.pack("<I", 0) + np.pad(np.array(lens[:5], "<f4"), (0, 27)).tobytes(),
         struct.pack("<I", model) + ours.tobytes(),
     ]
     if newer:
@@ -24,14 +26,22 @@ def tof_info(model: int = 1, lens: Sequence[float] = LENS, *, newer: bool = True
 
 
 def chunk(
-    kind: int, content: bytes, width: int, height: int, pixel_format: int, frame: int = 7, version: int = 3
+    kind: int,
+    content: bytes,
+    width: int,
+    height: int,
+    pixel_format: int,
+    frame: int = 7,
+    version: int = 3,
+    time_ns: int | None = None,
 ) -> bytes:
     text = b'{"Version":"0.0.1"}\0' if version == 3 else b""
     fixed = 36 if version == 1 else 48
     size = fixed + len(text) + len(content)
     header = struct.pack("<9I", kind, size, fixed + len(text), version, width, height, pixel_format, 123_456, frame)
     if version > 1:
-        header += struct.pack("<3I", 0, 1_700_000_000 + frame, 500)
+        seconds, nanoseconds = (1_700_000_000 + frame, 500) if time_ns is None else divmod(time_ns, 1_000_000_000)
+        header += struct.pack("<3I", 0, seconds, nanoseconds)
     return header + text + content
 
 

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from calib import pose
 from drivers.contract.frame import Frame, Geometry, Kind
 from drivers.encoding.foreign_recording import ForeignRecordingError
 from drivers.o3r.buffers import O3rBuffers, exposure
@@ -38,7 +39,8 @@ def test_a_message_becomes_four_images_of_one_exposure(tmp_path: Path) -> None:
     assert depth.si()[5, 7] == pytest.approx(507 * 0.00025)
     assert np.isnan(depth.si()[0, 0])
     assert deviation.si()[5, 7] == pytest.approx(10 * 0.00025)
-    assert amplitude.si()[5, 7] == pytest.approx(5070 * 0.5)
+    assert amplitude.si()[5, 7] == pytest.approx(5069**2 * 0.5)
+    assert np.isnan(amplitude.si()[0, 0])
     assert confidence.data[5, 7] == 16
     assert depth.exposure_s == pytest.approx(1e-3)
     assert depth.temperature_c == 41.5
@@ -50,7 +52,7 @@ def test_the_camera_is_opencvs_with_pixels_counted_from_their_centres(tmp_path: 
     point = np.array([0.2, -0.1, 0.8])
     matrix = np.array([[fx, 0, mx], [0, fy, my], [0, 0, 1]])
     corner, _ = cv2.projectPoints(point[None], np.zeros(3), np.zeros(3), matrix, np.array(distortion))
-    np.testing.assert_allclose(camera.project(point), corner.ravel() - 0.5, atol=1e-5)
+    np.testing.assert_allclose(camera.project(pose.transform(camera.T_rs, point)), corner.ravel() - 0.5, atol=1e-5)
 
 
 def test_the_lens_of_a_wide_view_is_opencvs_fisheye(tmp_path: Path) -> None:
@@ -63,7 +65,14 @@ def test_the_lens_of_a_wide_view_is_opencvs_fisheye(tmp_path: Path) -> None:
     point = np.array([0.7, -0.4, 0.5])
     matrix = np.array([[9.0, 0, 4.5], [0, 8, 3.25], [0, 0, 1]])
     corner, _ = cv2.fisheye.projectPoints(point[None, None], np.zeros(3), np.zeros(3), matrix, np.array(lens[5:9]))
-    np.testing.assert_allclose(camera.project(point), corner.ravel() - 0.5, atol=1e-5)
+    np.testing.assert_allclose(camera.project(pose.transform(camera.T_rs, point)), corner.ravel() - 0.5, atol=1e-5)
+
+
+def test_the_pose_turns_about_z_then_y_then_x(tmp_path: Path) -> None:
+    T_rs = read_buffers(tmp_path, pcic_messages.exposure()).cameras["depth"].T_rs
+    about_x, about_y, about_z = (cv2.Rodrigues(np.eye(3)[k] * angle)[0] for k, angle in enumerate((0.1, 0.2, 0.3)))
+    np.testing.assert_allclose(T_rs[:3, :3], about_x @ about_y @ about_z, atol=1e-6)
+    np.testing.assert_allclose(T_rs[:3, 3], (1, 2, 3))
 
 
 def test_network_messages_and_older_versions_are_read(tmp_path: Path) -> None:
@@ -121,7 +130,7 @@ def parsed(content: bytes) -> list[Frame]:
         frame
         for chunks in messages(content)
         if ChunkType.DISTANCE in chunks and ChunkType.TOF_INFO in chunks
-        for frame in exposure(chunks, "")
+        for frame in exposure(chunks).frames("")
     ]
 
 

@@ -1,4 +1,4 @@
-"""Nonblocking bounded queue between librealsense's threads and ours."""
+"""Nonblocking bounded queue between the threads of an SDK and a driver's own."""
 
 import threading
 from collections import deque
