@@ -17,8 +17,8 @@ from drivers.contract.clock import DeviceClock
 from drivers.contract.device import DeviceError, DeviceInfo, DeviceState, Sink
 from drivers.contract.frame import Kind
 from drivers.contract.frame_gate import FrameGate
+from drivers.contract.frame_queue import FrameQueue
 from drivers.realsense import controls
-from drivers.realsense.frame_queue import FrameQueue
 from drivers.realsense.library import translated_errors
 from drivers.realsense.picture import CLOCK, HARDWARE, Picture, frame, from_frame
 from drivers.realsense.profiles import Stream, cameras

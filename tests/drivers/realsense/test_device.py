@@ -15,10 +15,10 @@ from hypothesis import strategies as st
 from drivers.contract.controls import ControlKind
 from drivers.contract.device import AddressError, ControlError, DeviceError, DeviceState, SdkMissingError
 from drivers.contract.frame import Geometry, Kind
+from drivers.contract.frame_queue import FrameQueue
 from drivers.realsense import library, open_device
 from drivers.realsense.controls import make
 from drivers.realsense.device import RealsenseDevice
-from drivers.realsense.frame_queue import FrameQueue
 from drivers.realsense.opening import device_info, discover, of_device
 from drivers.realsense.picture import Picture, pixels
 from drivers.realsense.streams import ROLES, StreamError

@@ -1,4 +1,4 @@
-"""Nonblocking bounded queue between librealsense's threads and ours."""
+"""Nonblocking bounded queue between the threads of a device SDK and ours."""
 
 import threading
 from collections import deque
