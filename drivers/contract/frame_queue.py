@@ -1,4 +1,4 @@
-"""Nonblocking bounded queue between the threads of a device SDK and ours."""
+"""Nonblocking bounded queue between the threads of an SDK and a driver's own."""
 
 import threading
 from collections import deque

@@ -1,4 +1,4 @@
-"""What the Orbbec driver does without Orbbec's SDK."""
+"""The Orbbec driver without Orbbec's SDK: addresses, its absence, pixels."""
 
 import contextlib
 import sys

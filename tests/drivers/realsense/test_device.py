@@ -15,7 +15,6 @@ from hypothesis import strategies as st
 from drivers.contract.controls import ControlKind
 from drivers.contract.device import AddressError, ControlError, DeviceError, DeviceState, SdkMissingError
 from drivers.contract.frame import Geometry, Kind
-from drivers.contract.frame_queue import FrameQueue
 from drivers.realsense import library, open_device
 from drivers.realsense.controls import make
 from drivers.realsense.device import RealsenseDevice
@@ -225,16 +224,6 @@ def test_controls_are_in_si_units_and_in_the_cameras_steps() -> None:
         controls.set("exposure_s", 1.0)
     with pytest.raises(DeviceError, match="realsense://1: another program uses it"):
         controls.set("gain", 20.0)
-
-
-def test_a_frame_queue_keeps_the_newest_and_counts_drops() -> None:
-    queue: FrameQueue[int] = FrameQueue(2)
-    for number in range(5):
-        queue.put(number)
-    queue.end("over")
-    assert queue.ended() == ""
-    assert [queue.take(0), queue.take(0), queue.take(0)] == [3, 4, None]
-    assert (queue.dropped(), queue.dropped(), queue.ended()) == (3, 0, "over")
 
 
 @given(
