@@ -39,7 +39,7 @@ def _camera(stream: Stream, reference: Stream | None) -> Camera:
         raise StreamError(f"{name}: the camera tells no calibration of it")
     matrix = intrinsic.fx, intrinsic.fy, intrinsic.cx, intrinsic.cy
     try:
-        return Camera(intrinsic.width, intrinsic.height, *matrix, _lens(name, profile), _pose(stream, reference))
+        return Camera(intrinsic.width, intrinsic.height, *matrix, _lens(name, profile), _pose(name, stream, reference))
     except ValueError as error:
         raise error if isinstance(error, StreamError) else StreamError(f"{name}: {error}") from error
 
@@ -52,11 +52,14 @@ def _lens(name: str, profile: Any) -> Lens:
     return lens
 
 
-def _pose(stream: Stream, reference: Stream | None) -> Pose:
+def _pose(name: str, stream: Stream, reference: Stream | None) -> Pose:
     """Maps the stream's coordinates to those of the reference [m]; the SDK has rotations by rows and millimetres."""
     if reference is None or stream is reference:
         return pose.identity()
-    extrinsic = stream.profile.get_extrinsic_to(reference.profile)
+    try:
+        extrinsic = stream.profile.get_extrinsic_to(reference.profile)
+    except Exception as error:  # the SDK's exceptions have no common base
+        raise StreamError(f"{name}: the camera tells no pose of it ({error}); leave it out of the address") from error
     rotation = np.asarray(extrinsic.rot, float).reshape(3, 3)
     return pose.from_rotation(rotation, np.asarray(extrinsic.transform, float).ravel() * 1e-3)
 

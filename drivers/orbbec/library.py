@@ -22,7 +22,7 @@ def load() -> Any:
         SdkMissingError: it is not installed.
     """
     try:
-        with _stdout_as_stderr():
+        with _silent():
             import pyorbbecsdk  # noqa: PLC0415  no requirement of ours
     except ImportError as error:
         raise SdkMissingError("pyorbbecsdk2", command=_INSTALL) from error
@@ -55,17 +55,18 @@ def translated_errors(uri: str) -> Iterator[None]:
 
 
 @contextmanager
-def _stdout_as_stderr() -> Iterator[None]:
-    """Standard output goes to standard error: the SDK prints a line when it is imported, into a user's JSON."""
+def _silent() -> Iterator[None]:
+    """Standard output leads nowhere: the SDK prints a line when it is imported, into a user's JSON."""
     if "pyorbbecsdk" in sys.modules:
         yield
         return
     sys.stdout.flush()
-    kept = os.dup(1)
+    kept, nowhere = os.dup(1), os.open(os.devnull, os.O_WRONLY)
     try:
-        os.dup2(2, 1)
+        os.dup2(nowhere, 1)
         yield
     finally:
         ctypes.CDLL(None).fflush(None)  # what C still holds back would come when the process ends
         os.dup2(kept, 1)
         os.close(kept)
+        os.close(nowhere)

@@ -25,14 +25,16 @@ RATE_HZ = 50
 #: Time of the first image [µs].
 BEGIN_US = 2_000_000
 
-_VERSION, _ON, _OFF = struct.pack("<d", 2.1), struct.pack("<i", 1), struct.pack("<i", 0)
+#: Of the files, as the SDK counts them.
+VERSION = struct.pack("<d", 2.1)
+_ON, _OFF = struct.pack("<i", 1), struct.pack("<i", 0)
 
 
 def write(path: Path, serial: str, images: int, fault: Fault = Fault.NONE, after: int = 0) -> None:
     """Writes exposures: depth 1000 + number in mm except in the first row, infra-red and colours their number."""
     with bag(path) as writer:
         writer.device(serial)
-        writer.setting(0, _VERSION)
+        writer.setting(0, VERSION)
         for stream in (DEPTH, IR, COLOR):
             writer.profile(stream, RATE_HZ)
         for number in range(images):
@@ -49,7 +51,7 @@ def write_stereo(path: Path, images: int) -> None:
     with bag(path) as writer:
         writer.device("G1", GEMINI_335, "Orbbec Gemini 335")
         # Version; the camera computes depth, the SDK nothing; speckles are removed; unit of depth [mm].
-        for number, data in ((0, _VERSION), (85, _ON), (3004, _OFF), (24, _ON), (176, struct.pack("<f", 0.1))):
+        for number, data in ((0, VERSION), (85, _ON), (3004, _OFF), (24, _ON), (176, struct.pack("<f", 0.1))):
             writer.setting(number, data)
         writer.baseline(BASELINE_MM)
         for stream in (DEPTH, LEFT, RIGHT):
