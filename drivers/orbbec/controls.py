@@ -4,7 +4,7 @@ Exposures are in the camera's own units: the SDK documents none, and they differ
 of a Gemini 330; unknown for a Femto), so they are no `exposure_s`.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 from drivers.contract.controls import Control, ControlInfo, ControlKind, Controls, Value
@@ -43,17 +43,23 @@ _SYNC: Mapping[str, tuple[str, ...]] = {
 }
 
 
-def make(ob: Any, uri: str, camera: Any) -> Controls:
-    """Controls of a camera; those of its colour sensor have the prefix `color.`."""
+def make(ob: Any, uri: str, camera: Callable[[], Any]) -> Controls:
+    """Controls of a camera; those of its colour sensor have the prefix `color.`.
+
+    Args:
+        ob: pyorbbecsdk.
+        uri: of the camera, for messages.
+        camera: returns the `ob.Device`, or raises a DeviceError when it was closed: controls do not keep it open.
+    """
     found: dict[str, Control] = {}
     for key, name in _SWITCHES.items():
-        if name not in found and _settable(ob, camera, key):
+        if name not in found and _settable(ob, camera(), key):
             found[name] = _switch(ob, uri, camera, key, name)
     for key, name in _NUMBERS.items():
-        if name not in found and _settable(ob, camera, key):
+        if name not in found and _settable(ob, camera(), key):
             found[name] = _number(ob, uri, camera, key, name)
-    modes = sync_modes(ob, camera)
-    return Controls([*found.values(), *_sync(ob, uri, camera, modes)])
+    modes = sync_modes(ob, camera())
+    return Controls([*found.values(), *_sync(uri, camera, modes)])
 
 
 def sync_modes(ob: Any, camera: Any) -> Mapping[str, Any]:
@@ -84,44 +90,44 @@ def _settable(ob: Any, camera: Any, key: str) -> bool:
     return camera.is_property_supported(ob.OBPropertyID.__members__[key], ob.OBPermissionType.PERMISSION_READ_WRITE)
 
 
-def _switch(ob: Any, uri: str, camera: Any, key: str, name: str) -> Control:
+def _switch(ob: Any, uri: str, camera: Callable[[], Any], key: str, name: str) -> Control:
     number = ob.OBPropertyID.__members__[key]
 
     def read() -> Value:
         with translated_errors(uri):
-            return bool(camera.get_bool_property(number))
+            return bool(camera().get_bool_property(number))
 
     def write(value: Value) -> None:
         with translated_errors(uri):
-            camera.set_bool_property(number, bool(value))
+            camera().set_bool_property(number, bool(value))
 
     return Control(ControlInfo(name, ControlKind.SWITCH), read, write)
 
 
-def _number(ob: Any, uri: str, camera: Any, key: str, name: str) -> Control:
+def _number(ob: Any, uri: str, camera: Callable[[], Any], key: str, name: str) -> Control:
     number = ob.OBPropertyID.__members__[key]
     with translated_errors(uri):
-        limits = camera.get_int_property_range(number)
+        limits = camera().get_int_property_range(number)
 
     def read() -> Value:
         with translated_errors(uri):
-            return int(camera.get_int_property(number))
+            return int(camera().get_int_property(number))
 
     def write(value: Value) -> None:
         step = max(limits.step, 1)
         with translated_errors(uri):
-            camera.set_int_property(number, limits.min + step * round((int(value) - limits.min) / step))
+            camera().set_int_property(number, limits.min + step * round((int(value) - limits.min) / step))
 
     return Control(ControlInfo(name, ControlKind.WHOLE, "", limits.min, limits.max), read, write)
 
 
-def _sync(ob: Any, uri: str, camera: Any, modes: Mapping[str, Any]) -> Iterator[Control]:
+def _sync(uri: str, camera: Callable[[], Any], modes: Mapping[str, Any]) -> Iterator[Control]:
     if len(modes) < 2:
         return
 
     def read() -> Value:
         with translated_errors(uri):
-            mode = camera.get_multi_device_sync_config().mode
+            mode = camera().get_multi_device_sync_config().mode
         role = next((role for role, names in _SYNC.items() if mode.name in names), None)
         if role is None:
             raise DeviceError(f"{uri}: its synchronisation is {mode.name}, which is none of {', '.join(modes)}")
@@ -129,8 +135,8 @@ def _sync(ob: Any, uri: str, camera: Any, modes: Mapping[str, Any]) -> Iterator[
 
     def write(value: Value) -> None:
         with translated_errors(uri):
-            config = camera.get_multi_device_sync_config()
+            config = camera().get_multi_device_sync_config()
             config.mode = modes[str(value)]
-            camera.set_multi_device_sync_config(config)
+            camera().set_multi_device_sync_config(config)
 
     yield Control(ControlInfo("sync_role", ControlKind.CHOICE, choices=tuple(modes)), read, write)

@@ -86,7 +86,7 @@ class OrbbecDevice:
         self._filters: tuple[str, ...] = ()
         with translated_errors(self.info.uri):
             self.cameras: Mapping[str, Camera] = cameras(streams)
-            self.controls = controls.make(origin.ob, self.info.uri, origin.camera)
+            self.controls = controls.make(origin.ob, self.info.uri, self._camera)
             modes = controls.sync_modes(origin.ob, origin.camera)
         infos = tuple(_info(stream) for stream in streams)
         roles = tuple(SyncRole(role) for role in modes) or (SyncRole.FREE,)
@@ -149,7 +149,13 @@ class OrbbecDevice:
         self._gate.release()
         self.stop()
         with self._lock:
-            self._origin, self._streams = None, ()  # which closes the camera
+            self._origin, self._streams = None, ()  # the SDK closes a camera that nobody holds
+
+    def _camera(self) -> Any:
+        origin = self._origin
+        if origin is None:
+            raise DeviceError(f"{self.info.uri}: the device was closed")
+        return origin.camera
 
     def _open_sensors(self, queue: FrameQueue[_Arrival]) -> None:
         for stream in self._streams:

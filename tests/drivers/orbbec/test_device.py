@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 import time
+import weakref
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -212,7 +213,7 @@ class Session:
 
 def test_controls_are_the_cameras_properties() -> None:
     session = Session()
-    controls = make(ob, "orbbec://1", session)
+    controls = make(ob, "orbbec://1", lambda: session)
     assert [info.name for info in controls.infos] == ["color.auto_exposure", "color.exposure", "sync_role"]
     controls.set("color.exposure", 300)
     assert controls.get("color.exposure") == 301  # a step of the camera
@@ -222,9 +223,18 @@ def test_controls_are_the_cameras_properties() -> None:
         controls.set("color.exposure", 302)
 
 
+def test_controls_do_not_keep_a_closed_camera_open() -> None:
+    cameras = [Session()]
+    controls = make(ob, "orbbec://1", lambda: cameras[0])
+    gone = weakref.ref(cameras[0])
+    cameras.clear()
+    assert gone() is None
+    assert controls.infos
+
+
 def test_roles_of_synchronisation_are_the_sdks_modes() -> None:
     session = Session()
-    controls = make(ob, "orbbec://1", session)
+    controls = make(ob, "orbbec://1", lambda: session)
     assert set(sync_modes(ob, session)) == set(SyncRole)
     assert controls.get("sync_role") == "free"
     controls.set("sync_role", "master")
@@ -234,6 +244,16 @@ def test_roles_of_synchronisation_are_the_sdks_modes() -> None:
     session.config.mode = ob.OBMultiDeviceSyncMode.SOFTWARE_TRIGGERING
     with pytest.raises(DeviceError, match="SOFTWARE_TRIGGERING, which is none of free, master, slave"):
         controls.get("sync_role")
+
+
+def test_a_closed_camera_can_be_opened_again_while_its_device_is_still_held(device: OrbbecDevice, take: Path) -> None:
+    def handles() -> int:
+        return [link.readlink() for link in Path("/proc/self/fd").iterdir() if link.is_symlink()].count(take)
+
+    device.start(RecordingSink())
+    assert handles() == 1
+    device.close()
+    assert handles() == 0
 
 
 def test_a_recording_has_controls_only_of_what_can_be_changed(device: OrbbecDevice) -> None:
