@@ -18,12 +18,13 @@ class SdkMissingError(FinalError):
 
     Args:
         package: the package that cannot be imported.
-        extra: the extra of this project that installs it.
+        extra: the extra of this project that installs it, "" if there is none.
+        command: what installs it where no extra can.
     """
 
-    def __init__(self, package: str, extra: str) -> None:
+    def __init__(self, package: str, extra: str = "", *, command: str = "") -> None:
         self.reason = f"{package} is not installed"
-        self.remedy = f"pip install 'abs-service[{extra}]'"
+        self.remedy = command or f"pip install 'abs-service[{extra}]'"
         super().__init__(f"{self.reason}:  {self.remedy}")
 
 

@@ -28,7 +28,11 @@ def test_wheel_holds_the_four_packages_typed_and_nothing_else(wheel: Path) -> No
     assert {f"{package}/py.typed" for package in PACKAGES} <= set(names)
 
 
-DATA_FILES = [(ROOT / "proto", "absmsg/v1/*.proto"), (ROOT, "abs_service/config/*.toml")]
+DATA_FILES = [
+    (ROOT / "proto", "absmsg/v1/*.proto"),
+    (ROOT, "abs_service/config/*.toml"),
+    (ROOT, "drivers/orbbec/*.xml"),
+]
 
 
 @pytest.mark.parametrize(("folder", "pattern"), DATA_FILES)

@@ -108,6 +108,8 @@ def device_of(found: Found) -> str | None:
     scheme = found.info.uri.partition(":")[0]
     if scheme == "oak" and found.info.serial:
         return "oak-tof" if "tof" in found.info.model.lower() else "oak-stereo"
+    if scheme == "orbbec" and found.info.serial:
+        return "orbbec-tof" if "femto" in found.info.model.lower() else "orbbec-stereo"
     return scheme if scheme in DEVICES and found.info.serial else None
 
 

@@ -57,6 +57,11 @@ _STEREO = """\
 noise = { type = "structured_light", noise = 1.425e-3, step = 2.85e-3 }
 """
 
+_TIME_OF_FLIGHT = """\
+# A starting point: 1 cm. Measure yours with `abs-service calibrate noise`.
+noise = { type = "constant", sigma = 0.01 }
+"""
+
 DEVICES: Mapping[str, Device] = {
     "simulated": Device(
         "the simulated camera, nothing to connect",
@@ -79,13 +84,9 @@ DEVICES: Mapping[str, Device] = {
     ),
     "realsense": Device("Intel RealSense", "realsense://", "depth", _STEREO),
     "oak-stereo": Device("OAK with stereo cameras", "oak://?mode=stereo", "depth", _STEREO),
-    "oak-tof": Device(
-        "OAK with a time-of-flight camera",
-        "oak://?mode=tof",
-        "tof",
-        "# A starting point: 1 cm. Measure yours with `abs-service calibrate noise`.\n"
-        'noise = { type = "constant", sigma = 0.01 }\n',
-    ),
+    "oak-tof": Device("OAK with a time-of-flight camera", "oak://?mode=tof", "tof", _TIME_OF_FLIGHT),
+    "orbbec-stereo": Device("Orbbec Gemini", "orbbec://", "depth", _STEREO),
+    "orbbec-tof": Device("Orbbec Femto", "orbbec://", "depth", _TIME_OF_FLIGHT),
 }
 
 OBJECTS: Mapping[str, str] = {

@@ -100,6 +100,7 @@ def test_a_script_is_told_which_answer_is_missing(tmp_path, capsys, option):
 def test_attached_cameras_are_offered_by_their_addresses():
     kinect = Found(DeviceInfo("kinect1://A00363A01234040A", "Kinect v1", "A00363A01234040A"))
     oak = Found(DeviceInfo("oak://1844", "OAK-D-SR-PoE ToF", "1844"))
+    orbbec = Found(DeviceInfo("orbbec://CL8", "Orbbec Femto Bolt", "CL8"))
     nothing = Found(DeviceInfo("oak://", "OAK", ""))
     offered = {}
 
@@ -108,8 +109,9 @@ def test_attached_cameras_are_offered_by_their_addresses():
         return {"device": "oak://1844", "object": "rigid", "color": "no", "behind": "space"}[option]
 
     arguments = cli.command_parser("new", new).parse_args(["x.toml"])
-    answers = new.answered(arguments, "x", [kinect, oak, nothing], ask)
-    assert offered["device"] == ["kinect1://A00363A01234040A", "oak://1844", *DEVICES]
+    answers = new.answered(arguments, "x", [kinect, oak, orbbec, nothing], ask)
+    assert offered["device"] == ["kinect1://A00363A01234040A", "oak://1844", "orbbec://CL8", *DEVICES]
+    assert new.device_of(orbbec) == "orbbec-tof"
     assert (answers.device, answers.uri, answers.color) == ("oak-tof", "oak://1844", False)
 
 

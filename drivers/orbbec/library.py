@@ -1,0 +1,72 @@
+"""Lazy import of pyorbbecsdk, its settings, and translation of its errors."""
+
+import ctypes
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from drivers.contract.device import DeviceError, SdkMissingError
+from drivers.contract.discovery import UDEV_REMEDY
+
+#: The wheel's requirements are those of its examples: 2 GB, and an older NumPy than ours.
+_INSTALL = "pip install --no-deps pyorbbecsdk2"
+
+
+def load() -> Any:
+    """The module `pyorbbecsdk`.
+
+    Raises:
+        SdkMissingError: it is not installed.
+    """
+    try:
+        with _silent():
+            import pyorbbecsdk  # noqa: PLC0415  no requirement of ours
+    except ImportError as error:
+        raise SdkMissingError("pyorbbecsdk2", command=_INSTALL) from error
+    return pyorbbecsdk
+
+
+def context(ob: Any) -> Any:
+    """The SDK's context with `sdk.xml`; the settings hold while somebody holds it."""
+    return ob.Context(str(Path(__file__).with_name("sdk.xml")))
+
+
+@contextmanager
+def translated_errors(uri: str) -> Iterator[None]:
+    """Translates exceptions into errors that name the device and the remedy; the SDK's own have no common base.
+
+    Raises:
+        DeviceError: any exception.
+    """
+    try:
+        yield
+    except DeviceError:
+        raise
+    except Exception as error:
+        message = str(error)
+        if "permission" in message.lower() or "access" in message.lower():
+            message = f"{message}; {UDEV_REMEDY}"
+        elif "busy" in message.lower():
+            message = f"another program uses it ({message})"
+        raise DeviceError(f"{uri}: {message}") from error
+
+
+@contextmanager
+def _silent() -> Iterator[None]:
+    """Standard output leads nowhere: the SDK prints a line when it is imported, into a user's JSON."""
+    if "pyorbbecsdk" in sys.modules:
+        yield
+        return
+    sys.stdout.flush()
+    kept, nowhere = os.dup(1), os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 1)
+        yield
+    finally:
+        ctypes.CDLL(None).fflush(None)  # what C still holds back would come when the process ends
+        os.dup2(kept, 1)
+        os.close(kept)
+        os.close(nowhere)
