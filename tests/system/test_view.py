@@ -78,14 +78,52 @@ def _picture(page) -> bytes:
 
 def _chosen_by_a_click(page, listener) -> int:
     """Version of the mesh that is made after a click in the middle of the scene, at which the first view is aimed."""
+    return _chosen(page, listener, "Choose the object", "Click the object", lambda: page.mouse.click(*_at(page, 0, 0)))
+
+
+def _chosen(page, listener, button, hint, gesture) -> int:
+    """Version of the mesh that is made after a gesture in the scene."""
     version = listener.states()[-1][1].mesh_version
-    page.get_by_role("button", name="Choose the object").click(force=True)
-    _says(page, "Click the object")
-    box = page.locator("canvas").first.bounding_box()
-    page.mouse.click(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
-    wait_until(lambda: listener.states()[-1][1].mesh_version > version, PATIENCE_S, "a mesh of what was clicked")
+    page.get_by_role("button", name=button).click(force=True)
+    _says(page, hint)
+    gesture()
+    wait_until(lambda: listener.states()[-1][1].mesh_version > version, PATIENCE_S, "a mesh of what was chosen")
     _says(page, "To keep this choice")
     return listener.states()[-1][1].mesh_version
+
+
+def _at(page, right, down):
+    """A place in the scene, from its middle, in widths of the scene; a warning of the browser's covers the top."""
+    box = page.locator("canvas").first.bounding_box()
+    return box["x"] + (0.5 + right) * box["width"], box["y"] + box["height"] / 2 + down * box["width"]
+
+
+def _draw_box(page):
+    page.mouse.move(*_at(page, -0.45, -0.2))
+    page.mouse.down()
+    page.mouse.move(*_at(page, 0.1, 0.1), steps=4)
+    page.mouse.move(*_at(page, 0.45, 0.5), steps=4)
+    page.mouse.up()
+
+
+def _draw_lasso(page):
+    for corner in ((-0.45, -0.2), (0.45, -0.2), (0.45, 0.5), (-0.45, 0.5), (-0.45, -0.2)):
+        page.mouse.click(*_at(page, *corner))
+        time.sleep(0.5)
+
+
+def test_a_box_and_a_lasso_choose_the_object(run, rig_file, launch, browser, port):
+    _, listener = run
+    launch("view", rig_file, "--port", port)
+    page, _ = _opened(browser, port)
+    _says(page, "Tracking")
+    for button, hint, draw in (
+        ("Draw a box", "press in one corner", _draw_box),
+        ("Draw a lasso", "corner by corner", _draw_lasso),
+    ):
+        version = _chosen(page, listener, button, hint, lambda draw=draw: draw(page))
+        assert "outline = [[" in page.inner_text("body")
+        assert f"New mesh, version {version}" in page.inner_text("body")
 
 
 def test_the_page_shows_a_mesh_that_moves_acts_and_connects_again(run, rig_file, endpoint, launch, browser, port):

@@ -58,8 +58,8 @@ def run(arguments: argparse.Namespace) -> int:
     with rig_process.open_bus(rig, arguments, "viewer", "operator") as bus:
         health = Health(bus, "view", headers)
 
-        def reinitialize(tracker: str, seed: commands.Pixel | None) -> CommandAnswer | None:
-            return commands.reinitialize(bus, tracker, headers, ANSWER_S, seed)
+        def reinitialize(tracker: str, choice: commands.Choice) -> CommandAnswer | None:
+            return commands.reinitialize(bus, tracker, headers, ANSWER_S, choice)
 
         def record(recording: bool) -> CommandAnswer | None:
             return commands.record(bus, headers, recording, ANSWER_S)

@@ -11,12 +11,13 @@ import viser
 from absmsg.v1.deformation_state_pb2 import DeformationState
 from absmsg.v1.deformed_mesh_pb2 import DeformedMesh
 from absmsg.v1.health_pb2 import Health
-from numpy.typing import NDArray
 
 from abs_service.bus import keys
 from abs_service.display.page import pictures, table, words
+from abs_service.display.page.choosing import Choosing, Measured
 from abs_service.display.page.feed import Feed, rate_hz
 from abs_service.display.page.fields import FIELDS, ColorScale, MeshView, residual
+from abs_service.display.page.gestures import Gestures
 from abs_service.display.page.panel import Button, Panel
 from abs_service.display.page.plots import plots
 from abs_service.display.page.recording import Record, ask
@@ -31,11 +32,6 @@ MESH_S, IMAGES_S, WORDS_S, IDLE_S = 1 / 30, 0.25, 1.0, 0.5
 
 #: A residual compares a mesh with images of its exposure: those at most so far from it [ns].
 SAME_NS = 20_000_000
-
-#: A click means the first point that is so near to its ray, in distances between neighbouring points.
-REACH = 1.5
-#: The points of a sensor that has delivered none.
-NOTHING: pictures.Cloud = (np.empty((0, 3), np.float32), np.empty((0, 2), np.intp), 0.0)
 
 #: The page listens here only.
 HOST = "127.0.0.1"
@@ -70,12 +66,14 @@ class Page:
         self._scene = Scene(self._server)
         self._panel = Panel(self._server, {} if view_only else self._buttons())
         self._reinitialization = Reinitialization(feed, commands.reinitialize, self._panel.answer)
+        gestures = Gestures(self._server.scene)
+        self._choosing = Choosing(gestures, self._look, self._panel.answer, self._reinitialization.ask)
         self._record = commands.record
         self._scales = {name: ColorScale(field) for name, field in FIELDS.items()}
         self._drawn: object = None
         self._view: MeshView | None = None
         self._exposure_ns = 0  # of that mesh
-        self._measured: dict[str, pictures.Cloud] = {}  # by sensor
+        self._measured: dict[str, Measured] = {}  # by sensor
         self._due_s = dict.fromkeys((self._draw_mesh, self._draw_images, self._write), 0.0)
 
     @property
@@ -150,8 +148,8 @@ class Page:
             stale = age_s > words.STALE_S
             image = pictures.picture(frame)
             if frame.kind == Kind.DEPTH:
-                points_r, _, spacing_m = measured = pictures.cloud(pictures.radial(frame, camera), camera)
-                self._measured[frame.sensor] = measured
+                measured = self._measured[frame.sensor] = Measured(pictures.radial(frame, camera), camera)
+                points_r, _, spacing_m = pictures.cloud(measured.distance, camera)
                 self._scene.show_points(frame.sensor, points_r, spacing_m, stale, self._panel.shows[1])
             faces = self._view.faces if self._view is not None else np.empty((0, 3), np.int32)
             vertices = self._view.vertices if self._view is not None else np.empty((0, 3))
@@ -218,26 +216,22 @@ class Page:
             "Reinitialise": Button(
                 "Detect the object again, with a new mesh", lambda: self._reinitialization.ask(self._panel.tracker)
             ),
-            "Choose the object": Button("Detect the object that you click next", self._choose),
+            "Choose the object": Button(
+                "Detect the object that you click next", lambda: self._choosing.by_click(self._panel.tracker)
+            ),
+            "Draw a box": Button(
+                "Detect the object in the box that you draw next", lambda: self._choosing.by_box(self._panel.tracker)
+            ),
+            "Draw a lasso": Button(
+                "Detect the object that you click around", lambda: self._choosing.by_lasso(self._panel.tracker)
+            ),
             "Start recording": Button("Record from now on, with the seconds before", lambda: record(True)),
             "Stop recording": Button("End the recording", lambda: record(False)),
         }
 
-    def _choose(self) -> None:
-        """Waits for a click at the object."""
-        self._panel.answer("Click the object among the measured points.")
-        self._scene.on_next_click(self._pick)
-
-    def _pick(self, origin: NDArray[np.float64], direction: NDArray[np.float64]) -> None:
-        """Asks for a detection at the measured point under a click, a ray in rig coordinates."""
-        tracker = self._panel.tracker
-        points_r, pixels, spacing_m = self._measured.get(self._references.get(tracker, ""), NOTHING)
-        found = pictures.under_ray(points_r, origin, direction, REACH * spacing_m)
-        if found is None:
-            self._panel.answer("There is no measured point of the tracker's reference sensor where you clicked.")
-            return
-        row, column = pixels[found].tolist()
-        self._reinitialization.ask(tracker, (column, row))
+    def _look(self, tracker: str) -> Measured | None:
+        """The newest depth image of a tracker's reference; None if there is none."""
+        return self._measured.get(self._references.get(tracker, ""))
 
 
 @contextmanager

@@ -1,7 +1,5 @@
 """The 3-D part of the page: mesh, its first pose, points of the depth sensors, cameras."""
 
-from collections.abc import Callable
-
 import numpy as np
 import viser
 from numpy.typing import NDArray
@@ -98,17 +96,6 @@ class Scene:
             )  # fmt: skip
             text = f"/cameras/{name}/name"
             self._server.scene.add_label(text, name, position=(0.0, -CAMERA_M, CAMERA_M), visible=visible)
-
-    def on_next_click(self, call: Callable[[NDArray[np.float64], NDArray[np.float64]], None]) -> None:
-        """Calls once, from another thread, with origin [m] and direction of the ray (3,) under the next click."""
-        scene = self._server.scene
-        scene.remove_click_callback()
-
-        def clicked(event: viser.SceneClickEvent) -> None:
-            scene.remove_click_callback()
-            call(np.array(event.ray_origin), np.array(event.ray_direction))
-
-        scene.on_click()(clicked)
 
     def _place_camera(self, view: MeshView) -> None:
         """Aims the first view of every browser at the mesh, from behind the cameras."""
