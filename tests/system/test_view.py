@@ -1,4 +1,4 @@
-"""The live page in a headless browser, of a running rig."""
+"""The page in a headless browser, of a running rig and of a recording."""
 
 import re
 import signal
@@ -7,6 +7,7 @@ import time
 
 import pytest
 
+from tests.abs_service.commands.estimated_recording import write_estimated
 from tests.system.running import START_S, RigListener, abs_service, wait_until
 
 sync_api = pytest.importorskip("playwright.sync_api")
@@ -181,3 +182,20 @@ def test_a_page_that_only_shows_has_no_buttons(run, rig_file, launch, browser, p
     _says(page, "Tracking")
     for name in ("Reinitialise", "Choose the object", "Start recording", "Stop recording"):
         assert page.get_by_role("button", name=name).count() == 0
+
+
+def test_a_recording_is_played_to_its_end_stepped_back_and_played_again(tmp_path, launch, browser, port):
+    server = launch("view", write_estimated(tmp_path / "x.mcap"), "--port", port)
+    page, _ = _opened(browser, port)
+    _says(page, "Tracking")
+    page.get_by_role("button", name="Play", exact=True).wait_for()  # it is over, and says so
+    for status in ("Object lost", "Tracking with doubts"):
+        page.get_by_role("button", name="Back").click(force=True)
+        _says(page, status)
+    page.get_by_role("tab", name="Images").click(force=True)
+    _says(page, "tof/depth")
+    page.get_by_role("button", name="Play", exact=True).click(force=True)
+    page.get_by_text("Tracking with doubts").first.wait_for(state="hidden")
+    assert page.get_by_role("button", name="Reinitialise").count() == 0
+    server.send_signal(signal.SIGTERM)
+    assert server.wait(PATIENCE_S) == 0

@@ -1,9 +1,9 @@
 """The page: reads the feed and updates scene and panel, a few times a second each, while a browser is connected."""
 
 import threading
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stdout
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from os import devnull
 
 import numpy as np
@@ -15,13 +15,14 @@ from absmsg.v1.health_pb2 import Health
 from abs_service.bus import keys
 from abs_service.display.page import pictures, table, words
 from abs_service.display.page.choosing import Choosing, Measured
+from abs_service.display.page.commands import Commands
 from abs_service.display.page.feed import Feed, rate_hz
 from abs_service.display.page.fields import FIELDS, ColorScale, MeshView, residual
 from abs_service.display.page.gestures import Gestures
 from abs_service.display.page.panel import Button, Panel
 from abs_service.display.page.plots import plots
-from abs_service.display.page.recording import Record, ask
-from abs_service.display.page.reinitialization import Reinitialization, Send
+from abs_service.display.page.recording import ask
+from abs_service.display.page.reinitialization import Reinitialization
 from abs_service.display.page.scene import Scene
 from abs_service.tracking.tracker_log import points
 from calib.camera import Camera
@@ -37,30 +38,22 @@ SAME_NS = 20_000_000
 HOST = "127.0.0.1"
 
 
-@dataclass(frozen=True, slots=True)
-class Commands:
-    """Commands to a rig: to a tracker, and to its recorder."""
-
-    reinitialize: Send
-    record: Record
-
-
 class Page:
     """One page of one rig.
 
     Args:
         feed: of the rig.
-        endpoint: of the rig, for people to read.
+        silence: what to do while nothing is heard of the rig, in words.
         port: to listen at; the next free one is taken.
         view_only: True leaves out everything that acts on the rig.
-        references: by tracker, the sensor in whose depth image its object is detected.
         commands: to the rig.
+        clock: monotonic time [ns].
     """
 
     def __init__(
-        self, feed: Feed, endpoint: str, port: int, view_only: bool, references: Mapping[str, str], commands: Commands
+        self, feed: Feed, silence: str, port: int, view_only: bool, commands: Commands, clock: Callable[[], int]
     ) -> None:
-        self._feed, self._endpoint, self._references = feed, endpoint, references
+        self._feed, self._silence, self._references, self._clock = feed, silence, commands.references, clock
         with _quiet():
             self._server = viser.ViserServer(HOST, port, label="abs-service", verbose=False)
         self._scene = Scene(self._server)
@@ -81,6 +74,11 @@ class Page:
         """Address of the page."""
         return f"http://{HOST}:{self._server.get_port()}"
 
+    @property
+    def gui(self) -> viser.GuiApi:
+        """The panel, for further controls."""
+        return self._server.gui
+
     def run(self, stop: threading.Event, tick: Callable[[], None]) -> None:
         """Updates the page until stopped; calls `tick` at least twice a second."""
         periods_s = {self._draw_mesh: MESH_S, self._draw_images: IMAGES_S, self._write: WORDS_S}
@@ -88,12 +86,12 @@ class Page:
             tick()
             looked_at = bool(self._server.get_clients())
             self._feed.watch_images(looked_at)
-            now_s = self._feed.now_s
+            now_s = 1e-9 * self._clock()
             for draw in periods_s if looked_at else ():
                 if now_s >= self._due_s[draw]:
                     self._due_s[draw] = max(self._due_s[draw] + periods_s[draw], now_s)
                     draw()
-            stop.wait(max(self._due_s[self._draw_mesh] - self._feed.now_s, 0.002) if looked_at else IDLE_S)
+            stop.wait(max(self._due_s[self._draw_mesh] - 1e-9 * self._clock(), 0.002) if looked_at else IDLE_S)
 
     def close(self) -> None:
         """Ends the server."""
@@ -184,7 +182,7 @@ class Page:
         self._reinitialization.look()
 
     def _status(self, tracker: str) -> list[words.Words]:
-        silent = words.silence(self._feed.age_s(), self._endpoint)
+        silent = words.silence(self._feed.age_s(), self._silence)
         if silent is not None:
             return [silent]
         found = self._feed.newest(keys.state(tracker), DeformationState)
