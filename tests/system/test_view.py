@@ -4,6 +4,7 @@ import re
 import signal
 import socket
 import time
+from pathlib import Path
 
 import pytest
 
@@ -26,6 +27,9 @@ OPTIONS = [
     "--enable-unsafe-swiftshader",
     "--use-angle=swiftshader",
 ]
+
+#: A rig with two trackers, called left and right.
+PAIR = Path(__file__).parents[2] / "examples" / "rigs" / "two_trackers.toml"
 
 PATIENCE_S = 120  # a browser that renders in software, beside a rig, on a machine whose other core runs other tests
 
@@ -52,9 +56,10 @@ def port():
         return unused.getsockname()[1]
 
 
-def _opened(browser, port):
+def _opened(browser, port, **screen):
     """The page, once it says something, and how long that took [s]."""
-    page = browser.new_page(viewport={"width": 640, "height": 480})  # small: every pixel is rendered in software
+    small = {"viewport": {"width": 640, "height": 480}}  # every pixel is rendered in software
+    page = browser.new_page(**(screen or small))
     page.set_default_timeout(1e3 * PATIENCE_S)
     begin_s = time.monotonic()
     while True:
@@ -176,6 +181,16 @@ def test_the_page_shows_a_mesh_that_moves_acts_and_connects_again(run, rig_file,
     _says(page, "Tracking")
 
 
+def test_all_trackers_of_a_rig_are_shown(endpoint, launch, browser, port, tmp_path):
+    rig_file = tmp_path / "pair.toml"
+    rig_file.write_text(f'{PAIR.read_text("utf-8")}\n[bus]\nendpoint = "{endpoint}"\n', encoding="utf-8")
+    launch("run", rig_file, "--no-record", "--json")
+    launch("view", rig_file, "--port", port)
+    page, _ = _opened(browser, port)
+    for tracker in ("left", "right"):
+        _says(page, f"{tracker}: Tracking")
+
+
 def test_a_page_that_only_shows_has_no_buttons(run, rig_file, launch, browser, port):
     launch("view", rig_file, "--port", port, "--view-only")
     page, _ = _opened(browser, port)
@@ -199,3 +214,20 @@ def test_a_recording_is_played_to_its_end_stepped_back_and_played_again(tmp_path
     assert page.get_by_role("button", name="Reinitialise").count() == 0
     server.send_signal(signal.SIGTERM)
     assert server.wait(PATIENCE_S) == 0
+
+
+def test_on_a_phone_the_panel_leaves_half_of_the_scene_and_its_controls_are_in_reach(tmp_path, launch, browser, port):
+    launch("view", write_estimated(tmp_path / "x.mcap"), "--port", port)
+    page, _ = _opened(browser, port, viewport={"width": 390, "height": 844}, is_mobile=True, has_touch=True)
+    _says(page, "Tracking")
+    play = page.get_by_role("button", name="Play", exact=True)
+    play.wait_for()
+    status, canvas = page.locator(".abs-status").first.bounding_box(), page.locator("canvas").first.bounding_box()
+    assert canvas["width"] == 390
+    for box in (status, play.bounding_box()):
+        assert 0 <= box["x"] <= 390 - box["width"]
+        assert 844 / 3 <= box["y"] <= 844 - box["height"]
+    page.get_by_role("button", name="Back").tap(force=True)
+    _says(page, "Object lost")
+    page.get_by_role("tab", name="Images").tap(force=True)
+    _says(page, "tof/depth")

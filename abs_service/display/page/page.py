@@ -8,16 +8,14 @@ from os import devnull
 
 import numpy as np
 import viser
-from absmsg.v1.deformation_state_pb2 import DeformationState
 from absmsg.v1.deformed_mesh_pb2 import DeformedMesh
-from absmsg.v1.health_pb2 import Health
 
 from abs_service.bus import keys
-from abs_service.display.page import pictures, table, words
+from abs_service.display.page import pictures, status, table, words
 from abs_service.display.page.choosing import Choosing, Measured
 from abs_service.display.page.commands import Commands
-from abs_service.display.page.feed import Feed, rate_hz
-from abs_service.display.page.fields import FIELDS, ColorScale, MeshView, residual
+from abs_service.display.page.feed import Feed
+from abs_service.display.page.fields import FIELDS, ColorScale, Drawn, MeshView, joined, residual
 from abs_service.display.page.gestures import Gestures
 from abs_service.display.page.panel import Button, Panel
 from abs_service.display.page.plots import plots
@@ -63,11 +61,9 @@ class Page:
         self._choosing = Choosing(gestures, self._look, self._panel.answer, self._reinitialization.ask)
         self._record = commands.record
         self._scales = {name: ColorScale(field) for name, field in FIELDS.items()}
-        self._drawn: object = None
-        self._view: MeshView | None = None
-        self._exposure_ns = 0  # of that mesh
+        self._drawn: dict[str, Drawn] = {}  # by tracker
         self._measured: dict[str, Measured] = {}  # by sensor
-        self._due_s = dict.fromkeys((self._draw_mesh, self._draw_images, self._write), 0.0)
+        self._due_s = dict.fromkeys((self._draw_meshes, self._draw_images, self._write), 0.0)
 
     @property
     def url(self) -> str:
@@ -81,7 +77,7 @@ class Page:
 
     def run(self, stop: threading.Event, tick: Callable[[], None]) -> None:
         """Updates the page until stopped; calls `tick` at least twice a second."""
-        periods_s = {self._draw_mesh: MESH_S, self._draw_images: IMAGES_S, self._write: WORDS_S}
+        periods_s = {self._draw_meshes: MESH_S, self._draw_images: IMAGES_S, self._write: WORDS_S}
         while not stop.is_set():
             tick()
             looked_at = bool(self._server.get_clients())
@@ -91,25 +87,29 @@ class Page:
                 if now_s >= self._due_s[draw]:
                     self._due_s[draw] = max(self._due_s[draw] + periods_s[draw], now_s)
                     draw()
-            stop.wait(max(self._due_s[self._draw_mesh] - 1e-9 * self._clock(), 0.002) if looked_at else IDLE_S)
+            stop.wait(max(self._due_s[self._draw_meshes] - 1e-9 * self._clock(), 0.002) if looked_at else IDLE_S)
 
     def close(self) -> None:
         """Ends the server."""
         with _quiet():
             self._server.stop()
 
-    def _draw_mesh(self) -> None:
-        found = self._feed.newest(keys.mesh(self._panel.tracker), DeformedMesh)
+    def _draw_meshes(self) -> None:
+        for tracker in self._feed.trackers():
+            self._draw_mesh(tracker)
+
+    def _draw_mesh(self, tracker: str) -> None:
+        found, before = self._feed.newest(keys.mesh(tracker), DeformedMesh), self._drawn.get(tracker)
         if found is None or not (mesh := found[0]).vertices_f32:
             return
         stale, name = found[1] > words.STALE_S, self._panel.field
-        drawn = mesh.header.boot_id, mesh.header.seq, stale, name, self._panel.shows
-        if drawn == self._drawn or (view := self._mesh_view(mesh, name == "residual")) is None:
+        state = mesh.header.boot_id, mesh.header.seq, stale, name, self._panel.shows
+        if (before and before.state == state) or (view := self._mesh_view(mesh, name == "residual")) is None:
             return
-        self._drawn, self._view, self._exposure_ns = drawn, view, mesh.header.t_host_ns
+        self._drawn[tracker] = Drawn(view, mesh.header.t_host_ns, state)
         colors = self._scales[name].colors(FIELDS[name].values(view))
-        self._scene.show_mesh(view, colors, stale)
-        self._scene.show_first(view, self._panel.shows[0])
+        self._scene.show_mesh(tracker, view, colors, stale)
+        self._scene.show_first(tracker, view, self._panel.shows[0])
 
     def _mesh_view(self, mesh: DeformedMesh, with_image: bool) -> MeshView | None:
         """View of a mesh to draw; None as long as its faces are unknown."""
@@ -138,8 +138,10 @@ class Page:
 
     def _draw_images(self) -> None:
         self._scene.show_cameras(self._feed.cameras(), self._panel.shows[2])
+        chosen = self._drawn.get(self._panel.tracker)
+        vertices, faces = joined(one.view for one in self._drawn.values())
         for topic in self._feed.streams():
-            found = self._feed.frame(topic, self._exposure_ns)
+            found = self._feed.frame(topic, chosen.exposure_ns if chosen else 0)
             if found is None or (camera := self._camera(found[0])) is None:
                 continue
             frame, age_s = found
@@ -149,8 +151,6 @@ class Page:
                 measured = self._measured[frame.sensor] = Measured(pictures.radial(frame, camera), camera)
                 points_r, _, spacing_m = pictures.cloud(measured.distance, camera)
                 self._scene.show_points(frame.sensor, points_r, spacing_m, stale, self._panel.shows[1])
-            faces = self._view.faces if self._view is not None else np.empty((0, 3), np.int32)
-            vertices = self._view.vertices if self._view is not None else np.empty((0, 3))
             drawn = pictures.with_mesh(pictures.grey(image) if stale else image, camera, vertices, faces)
             name = topic.removesuffix("/image")
             state = f"{words.age(age_s)} old" if stale else f"{self._feed.image_rate_hz(topic):.1f} Hz"
@@ -160,14 +160,14 @@ class Page:
 
     def _draw_residual(self, stream: str, frame: Frame, camera: Camera, image: pictures.Picture, stale: bool) -> None:
         """Draws the residual of the mesh over a depth image, while it is wanted."""
-        name, view = f"{stream} residual", self._view
-        if not self._panel.shows_residual or stale or view is None:
+        name, chosen = f"{stream} residual", self._drawn.get(self._panel.tracker)
+        if not self._panel.shows_residual or stale or chosen is None:
             self._panel.hide_image(name)
             return
-        if abs(frame.t_host_ns - self._exposure_ns) > SAME_NS:
+        if abs(frame.t_host_ns - chosen.exposure_ns) > SAME_NS:
             return
         scale = self._scales["residual"]
-        view = replace(view, measured=pictures.radial(frame, camera), camera=camera)
+        view = replace(chosen.view, measured=pictures.radial(frame, camera), camera=camera)
         drawn = pictures.with_colors(image, camera, view.vertices, view.faces, residual(view), scale.colors)
         self._panel.show_image(name, f"{stream}, residual up to ± {scale.end:g} mm", drawn)
 
@@ -175,36 +175,11 @@ class Page:
         self._panel.offer(self._feed.trackers())
         tracker = self._panel.tracker
         numbers = self._feed.numbers(tracker)
-        self._panel.show_status(self._status(tracker))
+        self._panel.show_status(status.lines(self._feed, tracker, self._silence))
         self._panel.show_legend(self._scales[self._panel.field].end)
         self._panel.show_table(table.rows(self._feed, tracker))
         self._panel.show_plots(plots(numbers, self._feed.now_s))
         self._reinitialization.look()
-
-    def _status(self, tracker: str) -> list[words.Words]:
-        silent = words.silence(self._feed.age_s(), self._silence)
-        if silent is not None:
-            return [silent]
-        found = self._feed.newest(keys.state(tracker), DeformationState)
-        state, age_s = found if found else (DeformationState(), float("inf"))
-        name = DeformationState.Status.Name(state.status).removeprefix("STATUS_") if found else ""
-        lines = [words.tracker(name, state.reasons, state.warnings, age_s, 1e3 * state.deviation_m)]
-        numbers = self._feed.numbers(tracker)
-        camera_hz = self._reference_hz()
-        slow = words.slow(rate_hz(numbers, self._feed.now_s), camera_hz, sum(one.skipped for one in numbers))
-        if slow and age_s <= words.STALE_S:
-            lines.append(words.Words("The tracker is slow", slow, words.STATUS["DEGRADED"][1]))
-        for health, health_age_s in self._feed.healths():
-            of_status = health.component == f"track/{tracker}" and health.message.startswith(name)
-            if health_age_s < 3 * words.STALE_S and health.level >= Health.LEVEL_WARNING and not of_status:
-                color = words.STATUS["LOST" if health.level == Health.LEVEL_ERROR else "DEGRADED"][1]
-                lines.append(words.Words(health.component, health.message, color))
-        return lines
-
-    def _reference_hz(self) -> float:
-        """Rate of the fastest depth stream, which estimates should keep up with [1/s]; 0 if unknown."""
-        depth = [topic for topic in self._feed.streams() if topic.endswith("/depth/image")]
-        return max((self._feed.image_rate_hz(topic) for topic in depth), default=0.0)
 
     def _buttons(self) -> dict[str, Button]:
         def record(recording: bool) -> None:
