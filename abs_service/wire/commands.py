@@ -31,16 +31,16 @@ class Choice:
 
     Attributes:
         seed: a pixel of it; None without.
-        outline: corners of a polygon around it, in place of a seed; empty without.
+        polygon: corners of a polygon around it, in place of a seed; empty without.
     """
 
     seed: Pixel | None = None
-    outline: tuple[Pixel, ...] = ()
+    polygon: tuple[Pixel, ...] = ()
 
     def __str__(self) -> str:
         """It in words that continue a sentence; "" for the region of the rig file."""
-        if self.outline:
-            return f" in an outline of {len(self.outline)} corners"
+        if self.polygon:
+            return f" in a polygon of {len(self.polygon)} corners"
         return f" at pixel {list(self.seed)}" if self.seed else ""
 
 
@@ -49,7 +49,7 @@ AS_CONFIGURED = Choice()
 
 
 def box(left: int, top: int, right: int, bottom: int) -> tuple[Pixel, ...]:
-    """The outline of a box: from its first column and row to its last, in any order."""
+    """The polygon of a box: from its first column and row to its last, in any order."""
     return (left, top), (right, top), (right, bottom), (left, bottom)
 
 
@@ -119,8 +119,8 @@ def reinitialize(
     if choice.seed is not None:
         command.seed.column, command.seed.row = choice.seed
         command.seed.SetInParent()  # a pixel (0, 0) is one, too
-    for column, row in choice.outline:
-        command.outline.add(column=column, row=row)
+    for column, row in choice.polygon:
+        command.polygon.add(column=column, row=row)
     answers = bus.command(keys.reinitialize(tracker), REINITIALIZE, command.SerializeToString(), timeout_s)
     return CommandAnswer.FromString(answers[0].payload) if answers else None
 
@@ -185,4 +185,4 @@ def _refusal(command: Sample, message: str, rig: str) -> tuple[str, str]:
 def _choice(payload: bytes) -> Choice:
     parsed = Reinitialize.FromString(payload)
     seed = (parsed.seed.column, parsed.seed.row) if parsed.HasField("seed") else None
-    return Choice(seed, tuple((corner.column, corner.row) for corner in parsed.outline))
+    return Choice(seed, tuple((corner.column, corner.row) for corner in parsed.polygon))

@@ -193,10 +193,10 @@ def _check_model(model: SensorModel) -> None:
 
 
 def _check_reinitialize(command: Reinitialize) -> None:
-    corners = len(command.outline)
-    _require(not (corners and command.HasField("seed")), "a seed and an outline: one of them says where the object is")
+    corners = len(command.polygon)
+    _require(not (corners and command.HasField("seed")), "a seed and a polygon: one of them says where the object is")
     allowed = corners == 0 or MIN_CORNERS <= corners <= MAX_CORNERS
-    _require(allowed, f"an outline of {corners} corners: {MIN_CORNERS} to {MAX_CORNERS} are allowed")
+    _require(allowed, f"a polygon of {corners} corners: {MIN_CORNERS} to {MAX_CORNERS} are allowed")
 
 
 def _check_truth(truth: SurfaceTruth) -> None:

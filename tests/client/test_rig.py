@@ -93,9 +93,9 @@ def test_the_calibration_of_a_sensor(bus, rig):
 
 
 @pytest.mark.parametrize(
-    ("seed", "outline"), [(None, ()), ((0, 0), ()), ((111, 133), ()), (None, ((80, 90), (160, 90), (120, 170)))]
+    ("seed", "polygon"), [(None, ()), ((0, 0), ()), ((111, 133), ()), (None, ((80, 90), (160, 90), (120, 170)))]
 )
-def test_a_tracker_detects_its_object_anew(bus, rig, headers, seed, outline):
+def test_a_tracker_detects_its_object_anew(bus, rig, headers, seed, polygon):
     choices = []
 
     def act(choice):
@@ -103,8 +103,8 @@ def test_a_tracker_detects_its_object_anew(bus, rig, headers, seed, outline):
         return "" if choice == commands.AS_CONFIGURED else REGION
 
     commands.answer_reinitialize(bus, "sheet", headers, Health(bus, "track/sheet", headers), act)
-    assert rig.reinitialize("sheet", seed, outline) == (REGION if seed or outline else "")
-    assert choices == [commands.Choice(seed, outline)]
+    assert rig.reinitialize("sheet", seed, polygon) == (REGION if seed or polygon else "")
+    assert choices == [commands.Choice(seed, polygon)]
 
 
 def test_a_refusal_is_raised_with_its_reason(bus, rig, headers):

@@ -128,7 +128,7 @@ def test_a_box_and_a_lasso_choose_the_object(run, rig_file, launch, browser, por
         ("Draw a lasso", "corner by corner", _draw_lasso),
     ):
         _chosen(page, listener, button, hint, lambda draw=draw: draw(page))
-        _says(page, "outline = [[")
+        _says(page, "polygon = [[")
 
 
 def test_the_page_shows_a_mesh_that_moves_acts_and_connects_again(run, rig_file, endpoint, launch, browser, port):

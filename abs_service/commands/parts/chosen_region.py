@@ -30,7 +30,7 @@ def reinitialize(tracking: TrackingSession, rig: Rig, plan: Plan, tracker: str, 
         tracking.reinitialize()
         return ""
     camera = rig.sensors[plan.reference].camera
-    for pixel in (choice.seed,) if choice.seed else choice.outline:
+    for pixel in (choice.seed,) if choice.seed else choice.polygon:
         if pixel[0] >= camera.width or pixel[1] >= camera.height:
             size = f"{camera.width} × {camera.height} pixels"
             raise RefusedError(f"the pixel {list(pixel)} is outside the depth image of {size}")
@@ -43,8 +43,8 @@ def reinitialize(tracking: TrackingSession, rig: Rig, plan: Plan, tracker: str, 
 
 def chosen(region: RegionSettings, choice: Choice) -> RegionSettings | None:
     """The region of a rig file, with a user's choice; None if there is none."""
-    if choice.outline:
-        return in_outline(region, choice.outline)
+    if choice.polygon:
+        return in_polygon(region, choice.polygon)
     return at_pixel(region, choice.seed) if choice.seed else None
 
 
@@ -59,34 +59,34 @@ def at_pixel(region: RegionSettings, pixel: Pixel) -> RegionSettings:
     """
     match region:
         case above_plane.Settings():
-            return replace(region, seed=pixel, outline=None)
+            return replace(region, seed=pixel, polygon=None)
         case seed.Settings():
-            return replace(region, pixel=pixel, color=None, motion_s=None, outline=None)
+            return replace(region, pixel=pixel, color=None, motion_s=None, polygon=None)
         case nearest.Settings() | distance.Settings():
             return seed.Settings(pixel, largest_step_m=region.largest_step_m, within=region.within)
         case _:
             return seed.Settings(pixel)
 
 
-def in_outline(region: RegionSettings, outline: tuple[Pixel, ...]) -> RegionSettings:
-    """The region of a rig file, limited to an outline: of it the nearest surface, or the one on the plane.
+def in_polygon(region: RegionSettings, polygon: tuple[Pixel, ...]) -> RegionSettings:
+    """The region of a rig file, limited to a polygon: of it the nearest surface, or the one on the plane.
 
     The rig file's settings of surfaces are kept as by `at_pixel`.
 
     Args:
         region: of the rig file.
-        outline: corners (column, row) in the depth image.
+        polygon: corners (column, row) in the depth image.
     """
     match region:
         case above_plane.Settings():
-            return replace(region, seed=None, outline=outline)
+            return replace(region, seed=None, polygon=polygon)
         case nearest.Settings():
-            return replace(region, outline=outline)
+            return replace(region, polygon=polygon)
         case seed.Settings() | distance.Settings():
             kept = region.largest_step_m, region.minimum_pixels, region.within
-            return nearest.Settings(*kept, outline)
+            return nearest.Settings(*kept, polygon)
         case _:
-            return nearest.Settings(outline=outline)
+            return nearest.Settings(polygon=polygon)
 
 
 def toml(tracker: str, region: RegionSettings) -> str:

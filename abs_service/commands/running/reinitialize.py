@@ -40,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="first and last column and row of a box around it",
     )  # fmt: skip
     where.add_argument(
-        "--outline", metavar="U V", nargs="+", type=_place, action=_Outline,
+        "--polygon", metavar="U V", nargs="+", type=_place, action=_Polygon,
         help=f"column and row of each corner, {MIN_CORNERS} to {MAX_CORNERS}, of a polygon around it",
     )  # fmt: skip
 
@@ -84,7 +84,7 @@ def request(bus: Bus, tracker: str, headers: HeaderFactory, choice: commands.Cho
     return Exit.OK
 
 
-class _Outline(argparse.Action):
+class _Polygon(argparse.Action):
     """Makes pairs of columns and rows."""
 
     def __call__(
@@ -99,15 +99,15 @@ class _Outline(argparse.Action):
         if len(values) % 2 or not MIN_CORNERS <= len(corners) <= MAX_CORNERS:
             allowed = f"{MIN_CORNERS} to {MAX_CORNERS} corners have a column and a row each"
             raise argparse.ArgumentError(self, f"{len(values)} numbers; {allowed}")
-        namespace.outline = corners
+        namespace.polygon = corners
 
 
 def _choice(arguments: argparse.Namespace) -> commands.Choice:
     if arguments.seed:
         return commands.Choice(seed=tuple(arguments.seed))
     if arguments.box:
-        return commands.Choice(outline=commands.box(*arguments.box))
-    return commands.Choice(outline=arguments.outline or ())
+        return commands.Choice(polygon=commands.box(*arguments.box))
+    return commands.Choice(polygon=arguments.polygon or ())
 
 
 def _place(text: str) -> int:

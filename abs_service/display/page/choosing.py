@@ -20,7 +20,7 @@ REACH = 1.5
 #: Pixels over which the pixels inside a lasso are joined, and the smallest patch of them that counts.
 GAP_PX, SPECK_PX = 5, 16
 
-#: Largest distance of a lasso's simplified outline from its pixels, at first [px].
+#: Largest distance of a lasso's simplified polygon from its pixels, at first [px].
 SIMPLIFIED_PX = 1.0
 
 
@@ -94,16 +94,16 @@ def in_box(measured: Measured, eye: Eye, drawn: NDArray[np.float64]) -> Choice |
     rows, columns = np.nonzero(_inside(measured, eye, drawn))
     if len(rows) < SPECK_PX:
         return None
-    return Choice(outline=commands.box(int(columns.min()), int(rows.min()), int(columns.max()), int(rows.max())))
+    return Choice(polygon=commands.box(int(columns.min()), int(rows.min()), int(columns.max()), int(rows.max())))
 
 
 def in_lasso(measured: Measured, eye: Eye, drawn: NDArray[np.float64]) -> Choice | None:
-    """The outline of the pixels whose points lie in a lasso on the screen, with corners (k, 2); None if too few do."""
-    corners = outline(_inside(measured, eye, drawn))
-    return Choice(outline=corners) if corners else None
+    """The polygon of the pixels whose points lie in a lasso on the screen, with corners (k, 2); None if too few do."""
+    corners = polygon(_inside(measured, eye, drawn))
+    return Choice(polygon=corners) if corners else None
 
 
-def outline(inside: NDArray[np.bool_]) -> tuple[Pixel, ...]:
+def polygon(inside: NDArray[np.bool_]) -> tuple[Pixel, ...]:
     """Corners of a polygon around pixels (height, width): of one patch its contour, of several the hull of all.
 
     No corners if there is no patch of some size.

@@ -15,7 +15,7 @@ from abs_service.wire.commands import box as corners_of
 from tests.abs_service.tracking.driving import default_plan, drive, rig_of, simulate
 
 PIXEL = (111, 133)
-OUTLINE = ((80, 90), (160, 90), (120, 170))
+POLYGON = ((80, 90), (160, 90), (120, 170))
 MASK = Path("/rigs/mask.png")
 
 
@@ -51,23 +51,23 @@ def kept(chosen):
 @pytest.mark.parametrize(
     ("region", "chosen"),
     [
-        (nearest.Settings(0.02, 100, MASK), nearest.Settings(0.02, 100, MASK, OUTLINE)),
-        (distance.Settings(1.2, largest_step_m=0.03), nearest.Settings(0.03, outline=OUTLINE)),
-        (above_plane.Settings(0.005, (1, 2)), above_plane.Settings(0.005, outline=OUTLINE)),
-        (seed.Settings(motion_s=2.0, minimum_pixels=30), nearest.Settings(minimum_pixels=30, outline=OUTLINE)),
-        (box.Settings((0, 0, 0), (1, 1, 1)), nearest.Settings(outline=OUTLINE)),
-        (mask.Settings(MASK), nearest.Settings(outline=OUTLINE)),
+        (nearest.Settings(0.02, 100, MASK), nearest.Settings(0.02, 100, MASK, POLYGON)),
+        (distance.Settings(1.2, largest_step_m=0.03), nearest.Settings(0.03, polygon=POLYGON)),
+        (above_plane.Settings(0.005, (1, 2)), above_plane.Settings(0.005, polygon=POLYGON)),
+        (seed.Settings(motion_s=2.0, minimum_pixels=30), nearest.Settings(minimum_pixels=30, polygon=POLYGON)),
+        (box.Settings((0, 0, 0), (1, 1, 1)), nearest.Settings(polygon=POLYGON)),
+        (mask.Settings(MASK), nearest.Settings(polygon=POLYGON)),
     ],
 )
-def test_an_outline_goes_into_the_region_and_back_into_the_rig_file(region, chosen):
-    assert chosen_region.in_outline(region, OUTLINE) == chosen
+def test_a_polygon_goes_into_the_region_and_back_into_the_rig_file(region, chosen):
+    assert chosen_region.in_polygon(region, POLYGON) == chosen
     assert kept(chosen) == chosen
 
 
-def test_a_pixel_takes_the_place_of_an_outline():
-    for region in (nearest.Settings(outline=OUTLINE), seed.Settings((1, 2), outline=OUTLINE)):
+def test_a_pixel_takes_the_place_of_a_polygon():
+    for region in (nearest.Settings(polygon=POLYGON), seed.Settings((1, 2), polygon=POLYGON)):
         assert chosen_region.at_pixel(region, PIXEL) == seed.Settings(PIXEL)
-    assert chosen_region.at_pixel(above_plane.Settings(outline=OUTLINE), PIXEL) == above_plane.Settings(seed=PIXEL)
+    assert chosen_region.at_pixel(above_plane.Settings(polygon=POLYGON), PIXEL) == above_plane.Settings(seed=PIXEL)
 
 
 def test_defaults_are_left_out():
@@ -96,7 +96,7 @@ def test_a_running_tracker_takes_a_pixel_of_its_image_only():
         chosen_region.reinitialize(tracking, rig, plan, "sheet", Choice(seed=(camera.width, 0)))
 
 
-def test_a_running_tracker_takes_the_object_in_an_outline_until_the_next_command():
+def test_a_running_tracker_takes_the_object_in_a_polygon_until_the_next_command():
     """Of two sheets, the farther one is chosen by a box around it, and found there again."""
     simulation = simulate("simulated://pair?seed=1")
     rig, plan = rig_of(simulation), default_plan()
@@ -107,13 +107,13 @@ def test_a_running_tracker_takes_the_object_in_an_outline_until_the_next_command
     half = camera.width // 2
     column = camera.project(first[None])[0, 0]
     other = (half, 0, camera.width - 1, camera.height - 1) if column < half else (0, 0, half, camera.height - 1)
-    answer = chosen_region.reinitialize(tracking, rig, plan, "sheet", Choice(outline=corners_of(*other)))
-    assert answer == chosen_region.toml("sheet", nearest.Settings(outline=corners_of(*other)))
+    answer = chosen_region.reinitialize(tracking, rig, plan, "sheet", Choice(polygon=corners_of(*other)))
+    assert answer == chosen_region.toml("sheet", nearest.Settings(polygon=corners_of(*other)))
     steps = list(drive(tracking, simulation, range(2, 4)))
     assert (tracking.mesh_version, steps[-1].estimate.status) == (2, Status.TRACKING)
     found = camera.project(tracking.mesh.vertices)[:, 0]
     assert found.min() > half - 2 if column < half else found.max() < half + 2
-    outside = Choice(outline=corners_of(0, 0, camera.width, 5))
+    outside = Choice(polygon=corners_of(0, 0, camera.width, 5))
     with pytest.raises(RefusedError, match="outside the depth image"):
         chosen_region.reinitialize(tracking, rig, plan, "sheet", outside)
 

@@ -76,7 +76,7 @@ def test_a_seed_that_is_no_pixel_is_a_mistake_of_the_user(seed):
     assert ended.value.code == 2
 
 
-def test_a_box_is_an_outline_in_any_order():
+def test_a_box_is_a_polygon_in_any_order():
     assert commands.box(80, 90, 160, 170) == ((80, 90), (160, 90), (160, 170), (80, 170))
     assert sorted(commands.box(160, 170, 80, 90)) == sorted(commands.box(80, 90, 160, 170))
 
@@ -86,8 +86,8 @@ def test_a_box_is_an_outline_in_any_order():
     [
         ("", commands.AS_CONFIGURED),
         ("--seed 111 133", SEED),
-        ("--box 80 90 160 170", commands.Choice(outline=commands.box(80, 90, 160, 170))),
-        ("--outline 80 90 160 90 120 170", commands.Choice(outline=((80, 90), (160, 90), (120, 170)))),
+        ("--box 80 90 160 170", commands.Choice(polygon=commands.box(80, 90, 160, 170))),
+        ("--polygon 80 90 160 90 120 170", commands.Choice(polygon=((80, 90), (160, 90), (120, 170)))),
     ],
 )
 def test_what_is_typed_is_asked_for(monkeypatch, typed, choice):
@@ -99,7 +99,7 @@ def test_what_is_typed_is_asked_for(monkeypatch, typed, choice):
 
 
 @pytest.mark.parametrize(
-    "typed", ["--outline 1 2 3 4", "--outline 1 2 3 4 5 6 7", "--box 1 2 3", "--seed 1 2 --box 1 2 3 4"]
+    "typed", ["--polygon 1 2 3 4", "--polygon 1 2 3 4 5 6 7", "--box 1 2 3", "--seed 1 2 --box 1 2 3 4"]
 )
 def test_what_is_no_choice_is_a_mistake_of_the_user(typed):
     with pytest.raises(SystemExit) as ended:

@@ -19,9 +19,9 @@ SENDER = Header(rig="demo", boot_id="5f1c", host_clock="0b6c")
 
 
 def drawn(*rows, **others):
-    """A command with an outline of corners in these rows."""
-    outline = [Reinitialize.Pixel(column=row % 7, row=row) for row in rows]
-    return Reinitialize(tracker="sheet", header=SENDER, outline=outline, **others).SerializeToString()
+    """A command with a polygon of corners in these rows."""
+    polygon = [Reinitialize.Pixel(column=row % 7, row=row) for row in rows]
+    return Reinitialize(tracker="sheet", header=SENDER, polygon=polygon, **others).SerializeToString()
 
 
 class Bench:
@@ -63,7 +63,7 @@ def test_a_command_is_carried_out_answered_and_told(caplog):
     [
         (commands.Choice(seed=(111, 133)), " at pixel [111, 133]"),
         (commands.Choice(seed=(0, 0)), " at pixel [0, 0]"),
-        (commands.Choice(outline=TRIANGLE), " in an outline of 3 corners"),
+        (commands.Choice(polygon=TRIANGLE), " in a polygon of 3 corners"),
     ],
 )
 def test_a_choice_arrives_and_the_answer_says_how_to_keep_it(choice, words):
@@ -104,9 +104,9 @@ def test_a_seed_that_the_tracker_cannot_use_is_refused_and_told():
             "Pixel.row = 16384 must be in 0 … 16383",
         ),
         (commands.REINITIALIZE, drawn(1 << 14, 1, 1), "Pixel.row = 16384 must be in 0 … 16383"),
-        (commands.REINITIALIZE, drawn(1, 2), "an outline of 2 corners: 3 to 256 are allowed"),
-        (commands.REINITIALIZE, drawn(*range(257)), "an outline of 257 corners: 3 to 256 are allowed"),
-        (commands.REINITIALIZE, drawn(1, 2, 3, seed=Reinitialize.Pixel()), "a seed and an outline: one of them"),
+        (commands.REINITIALIZE, drawn(1, 2), "a polygon of 2 corners: 3 to 256 are allowed"),
+        (commands.REINITIALIZE, drawn(*range(257)), "a polygon of 257 corners: 3 to 256 are allowed"),
+        (commands.REINITIALIZE, drawn(1, 2, 3, seed=Reinitialize.Pixel()), "a seed and a polygon: one of them"),
     ],
 )
 def test_anything_else_is_refused_with_the_reason(message, payload, reason):

@@ -1,4 +1,4 @@
-"""Mask images and outlines, and regions that are limited to them."""
+"""Mask images and polygons, and regions that are limited to them."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ Select = Callable[[DepthView], NDArray[np.bool_]]
 
 #: Column or row of a corner [px], in the largest image of all; the corners (column, row) of a polygon.
 Place = Annotated[int, Ge(0), Le(16383)]
-Outline = Annotated[tuple[tuple[Place, Place], ...], MinLen(3)]
+Polygon = Annotated[tuple[tuple[Place, Place], ...], MinLen(3)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,13 +36,13 @@ class Restricted:
         return self.selection(self.limit(view))
 
 
-def restricted(selection: Select, within: Path | None, outline: Outline | None) -> Restricted:
+def restricted(selection: Select, within: Path | None, polygon: Polygon | None) -> Restricted:
     """The region of a selection that ignores all pixels outside a mask image and a polygon.
 
     Args:
         selection: selects the object's pixels in a limited view.
         within: the mask image, see `load_mask`; None for the entire view.
-        outline: corners of the polygon; None for the entire view.
+        polygon: corners of the polygon; None for the entire view.
 
     Raises:
         DetectionError: the file is missing or no image.
@@ -51,15 +51,15 @@ def restricted(selection: Select, within: Path | None, outline: Outline | None) 
 
     def limit(view: DepthView) -> DepthView:
         masked = view if mask is None else limited(view, mask)
-        return masked if outline is None else limited(masked, filled(outline, view.distance.shape))
+        return masked if polygon is None else limited(masked, filled(polygon, view.distance.shape))
 
     return Restricted(limit, selection)
 
 
-def filled(outline: Outline, shape: tuple[int, ...]) -> NDArray[np.bool_]:
+def filled(polygon: Polygon, shape: tuple[int, ...]) -> NDArray[np.bool_]:
     """Pixels (height, width) of a polygon, its edges included, in an image of that shape."""
     inside = np.zeros(shape, np.uint8)
-    cv2.fillPoly(inside, [np.array(outline, np.int32)], 1)
+    cv2.fillPoly(inside, [np.array(polygon, np.int32)], 1)
     return inside.view(np.bool_)
 
 

@@ -54,9 +54,9 @@ def test_the_middle_of_the_view_is_the_middle_of_the_screen_and_up_is_small():
 def test_a_box_holds_all_pixels_of_what_is_drawn_around(aside):
     choice = choosing.in_box(MEASURED, eye(aside), around(eye(aside)))
     assert choice is not None
-    assert len(choice.outline) == 4
-    assert filled(choice.outline, DISTANCE.shape)[BOARD].all()
-    assert np.count_nonzero(filled(choice.outline, DISTANCE.shape)) < 3 * np.count_nonzero(BOARD)
+    assert len(choice.polygon) == 4
+    assert filled(choice.polygon, DISTANCE.shape)[BOARD].all()
+    assert np.count_nonzero(filled(choice.polygon, DISTANCE.shape)) < 3 * np.count_nonzero(BOARD)
 
 
 @pytest.mark.parametrize("aside", [0.0, 0.4])
@@ -64,7 +64,7 @@ def test_a_lasso_holds_the_pixels_whose_points_are_in_it(aside):
     seen_from, drawn = eye(aside), around(eye(aside))
     choice = choosing.in_lasso(MEASURED, seen_from, drawn)
     assert choice is not None
-    assert filled(choice.outline, DISTANCE.shape)[BOARD].mean() > 0.9  # within a pixel
+    assert filled(choice.polygon, DISTANCE.shape)[BOARD].mean() > 0.9  # within a pixel
 
 
 def test_a_lasso_with_a_dent_leaves_out_the_dent():
@@ -74,28 +74,28 @@ def test_a_lasso_with_a_dent_leaves_out_the_dent():
     rays = np.array([((u - 31.5) / 60, (v - 23.5) / 60, 1.0) for u, v in corners])
     choice = choosing.in_lasso(MEASURED, seen_from, seen_from.project(T_RS[:3, 3] + rays @ T_RS[:3, :3].T))
     assert choice is not None
-    inside = filled(choice.outline, DISTANCE.shape)
+    inside = filled(choice.polygon, DISTANCE.shape)
     assert not inside[30, 33]
     assert inside[22, 33]
     assert not inside[~BOARD].any()
 
 
-def test_the_outline_of_several_patches_is_their_hull_and_specks_do_not_count():
+def test_the_polygon_of_several_patches_is_their_hull_and_specks_do_not_count():
     inside = np.zeros((48, 64), bool)
-    assert choosing.outline(inside) == ()
+    assert choosing.polygon(inside) == ()
     inside[2, 2] = True
-    assert choosing.outline(inside) == ()
+    assert choosing.polygon(inside) == ()
     inside[10:20, 10:20] = inside[30:40, 40:50] = True
-    hull = filled(choosing.outline(inside), inside.shape)
+    hull = filled(choosing.polygon(inside), inside.shape)
     assert hull[25, 30]
     assert not hull[2, 2]
 
 
-def test_an_outline_of_any_shape_has_few_enough_corners():
+def test_a_polygon_of_any_shape_has_few_enough_corners():
     rows, columns = np.mgrid[:1000, :1000]
     angle = np.arctan2(rows - 500, columns - 500)
     star = np.hypot(rows - 500, columns - 500) < 300 + 150 * np.sin(400 * angle)
-    assert 3 <= len(choosing.outline(star)) <= choosing.MAX_CORNERS
+    assert 3 <= len(choosing.polygon(star)) <= choosing.MAX_CORNERS
 
 
 class Pointer:
@@ -134,7 +134,7 @@ def test_boxes_and_lassos_are_asked_for_and_nothing_is_told():
     choosing_page, said, asked = page(Pointer(drawn=around(eye(0.0))))
     choosing_page.by_box("sheet")
     choosing_page.by_lasso("sheet")
-    assert [len(choice.outline) >= 4 for _, choice in asked] == [True, True]
+    assert [len(choice.polygon) >= 4 for _, choice in asked] == [True, True]
     assert "the lasso begins anew" in said[-1]
     empty = np.array([[0.0, 0.0], [0.01, 0.0], [0.01, 0.01]])
     for measured, drawn in ((MEASURED, empty), (None, around(eye(0.0)))):
