@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 
 from absmsg.v1.command_pb2 import CommandAnswer, Record, Reinitialize
 
@@ -24,12 +25,40 @@ ANSWER = CommandAnswer.DESCRIPTOR.full_name
 Pixel = tuple[int, int]
 
 
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """The object that a user chooses in the depth image of a tracker's reference; neither: the region of the rig file.
+
+    Attributes:
+        seed: a pixel of it; None without.
+        polygon: corners of a polygon around it, in place of a seed; empty without.
+    """
+
+    seed: Pixel | None = None
+    polygon: tuple[Pixel, ...] = ()
+
+    def __str__(self) -> str:
+        """It in words that continue a sentence; "" for the region of the rig file."""
+        if self.polygon:
+            return f" in a polygon of {len(self.polygon)} corners"
+        return f" at pixel {list(self.seed)}" if self.seed else ""
+
+
+#: The region of the rig file.
+AS_CONFIGURED = Choice()
+
+
+def box(left: int, top: int, right: int, bottom: int) -> tuple[Pixel, ...]:
+    """The polygon of a box: from its first column and row to its last, in any order."""
+    return (left, top), (right, top), (right, bottom), (left, bottom)
+
+
 class RefusedError(Exception):
     """A valid command that cannot be carried out; the message is the answer's reason."""
 
 
 def answer_reinitialize(
-    bus: Bus, tracker: str, headers: HeaderFactory, health: Health, act: Callable[[Pixel | None], str]
+    bus: Bus, tracker: str, headers: HeaderFactory, health: Health, act: Callable[[Choice], str]
 ) -> Subscription:
     """Answers requests to detect the object of a tracker anew; calls `act` for those that are valid.
 
@@ -40,16 +69,15 @@ def answer_reinitialize(
         tracker: its name.
         headers: of the answers.
         health: of the tracker.
-        act: detects anew, at a pixel if there is one, and returns the answer's `region`, or raises RefusedError; called
+        act: detects anew what was chosen, and returns the answer's `region`, or raises RefusedError; called
             from a thread of the transport.
     """
 
     def on_command(payload: bytes) -> str:
-        return act(_seed(payload))
+        return act(_choice(payload))
 
     def where(payload: bytes) -> str:
-        seed = _seed(payload)
-        return f" at {list(seed)}" if seed else ""
+        return str(_choice(payload))
 
     return _answer(bus, keys.reinitialize(tracker), REINITIALIZE, headers, health, on_command, where)
 
@@ -76,7 +104,7 @@ def answer_record(bus: Bus, headers: HeaderFactory, health: Health, act: Callabl
 
 
 def reinitialize(
-    bus: Bus, tracker: str, headers: HeaderFactory, timeout_s: float, seed: Pixel | None = None
+    bus: Bus, tracker: str, headers: HeaderFactory, timeout_s: float, choice: Choice = AS_CONFIGURED
 ) -> CommandAnswer | None:
     """Asks a tracker to detect its object anew; returns its answer, None if there is none.
 
@@ -85,12 +113,14 @@ def reinitialize(
         tracker: its name.
         headers: of this process.
         timeout_s: of the answer [s].
-        seed: a pixel of the object in the depth image of the tracker's reference; None: the region of its rig file.
+        choice: the object.
     """
     command = Reinitialize(header=headers.now(0), tracker=tracker)
-    if seed is not None:
-        command.seed.column, command.seed.row = seed
+    if choice.seed is not None:
+        command.seed.column, command.seed.row = choice.seed
         command.seed.SetInParent()  # a pixel (0, 0) is one, too
+    for column, row in choice.polygon:
+        command.polygon.add(column=column, row=row)
     answers = bus.command(keys.reinitialize(tracker), REINITIALIZE, command.SerializeToString(), timeout_s)
     return CommandAnswer.FromString(answers[0].payload) if answers else None
 
@@ -152,6 +182,7 @@ def _refusal(command: Sample, message: str, rig: str) -> tuple[str, str]:
     return "" if header.rig == rig else f"it is for rig {header.rig!r}", sender
 
 
-def _seed(payload: bytes) -> Pixel | None:
+def _choice(payload: bytes) -> Choice:
     parsed = Reinitialize.FromString(payload)
-    return (parsed.seed.column, parsed.seed.row) if parsed.HasField("seed") else None
+    seed = (parsed.seed.column, parsed.seed.row) if parsed.HasField("seed") else None
+    return Choice(seed, tuple((corner.column, corner.row) for corner in parsed.polygon))

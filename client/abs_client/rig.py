@@ -1,6 +1,6 @@
 """A running rig: its estimates, images and calibrations, and commands to it."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from types import TracebackType
 from typing import Self
 
@@ -97,16 +97,19 @@ class Rig:
         prefix = self._link.key("live/")
         return tuple(sorted(key.removeprefix(prefix) for key in self._link.tokens("live/**")))
 
-    def reinitialize(self, tracker: str, seed: tuple[int, int] | None = None) -> str:
+    def reinitialize(
+        self, tracker: str, seed: tuple[int, int] | None = None, polygon: Sequence[tuple[int, int]] = ()
+    ) -> str:
         """Has a tracker detect its object anew.
 
         Args:
             tracker: its name.
             seed: a pixel (column, row) of the object in the depth image of the tracker's reference sensor; None: what
                 the region of the rig file says.
+            polygon: in place of a seed, the corners (column, row), three or more, of a polygon around the object.
 
         Returns:
-            The lines of the rig file that make a seed last; "" without a seed.
+            The lines of the rig file that make a seed or a polygon last; "" without them.
 
         Raises:
             RefusedError: the tracker refuses, or this program's certificate does not allow it.
@@ -116,6 +119,8 @@ class Rig:
         if seed is not None:
             command.seed.column, command.seed.row = seed
             command.seed.SetInParent()  # a pixel (0, 0) is one, too
+        for column, row in polygon:
+            command.polygon.add(column=column, row=row)
         return self._command(f"{tracker}/reinitialize", command).region
 
     def record(self, recording: bool) -> None:

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any, TypeVar
 
 import numpy as np
+from absmsg.v1.command_pb2 import Reinitialize
 from absmsg.v1.deformed_mesh_pb2 import DeformedMesh, MeshTopology
 from absmsg.v1.frame_info_pb2 import FrameInfo
 from absmsg.v1.sensor_model_pb2 import SensorModel
@@ -26,6 +27,8 @@ LONGEST_FILE = 1 << 20
 MAX_ENTRIES = 2000
 #: Most points of a truth, whose surfaces are searched for the vertices of every estimate, or of a mesh for viewers.
 MAX_POINTS = 1 << 18
+#: Fewest and most corners of a polygon that a user draws around an object.
+MIN_CORNERS, MAX_CORNERS = 3, 256
 #: Largest image [pixels along a side].
 LARGEST_SIDE = 1 << 14
 #: A larger gap in sequence numbers is no loss: the numbers are not those of one publisher.
@@ -189,6 +192,13 @@ def _check_model(model: SensorModel) -> None:
     _require(len(model.T_rs) == 16, f"{model.sensor}: T_rs has {len(model.T_rs)} numbers, 16 are a pose")
 
 
+def _check_reinitialize(command: Reinitialize) -> None:
+    corners = len(command.polygon)
+    _require(not (corners and command.HasField("seed")), "a seed and a polygon: one of them says where the object is")
+    allowed = corners == 0 or MIN_CORNERS <= corners <= MAX_CORNERS
+    _require(allowed, f"a polygon of {corners} corners: {MIN_CORNERS} to {MAX_CORNERS} are allowed")
+
+
 def _check_truth(truth: SurfaceTruth) -> None:
     points = truth.rows * truth.columns
     size = f"SurfaceTruth of {truth.rows} × {truth.columns} points"
@@ -223,6 +233,7 @@ def _points(name: str, xyz_f32: bytes) -> int:
 #: What has to fit together in a message of a type, by its full name.
 _CONTENT: Mapping[str, Callable[[Any], None]] = {
     FrameInfo.DESCRIPTOR.full_name: _check_info,
+    Reinitialize.DESCRIPTOR.full_name: _check_reinitialize,
     SensorModel.DESCRIPTOR.full_name: _check_model,
     SurfaceTruth.DESCRIPTOR.full_name: _check_truth,
     DeformedMesh.DESCRIPTOR.full_name: _check_mesh,

@@ -2,7 +2,7 @@
 
 import struct
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Set
 from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
@@ -10,7 +10,7 @@ from typing import BinaryIO
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.reader import SeekingReader
-from mcap.records import Attachment, Channel, Chunk, McapRecord, Message, Schema
+from mcap.records import Attachment, Channel, Chunk, ChunkIndex, McapRecord, Message, Schema
 from mcap.stream_reader import StreamReader
 from mcap.summary import Summary
 from zstandard import ZstdError
@@ -34,10 +34,22 @@ class RecordingError(DeviceError):
 
 @dataclass(frozen=True)
 class ChunkLocation:
-    """File offset of a chunk, and its earliest message time [ns]."""
+    """A chunk of a file.
+
+    Attributes:
+        offset: in the file.
+        start_ns, end_ns: first and last log time [ns].
+        channels: that it has messages of; None if unknown.
+    """
 
     offset: int
     start_ns: int
+    end_ns: int
+    channels: frozenset[int] | None = None
+
+    def may_have(self, channels: Set[int]) -> bool:
+        """False if it has no message of any of these channels."""
+        return self.channels is None or not self.channels.isdisjoint(channels)
 
 
 @dataclass(frozen=True)
@@ -111,7 +123,8 @@ def _from_index(summary: Summary, stream: BinaryIO) -> Contents:
     stream.seek(0)
     return Contents(
         chunks=tuple(
-            ChunkLocation(index.chunk_start_offset, index.message_start_time) for index in summary.chunk_indexes
+            ChunkLocation(one.chunk_start_offset, one.message_start_time, one.message_end_time, _channels(one))
+            for one in summary.chunk_indexes
         ),
         topics=_topics(summary.schemas, summary.channels, counts),
         attachments={attachment.name: attachment.data for attachment in SeekingReader(stream).iter_attachments()},
@@ -120,6 +133,11 @@ def _from_index(summary: Summary, stream: BinaryIO) -> Contents:
         truncated=False,
         damaged=0,
     )
+
+
+def _channels(index: ChunkIndex) -> frozenset[int] | None:
+    """Channels with messages in a chunk; None for a writer that tells none."""
+    return frozenset(index.message_index_offsets) or None
 
 
 def _scan_records(stream: BinaryIO) -> Contents:
@@ -141,7 +159,7 @@ def _scan_records(stream: BinaryIO) -> Contents:
         except DAMAGE:
             damaged += 1
             continue
-        chunks.append(ChunkLocation(offset, record.message_start_time))
+        chunks.append(ChunkLocation(offset, record.message_start_time, record.message_end_time))
         times += [record.message_start_time, record.message_end_time]
         schemas |= {schema.id: schema for schema in contents if isinstance(schema, Schema)}
         channels |= {channel.id: channel for channel in contents if isinstance(channel, Channel)}

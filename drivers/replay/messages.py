@@ -19,7 +19,7 @@ def messages(path: Path, contents: Contents, schemas: Set[str]) -> Iterator[tupl
     Args:
         path: of the file.
         contents: its index.
-        schemas: full names of protobuf messages.
+        schemas: full names of protobuf messages; chunks without any of them are not read.
 
     Raises:
         RecordingError: a corrupt chunk.
@@ -32,7 +32,7 @@ def messages(path: Path, contents: Contents, schemas: Set[str]) -> Iterator[tupl
     with path.open("rb") as stream:
         for number, chunk in enumerate(contents.chunks):
             try:
-                records = read_chunk(stream, chunk)
+                records = read_chunk(stream, chunk) if chunk.may_have(wanted) else []
             except DAMAGE as error:
                 where = f"{path}: the chunk at byte {chunk.offset} is damaged ({error})"
                 raise RecordingError(f"{where}; `abs-service recover` saves the rest") from error

@@ -92,17 +92,19 @@ def test_the_calibration_of_a_sensor(bus, rig):
         rig.camera("color")
 
 
-@pytest.mark.parametrize("seed", [None, (0, 0), (111, 133)])
-def test_a_tracker_detects_its_object_anew(bus, rig, headers, seed):
-    seeds = []
+@pytest.mark.parametrize(
+    ("seed", "polygon"), [(None, ()), ((0, 0), ()), ((111, 133), ()), (None, ((80, 90), (160, 90), (120, 170)))]
+)
+def test_a_tracker_detects_its_object_anew(bus, rig, headers, seed, polygon):
+    choices = []
 
-    def act(given):
-        seeds.append(given)
-        return REGION if given else ""
+    def act(choice):
+        choices.append(choice)
+        return "" if choice == commands.AS_CONFIGURED else REGION
 
     commands.answer_reinitialize(bus, "sheet", headers, Health(bus, "track/sheet", headers), act)
-    assert rig.reinitialize("sheet", seed) == (REGION if seed else "")
-    assert seeds == [seed]
+    assert rig.reinitialize("sheet", seed, polygon) == (REGION if seed or polygon else "")
+    assert choices == [commands.Choice(seed, polygon)]
 
 
 def test_a_refusal_is_raised_with_its_reason(bus, rig, headers):

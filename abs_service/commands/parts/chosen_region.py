@@ -1,4 +1,4 @@
-"""The region of a tracker whose user says where the object is: for the running tracker, and for the rig file."""
+"""The region of a tracker whose user chooses the object: for the running tracker, and for the rig file."""
 
 import json
 from dataclasses import fields, replace
@@ -8,36 +8,44 @@ from abs_service.tracker.detection.initial_detection import DetectionError
 from abs_service.tracker.detection.regions import above_plane, distance, nearest, seed
 from abs_service.tracking.plan import Plan, RegionSettings
 from abs_service.tracking.session import TrackingSession
-from abs_service.wire.commands import Pixel, RefusedError
+from abs_service.wire.commands import Choice, Pixel, RefusedError
 from calib.rig import Rig
 
 
-def reinitialize(tracking: TrackingSession, rig: Rig, plan: Plan, tracker: str, pixel: Pixel | None) -> str:
-    """Makes a tracker look for its object anew; returns the table of the rig file that keeps a pixel, else "".
+def reinitialize(tracking: TrackingSession, rig: Rig, plan: Plan, tracker: str, choice: Choice) -> str:
+    """Makes a tracker look for its object anew; returns the table of the rig file that keeps a choice, else "".
 
     Args:
         tracking: the tracker.
         rig: its sensors.
         plan: as its rig file has it.
         tracker: its name.
-        pixel: of the object in the depth image of its reference; None: the rig file's region.
+        choice: the object, in the depth image of its reference.
 
     Raises:
-        RefusedError: the pixel is outside the image, or the region's mask is gone.
+        RefusedError: a pixel is outside the image, or the region's mask is gone.
     """
-    if pixel is None:
+    region = chosen(plan.region, choice)
+    if region is None:
         tracking.reinitialize()
         return ""
     camera = rig.sensors[plan.reference].camera
-    if pixel[0] >= camera.width or pixel[1] >= camera.height:
-        size = f"{camera.width} × {camera.height} pixels"
-        raise RefusedError(f"the pixel {list(pixel)} is outside the depth image of {size}")
-    region = at_pixel(plan.region, pixel)
+    for pixel in (choice.seed,) if choice.seed else choice.polygon:
+        if pixel[0] >= camera.width or pixel[1] >= camera.height:
+            size = f"{camera.width} × {camera.height} pixels"
+            raise RefusedError(f"the pixel {list(pixel)} is outside the depth image of {size}")
     try:
         tracking.reinitialize(region.build())
     except DetectionError as error:
         raise RefusedError(str(error)) from error
     return toml(tracker, region)
+
+
+def chosen(region: RegionSettings, choice: Choice) -> RegionSettings | None:
+    """The region of a rig file, with a user's choice; None if there is none."""
+    if choice.polygon:
+        return in_polygon(region, choice.polygon)
+    return at_pixel(region, choice.seed) if choice.seed else None
 
 
 def at_pixel(region: RegionSettings, pixel: Pixel) -> RegionSettings:
@@ -51,13 +59,34 @@ def at_pixel(region: RegionSettings, pixel: Pixel) -> RegionSettings:
     """
     match region:
         case above_plane.Settings():
-            return replace(region, seed=pixel)
+            return replace(region, seed=pixel, polygon=None)
         case seed.Settings():
-            return replace(region, pixel=pixel, color=None, motion_s=None)
+            return replace(region, pixel=pixel, color=None, motion_s=None, polygon=None)
         case nearest.Settings() | distance.Settings():
             return seed.Settings(pixel, largest_step_m=region.largest_step_m, within=region.within)
         case _:
             return seed.Settings(pixel)
+
+
+def in_polygon(region: RegionSettings, polygon: tuple[Pixel, ...]) -> RegionSettings:
+    """The region of a rig file, limited to a polygon: of it the nearest surface, or the one on the plane.
+
+    The rig file's settings of surfaces are kept as by `at_pixel`.
+
+    Args:
+        region: of the rig file.
+        polygon: corners (column, row) in the depth image.
+    """
+    match region:
+        case above_plane.Settings():
+            return replace(region, seed=None, polygon=polygon)
+        case nearest.Settings():
+            return replace(region, polygon=polygon)
+        case seed.Settings() | distance.Settings():
+            kept = region.largest_step_m, region.minimum_pixels, region.within
+            return nearest.Settings(*kept, polygon)
+        case _:
+            return nearest.Settings(polygon=polygon)
 
 
 def toml(tracker: str, region: RegionSettings) -> str:

@@ -24,16 +24,16 @@ class SecurityError(Exception):
     """A file of `[bus.tls]` that cannot be used; the message names the rig file, key, value and error."""
 
 
-def add_config(parser: argparse.ArgumentParser) -> None:
-    """Adds CONFIG."""
+def add_config(parser: argparse.ArgumentParser, what: str = "TOML file of the rig") -> None:
+    """Adds CONFIG, which is `what`."""
     parser.add_argument(
-        "config", metavar="CONFIG", nargs="?", type=Path, help="TOML file of the rig (default: the simulated demo rig)"
+        "config", metavar="CONFIG", nargs="?", type=Path, help=f"{what} (default: the simulated demo rig)"
     )
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Adds CONFIG, --connect and --listen."""
-    add_config(parser)
+def add_arguments(parser: argparse.ArgumentParser, what: str = "TOML file of the rig") -> None:
+    """Adds CONFIG, which is `what`, --connect and --listen."""
+    add_config(parser, what)
     where = parser.add_mutually_exclusive_group()
     where.add_argument("--connect", metavar="ENDPOINT", help="connect to this endpoint instead of bus.endpoint")
     where.add_argument("--listen", metavar="ENDPOINT", help="let the others connect here, instead of connecting")

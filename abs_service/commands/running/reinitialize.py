@@ -3,12 +3,14 @@
   abs-service reinitialize                  the tracker of the demo rig that `abs-service run` shows elsewhere
   abs-service reinitialize rig.toml sheet   one tracker of that rig
   abs-service reinitialize rig.toml sheet --seed 111 133   the object that this pixel of the depth image shows
+  abs-service reinitialize rig.toml sheet --box 80 90 160 170   the nearest object in this box of it
 
 A tracker that has lost its object does so by itself; this is for another object, or for a better view of the same.
 """
 
 import argparse
 import threading
+from typing import Any
 
 from absmsg.v1 import deformation_state_pb2
 
@@ -19,7 +21,7 @@ from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.commands.parts import rig_process
 from abs_service.supervision.exit_codes import Exit
 from abs_service.wire import commands
-from drivers.encoding.message_check import LARGEST_SIDE
+from drivers.encoding.message_check import LARGEST_SIDE, MAX_CORNERS, MIN_CORNERS
 
 #: Timeout of the detection [s].
 TIMEOUT_S = 10.0
@@ -29,10 +31,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the arguments of `abs-service reinitialize`."""
     rig_process.add_arguments(parser)
     parser.add_argument("tracker", metavar="TRACKER", nargs="?", help="its name (default: the first one)")
-    parser.add_argument(
-        "--seed", metavar=("U", "V"), nargs=2, type=_place,
-        help="column and row of a pixel of the object in the depth image of the tracker's reference sensor, "
-        "instead of the region of the rig file",
+    where = parser.add_argument_group(
+        "the object, in the depth image of the tracker's reference sensor, instead of the region of the rig file"
+    ).add_mutually_exclusive_group()
+    where.add_argument("--seed", metavar=("U", "V"), nargs=2, type=_place, help="column and row of a pixel of it")
+    where.add_argument(
+        "--box", metavar=("U", "V", "U2", "V2"), nargs=4, type=_place,
+        help="first and last column and row of a box around it",
+    )  # fmt: skip
+    where.add_argument(
+        "--polygon", metavar="U V", nargs="+", type=_place, action=_Polygon,
+        help=f"column and row of each corner, {MIN_CORNERS} to {MAX_CORNERS}, of a polygon around it",
     )  # fmt: skip
 
 
@@ -41,12 +50,12 @@ def run(arguments: argparse.Namespace) -> int:
     settings = rig_process.load_config(arguments)
     name = arguments.tracker or next(iter(settings.trackers), "")
     wiring.plan(settings, name)
-    seed = (arguments.seed[0], arguments.seed[1]) if arguments.seed else None
+    choice = _choice(arguments)
     with rig_process.open_bus(settings, arguments, "operator") as bus:
-        return request(bus, name, HeaderFactory(settings.name, WallClock()), seed)
+        return request(bus, name, HeaderFactory(settings.name, WallClock()), choice)
 
 
-def request(bus: Bus, tracker: str, headers: HeaderFactory, seed: tuple[int, int] | None = None) -> int:
+def request(bus: Bus, tracker: str, headers: HeaderFactory, choice: commands.Choice = commands.AS_CONFIGURED) -> int:
     """Sends the command once the tracker's first state shows that it runs, and waits for another mesh version."""
     versions: list[int] = []
     received, renewed = threading.Event(), threading.Event()
@@ -62,7 +71,7 @@ def request(bus: Bus, tracker: str, headers: HeaderFactory, seed: tuple[int, int
     if not received.wait(TIMEOUT_S):
         print(f'tracker "{tracker}" publishes nothing: does it run, and do its sensors deliver?')
         return Exit.FAILED
-    answer = commands.reinitialize(bus, tracker, headers, TIMEOUT_S, seed)
+    answer = commands.reinitialize(bus, tracker, headers, TIMEOUT_S, choice)
     if answer is None or not answer.accepted:
         print(f'tracker "{tracker}" refuses: {answer.reason if answer else "it gives no answer"}')
         return Exit.FAILED
@@ -73,6 +82,32 @@ def request(bus: Bus, tracker: str, headers: HeaderFactory, seed: tuple[int, int
     if answer.region:
         print(f"to keep it, write into the rig file, in place of its region:\n\n{answer.region}", end="")
     return Exit.OK
+
+
+class _Polygon(argparse.Action):
+    """Makes pairs of columns and rows."""
+
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: Any,
+        option_string: str | None = None,
+    ) -> None:
+        """Sets the argument to the corners; ends the program if a row is missing, or the number is not allowed."""
+        corners = tuple(zip(values[::2], values[1::2]))
+        if len(values) % 2 or not MIN_CORNERS <= len(corners) <= MAX_CORNERS:
+            allowed = f"{MIN_CORNERS} to {MAX_CORNERS} corners have a column and a row each"
+            raise argparse.ArgumentError(self, f"{len(values)} numbers; {allowed}")
+        namespace.polygon = corners
+
+
+def _choice(arguments: argparse.Namespace) -> commands.Choice:
+    if arguments.seed:
+        return commands.Choice(seed=tuple(arguments.seed))
+    if arguments.box:
+        return commands.Choice(polygon=commands.box(*arguments.box))
+    return commands.Choice(polygon=arguments.polygon or ())
 
 
 def _place(text: str) -> int:

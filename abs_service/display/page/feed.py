@@ -5,7 +5,7 @@ from collections import deque
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Protocol, TypeVar
 
 import numpy as np
 from absmsg.v1.deformation_state_pb2 import DeformationState
@@ -17,7 +17,7 @@ from google.protobuf.message import DecodeError, Message
 from numpy.typing import NDArray
 
 from abs_service.bus import keys
-from abs_service.bus.contract import Bus, Sample, Subscription
+from abs_service.bus.contract import Sample, Subscription
 from calib.camera import Camera
 from drivers.contract.frame import Frame
 from drivers.encoding import codec
@@ -57,39 +57,54 @@ class Numbers:
     theta: NDArray[np.float32]
 
 
+class Source(Protocol):
+    """Tells the messages of a rig, as a bus does."""
+
+    def subscribe(self, pattern: str, on_sample: Callable[[Sample], None]) -> Subscription:
+        """Calls `on_sample` for each message on matching topics."""
+        ...
+
+    def query(self, pattern: str, timeout_s: float) -> list[Sample]:
+        """All answers to a query for the topics that match."""
+        ...
+
+
 class Feed:
     """Collects the messages of a rig. Its methods may be called from one thread; messages arrive in another.
 
+    Where the clock goes back, as in a recording, all that was collected is forgotten.
+
     Args:
-        bus: of the rig.
-        clock: monotonic time [ns].
+        source: of the messages.
+        clock: time [ns] that the ages of messages are told from.
 
     Attributes:
         malformed: messages that could not be parsed.
     """
 
-    def __init__(self, bus: Bus, clock: Callable[[], int]) -> None:
+    def __init__(self, source: Source, clock: Callable[[], int]) -> None:
         self.malformed = 0
-        self._bus, self._clock = bus, clock
+        self._source, self._clock = source, clock
         self._parse = {message.DESCRIPTOR.full_name: message for message in _MESSAGES}
         self._newest: dict[str, tuple[Message, float]] = {}
         self._numbers: dict[str, deque[Numbers]] = {}
         self._images: dict[str, deque[tuple[Sample, float]]] = {}
         self._cameras: dict[str, Camera] = {}
         self._watching: list[Subscription] = []
+        self._last_s = -float("inf")
         self._lock = threading.Lock()
         for pattern in _PATTERNS:
-            bus.subscribe(pattern, self._take)
+            source.subscribe(pattern, self._take)
 
     @property
     def now_s(self) -> float:
-        """Monotonic time [s]."""
+        """Time by the clock [s]."""
         return self._clock() * 1e-9
 
     def watch_images(self, wanted: bool) -> None:
         """Begins or ends receiving images."""
         if wanted and not self._watching:
-            self._watching = [self._bus.subscribe("*/*/image", self._take_image)]
+            self._watching = [self._source.subscribe("*/*/image", self._take_image)]
         elif not wanted and self._watching:
             self._watching.pop().close()
             with self._lock:
@@ -130,7 +145,7 @@ class Feed:
         """The topology of a mesh, asked for if it has not come; None if there is none."""
         topic = keys.topology(mesh.tracker)
         for ask in (False, True):
-            for sample in self._bus.query(topic, QUERY_S) if ask else ():
+            for sample in self._source.query(topic, QUERY_S) if ask else ():
                 self._take(sample)
             found = self.newest(topic, MeshTopology)
             if found and _belong(found[0], mesh):
@@ -181,14 +196,25 @@ class Feed:
             self.malformed += 1
             return
         with self._lock:
-            self._newest[sample.topic] = message, self.now_s
+            now_s = self._arrival_s()
+            self._newest[sample.topic] = message, now_s
             if isinstance(message, DeformationState):
                 length = deque[Numbers](maxlen=round(60 * MINUTE_S))
-                self._numbers.setdefault(message.tracker, length).append(_numbers(message, self.now_s))
+                self._numbers.setdefault(message.tracker, length).append(_numbers(message, now_s))
 
     def _take_image(self, sample: Sample) -> None:
         with self._lock:
-            self._images.setdefault(sample.topic, deque(maxlen=IMAGES)).append((sample, self.now_s))
+            now_s = self._arrival_s()
+            self._images.setdefault(sample.topic, deque(maxlen=IMAGES)).append((sample, now_s))
+
+    def _arrival_s(self) -> float:
+        """The time now [s]; forgets everything if it is earlier than that of the last message."""
+        now_s = self.now_s
+        if now_s < self._last_s:
+            for collected in (self._newest, self._numbers, self._images):
+                collected.clear()
+        self._last_s = now_s
+        return now_s
 
 
 def rate_hz(numbers: Iterable[Numbers], now_s: float, seconds: float = 3.0) -> float:

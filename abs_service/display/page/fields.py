@@ -1,6 +1,6 @@
 """Quantities of the mesh's vertices that can be shown as colours, and the colours."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 import cv2
@@ -37,6 +37,31 @@ class MeshView:
     covariance: NDArray[np.float64]
     measured: NDArray[np.floating]
     camera: Camera | None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Drawn:
+    """A mesh that is shown.
+
+    Attributes:
+        view: of it.
+        exposure_ns: time of its images, CLOCK_MONOTONIC [ns].
+        state: of everything that its picture depends on; another one has to be drawn again.
+    """
+
+    view: MeshView
+    exposure_ns: int
+    state: object
+
+
+def joined(views: Iterable[MeshView]) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    """Vertices (n, 3) [m] and faces (m, 3) of several meshes as one."""
+    vertices, faces, number = [np.empty((0, 3))], [np.empty((0, 3), np.int32)], 0
+    for view in views:
+        vertices.append(view.vertices)
+        faces.append(view.faces + np.int32(number))
+        number += len(view.vertices)
+    return np.concatenate(vertices), np.concatenate(faces)
 
 
 def displacement(view: MeshView) -> Values:

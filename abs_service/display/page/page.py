@@ -1,26 +1,26 @@
 """The page: reads the feed and updates scene and panel, a few times a second each, while a browser is connected."""
 
 import threading
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stdout
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from os import devnull
 
 import numpy as np
 import viser
-from absmsg.v1.deformation_state_pb2 import DeformationState
 from absmsg.v1.deformed_mesh_pb2 import DeformedMesh
-from absmsg.v1.health_pb2 import Health
-from numpy.typing import NDArray
 
 from abs_service.bus import keys
-from abs_service.display.page import pictures, table, words
-from abs_service.display.page.feed import Feed, rate_hz
-from abs_service.display.page.fields import FIELDS, ColorScale, MeshView, residual
+from abs_service.display.page import pictures, status, table, words
+from abs_service.display.page.choosing import Choosing, Measured
+from abs_service.display.page.commands import Commands
+from abs_service.display.page.feed import Feed
+from abs_service.display.page.fields import FIELDS, ColorScale, Drawn, MeshView, joined, residual
+from abs_service.display.page.gestures import Gestures
 from abs_service.display.page.panel import Button, Panel
 from abs_service.display.page.plots import plots
-from abs_service.display.page.recording import Record, ask
-from abs_service.display.page.reinitialization import Reinitialization, Send
+from abs_service.display.page.recording import ask
+from abs_service.display.page.reinitialization import Reinitialization
 from abs_service.display.page.scene import Scene
 from abs_service.tracking.tracker_log import points
 from calib.camera import Camera
@@ -32,21 +32,8 @@ MESH_S, IMAGES_S, WORDS_S, IDLE_S = 1 / 30, 0.25, 1.0, 0.5
 #: A residual compares a mesh with images of its exposure: those at most so far from it [ns].
 SAME_NS = 20_000_000
 
-#: A click means the first point that is so near to its ray, in distances between neighbouring points.
-REACH = 1.5
-#: The points of a sensor that has delivered none.
-NOTHING: pictures.Cloud = (np.empty((0, 3), np.float32), np.empty((0, 2), np.intp), 0.0)
-
 #: The page listens here only.
 HOST = "127.0.0.1"
-
-
-@dataclass(frozen=True, slots=True)
-class Commands:
-    """Commands to a rig: to a tracker, and to its recorder."""
-
-    reinitialize: Send
-    record: Record
 
 
 class Page:
@@ -54,66 +41,75 @@ class Page:
 
     Args:
         feed: of the rig.
-        endpoint: of the rig, for people to read.
+        silence: what to do while nothing is heard of the rig, in words.
         port: to listen at; the next free one is taken.
         view_only: True leaves out everything that acts on the rig.
-        references: by tracker, the sensor in whose depth image its object is detected.
         commands: to the rig.
+        clock: monotonic time [ns].
     """
 
     def __init__(
-        self, feed: Feed, endpoint: str, port: int, view_only: bool, references: Mapping[str, str], commands: Commands
+        self, feed: Feed, silence: str, port: int, view_only: bool, commands: Commands, clock: Callable[[], int]
     ) -> None:
-        self._feed, self._endpoint, self._references = feed, endpoint, references
+        self._feed, self._silence, self._references, self._clock = feed, silence, commands.references, clock
         with _quiet():
             self._server = viser.ViserServer(HOST, port, label="abs-service", verbose=False)
         self._scene = Scene(self._server)
         self._panel = Panel(self._server, {} if view_only else self._buttons())
         self._reinitialization = Reinitialization(feed, commands.reinitialize, self._panel.answer)
+        gestures = Gestures(self._server.scene)
+        self._choosing = Choosing(gestures, self._look, self._panel.answer, self._reinitialization.ask)
         self._record = commands.record
         self._scales = {name: ColorScale(field) for name, field in FIELDS.items()}
-        self._drawn: object = None
-        self._view: MeshView | None = None
-        self._exposure_ns = 0  # of that mesh
-        self._measured: dict[str, pictures.Cloud] = {}  # by sensor
-        self._due_s = dict.fromkeys((self._draw_mesh, self._draw_images, self._write), 0.0)
+        self._drawn: dict[str, Drawn] = {}  # by tracker
+        self._measured: dict[str, Measured] = {}  # by sensor
+        self._due_s = dict.fromkeys((self._draw_meshes, self._draw_images, self._write), 0.0)
 
     @property
     def url(self) -> str:
         """Address of the page."""
         return f"http://{HOST}:{self._server.get_port()}"
 
+    @property
+    def gui(self) -> viser.GuiApi:
+        """The panel, for further controls."""
+        return self._server.gui
+
     def run(self, stop: threading.Event, tick: Callable[[], None]) -> None:
         """Updates the page until stopped; calls `tick` at least twice a second."""
-        periods_s = {self._draw_mesh: MESH_S, self._draw_images: IMAGES_S, self._write: WORDS_S}
+        periods_s = {self._draw_meshes: MESH_S, self._draw_images: IMAGES_S, self._write: WORDS_S}
         while not stop.is_set():
             tick()
             looked_at = bool(self._server.get_clients())
             self._feed.watch_images(looked_at)
-            now_s = self._feed.now_s
+            now_s = 1e-9 * self._clock()
             for draw in periods_s if looked_at else ():
                 if now_s >= self._due_s[draw]:
                     self._due_s[draw] = max(self._due_s[draw] + periods_s[draw], now_s)
                     draw()
-            stop.wait(max(self._due_s[self._draw_mesh] - self._feed.now_s, 0.002) if looked_at else IDLE_S)
+            stop.wait(max(self._due_s[self._draw_meshes] - 1e-9 * self._clock(), 0.002) if looked_at else IDLE_S)
 
     def close(self) -> None:
         """Ends the server."""
         with _quiet():
             self._server.stop()
 
-    def _draw_mesh(self) -> None:
-        found = self._feed.newest(keys.mesh(self._panel.tracker), DeformedMesh)
+    def _draw_meshes(self) -> None:
+        for tracker in self._feed.trackers():
+            self._draw_mesh(tracker)
+
+    def _draw_mesh(self, tracker: str) -> None:
+        found, before = self._feed.newest(keys.mesh(tracker), DeformedMesh), self._drawn.get(tracker)
         if found is None or not (mesh := found[0]).vertices_f32:
             return
         stale, name = found[1] > words.STALE_S, self._panel.field
-        drawn = mesh.header.boot_id, mesh.header.seq, stale, name, self._panel.shows
-        if drawn == self._drawn or (view := self._mesh_view(mesh, name == "residual")) is None:
+        state = mesh.header.boot_id, mesh.header.seq, stale, name, self._panel.shows
+        if (before and before.state == state) or (view := self._mesh_view(mesh, name == "residual")) is None:
             return
-        self._drawn, self._view, self._exposure_ns = drawn, view, mesh.header.t_host_ns
+        self._drawn[tracker] = Drawn(view, mesh.header.t_host_ns, state)
         colors = self._scales[name].colors(FIELDS[name].values(view))
-        self._scene.show_mesh(view, colors, stale)
-        self._scene.show_first(view, self._panel.shows[0])
+        self._scene.show_mesh(tracker, view, colors, stale)
+        self._scene.show_first(tracker, view, self._panel.shows[0])
 
     def _mesh_view(self, mesh: DeformedMesh, with_image: bool) -> MeshView | None:
         """View of a mesh to draw; None as long as its faces are unknown."""
@@ -142,19 +138,19 @@ class Page:
 
     def _draw_images(self) -> None:
         self._scene.show_cameras(self._feed.cameras(), self._panel.shows[2])
+        chosen = self._drawn.get(self._panel.tracker)
+        vertices, faces = joined(one.view for one in self._drawn.values())
         for topic in self._feed.streams():
-            found = self._feed.frame(topic, self._exposure_ns)
+            found = self._feed.frame(topic, chosen.exposure_ns if chosen else 0)
             if found is None or (camera := self._camera(found[0])) is None:
                 continue
             frame, age_s = found
             stale = age_s > words.STALE_S
             image = pictures.picture(frame)
             if frame.kind == Kind.DEPTH:
-                points_r, _, spacing_m = measured = pictures.cloud(pictures.radial(frame, camera), camera)
-                self._measured[frame.sensor] = measured
+                measured = self._measured[frame.sensor] = Measured(pictures.radial(frame, camera), camera)
+                points_r, _, spacing_m = pictures.cloud(measured.distance, camera)
                 self._scene.show_points(frame.sensor, points_r, spacing_m, stale, self._panel.shows[1])
-            faces = self._view.faces if self._view is not None else np.empty((0, 3), np.int32)
-            vertices = self._view.vertices if self._view is not None else np.empty((0, 3))
             drawn = pictures.with_mesh(pictures.grey(image) if stale else image, camera, vertices, faces)
             name = topic.removesuffix("/image")
             state = f"{words.age(age_s)} old" if stale else f"{self._feed.image_rate_hz(topic):.1f} Hz"
@@ -164,14 +160,14 @@ class Page:
 
     def _draw_residual(self, stream: str, frame: Frame, camera: Camera, image: pictures.Picture, stale: bool) -> None:
         """Draws the residual of the mesh over a depth image, while it is wanted."""
-        name, view = f"{stream} residual", self._view
-        if not self._panel.shows_residual or stale or view is None:
+        name, chosen = f"{stream} residual", self._drawn.get(self._panel.tracker)
+        if not self._panel.shows_residual or stale or chosen is None:
             self._panel.hide_image(name)
             return
-        if abs(frame.t_host_ns - self._exposure_ns) > SAME_NS:
+        if abs(frame.t_host_ns - chosen.exposure_ns) > SAME_NS:
             return
         scale = self._scales["residual"]
-        view = replace(view, measured=pictures.radial(frame, camera), camera=camera)
+        view = replace(chosen.view, measured=pictures.radial(frame, camera), camera=camera)
         drawn = pictures.with_colors(image, camera, view.vertices, view.faces, residual(view), scale.colors)
         self._panel.show_image(name, f"{stream}, residual up to ± {scale.end:g} mm", drawn)
 
@@ -179,36 +175,11 @@ class Page:
         self._panel.offer(self._feed.trackers())
         tracker = self._panel.tracker
         numbers = self._feed.numbers(tracker)
-        self._panel.show_status(self._status(tracker))
+        self._panel.show_status(status.lines(self._feed, tracker, self._silence))
         self._panel.show_legend(self._scales[self._panel.field].end)
         self._panel.show_table(table.rows(self._feed, tracker))
         self._panel.show_plots(plots(numbers, self._feed.now_s))
         self._reinitialization.look()
-
-    def _status(self, tracker: str) -> list[words.Words]:
-        silent = words.silence(self._feed.age_s(), self._endpoint)
-        if silent is not None:
-            return [silent]
-        found = self._feed.newest(keys.state(tracker), DeformationState)
-        state, age_s = found if found else (DeformationState(), float("inf"))
-        name = DeformationState.Status.Name(state.status).removeprefix("STATUS_") if found else ""
-        lines = [words.tracker(name, state.reasons, state.warnings, age_s, 1e3 * state.deviation_m)]
-        numbers = self._feed.numbers(tracker)
-        camera_hz = self._reference_hz()
-        slow = words.slow(rate_hz(numbers, self._feed.now_s), camera_hz, sum(one.skipped for one in numbers))
-        if slow and age_s <= words.STALE_S:
-            lines.append(words.Words("The tracker is slow", slow, words.STATUS["DEGRADED"][1]))
-        for health, health_age_s in self._feed.healths():
-            of_status = health.component == f"track/{tracker}" and health.message.startswith(name)
-            if health_age_s < 3 * words.STALE_S and health.level >= Health.LEVEL_WARNING and not of_status:
-                color = words.STATUS["LOST" if health.level == Health.LEVEL_ERROR else "DEGRADED"][1]
-                lines.append(words.Words(health.component, health.message, color))
-        return lines
-
-    def _reference_hz(self) -> float:
-        """Rate of the fastest depth stream, which estimates should keep up with [1/s]; 0 if unknown."""
-        depth = [topic for topic in self._feed.streams() if topic.endswith("/depth/image")]
-        return max((self._feed.image_rate_hz(topic) for topic in depth), default=0.0)
 
     def _buttons(self) -> dict[str, Button]:
         def record(recording: bool) -> None:
@@ -218,26 +189,22 @@ class Page:
             "Reinitialise": Button(
                 "Detect the object again, with a new mesh", lambda: self._reinitialization.ask(self._panel.tracker)
             ),
-            "Choose the object": Button("Detect the object that you click next", self._choose),
+            "Choose the object": Button(
+                "Detect the object that you click next", lambda: self._choosing.by_click(self._panel.tracker)
+            ),
+            "Draw a box": Button(
+                "Detect the object in the box that you draw next", lambda: self._choosing.by_box(self._panel.tracker)
+            ),
+            "Draw a lasso": Button(
+                "Detect the object that you click around", lambda: self._choosing.by_lasso(self._panel.tracker)
+            ),
             "Start recording": Button("Record from now on, with the seconds before", lambda: record(True)),
             "Stop recording": Button("End the recording", lambda: record(False)),
         }
 
-    def _choose(self) -> None:
-        """Waits for a click at the object."""
-        self._panel.answer("Click the object among the measured points.")
-        self._scene.on_next_click(self._pick)
-
-    def _pick(self, origin: NDArray[np.float64], direction: NDArray[np.float64]) -> None:
-        """Asks for a detection at the measured point under a click, a ray in rig coordinates."""
-        tracker = self._panel.tracker
-        points_r, pixels, spacing_m = self._measured.get(self._references.get(tracker, ""), NOTHING)
-        found = pictures.under_ray(points_r, origin, direction, REACH * spacing_m)
-        if found is None:
-            self._panel.answer("There is no measured point of the tracker's reference sensor where you clicked.")
-            return
-        row, column = pixels[found].tolist()
-        self._reinitialization.ask(tracker, (column, row))
+    def _look(self, tracker: str) -> Measured | None:
+        """The newest depth image of a tracker's reference; None if there is none."""
+        return self._measured.get(self._references.get(tracker, ""))
 
 
 @contextmanager

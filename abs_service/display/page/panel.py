@@ -49,7 +49,7 @@ class Panel:
         self._server, gui = server, server.gui
         gui.main_panel.dock_right()
         gui.configure_theme(control_width="large", dark_mode=True, show_logo=False, show_share_button=False)
-        self._status, self._renewed = gui.add_html(""), 0
+        self._status, self._renewed = gui.add_html("", order=0.0), 0
         self._tracker = gui.add_dropdown("Tracker", list[str](["–"]), visible=False)
         tabs = gui.add_tab_group()
         with tabs.add_tab("View"):

@@ -8,15 +8,13 @@ from absmsg.v1.deformation_state_pb2 import DeformationState
 
 from abs_service.bus import keys
 from abs_service.display.page.feed import Feed
+from abs_service.wire.commands import AS_CONFIGURED, Choice
 
 #: Time that a detection may take [s].
 ANSWER_S = 10.0
 
-#: Column and row of a pixel in the depth image of a tracker's reference.
-Pixel = tuple[int, int]
-
 #: Sends the command to a tracker; returns its answer, None if there is none.
-Send = Callable[[str, Pixel | None], CommandAnswer | None]
+Send = Callable[[str, Choice], CommandAnswer | None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,11 +40,11 @@ class Reinitialization:
         self._feed, self._send, self._say = feed, send, say
         self._asked: _Asked | None = None
 
-    def ask(self, tracker: str, seed: Pixel | None = None) -> None:
-        """Asks a tracker to detect its object anew, at a pixel if there is one."""
-        version, where = self._version(tracker), f" at pixel {list(seed)}" if seed else ""
-        self._say(f"Asks the tracker to detect its object again{where} …")
-        answer = self._send(tracker, seed)
+    def ask(self, tracker: str, choice: Choice = AS_CONFIGURED) -> None:
+        """Asks a tracker to detect its object anew, the one that was chosen."""
+        version = self._version(tracker)
+        self._say(f"Asks the tracker to detect its object again{choice} …")
+        answer = self._send(tracker, choice)
         if answer is None or not answer.accepted:
             self._asked = None
             self._say(f"The tracker refuses: {answer.reason if answer else 'it gives no answer'}.")

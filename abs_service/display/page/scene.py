@@ -1,7 +1,5 @@
 """The 3-D part of the page: mesh, its first pose, points of the depth sensors, cameras."""
 
-from collections.abc import Callable
-
 import numpy as np
 import viser
 from numpy.typing import NDArray
@@ -32,36 +30,46 @@ class Scene:
 
     def __init__(self, server: viser.ViserServer) -> None:
         self._server = server
-        self._meshes: list[viser.GlbHandle] = []
-        self._ghost: viser.MeshHandle | None = None
+        self._meshes: dict[str, tuple[viser.GlbHandle, viser.GlbHandle]] = {}  # by tracker: seen, and hidden
+        self._first: dict[str, NDArray[np.float64]] = {}  # vertices when the mesh was first shown
+        self._ghosts: dict[str, viser.MeshHandle] = {}
         self._clouds: dict[str, viser.PointCloudHandle] = {}
         self._cameras: dict[str, str] = {}
+        server.on_client_connect(self._aim)
         server.scene.set_up_direction("-y")
         server.scene.configure_default_lights(enabled=True, cast_shadow=False)
 
-    def show_mesh(self, view: MeshView, colors: NDArray[np.uint8], stale: bool) -> None:
-        """Shows a mesh with colours (n, 3). Each file is loaded out of sight, and seen when the next one comes."""
+    def show_mesh(self, tracker: str, view: MeshView, colors: NDArray[np.uint8], stale: bool) -> None:
+        """Shows a tracker's mesh with colours (n, 3). A file is loaded out of sight, and seen when the next comes."""
         data = glb(view.vertices, view.faces, np.full_like(colors, STALE) if stale else colors)
-        if not self._meshes:
+        if tracker not in self._meshes:
+            self._first[tracker] = view.vertices
+            for client in self._server.get_clients().values():
+                self._aim(client)
+            first, second = f"/mesh/{tracker}/0", f"/mesh/{tracker}/1"
             add = self._server.scene.add_glb
-            self._meshes = [add(f"/mesh/{i}", data, visible=i == 0, cast_shadow=False) for i in range(2)]
-            self._place_camera(view)
-        seen, hidden = self._meshes
+            self._meshes[tracker] = (
+                add(first, data, cast_shadow=False),
+                add(second, data, visible=False, cast_shadow=False),
+            )
+        seen, hidden = self._meshes[tracker]
         with self._server.atomic():
             hidden.visible, seen.visible = True, False
             seen.glb_data = data
-        self._meshes = [hidden, seen]
+        self._meshes[tracker] = hidden, seen
 
-    def show_first(self, view: MeshView, visible: bool) -> None:
-        """Shows the first pose as a net."""
-        if self._ghost is None or len(self._ghost.vertices) != len(view.first):
+    def show_first(self, tracker: str, view: MeshView, visible: bool) -> None:
+        """Shows the first pose of a tracker's mesh as a net."""
+        ghost = self._ghosts.get(tracker)
+        if ghost is None or len(ghost.vertices) != len(view.first):
             add = self._server.scene.add_mesh_simple
             options = {"wireframe": True, "opacity": 0.35, "side": "double", "cast_shadow": False}
-            self._ghost = add("/first", view.first.astype(np.float32), view.faces, color=GHOST, **options)
-        elif not np.array_equal(self._ghost.vertices, view.first.astype(np.float32)):
-            self._ghost.vertices, self._ghost.faces = view.first.astype(np.float32), view.faces.astype(np.uint32)
-        if self._ghost.visible != visible:
-            self._ghost.visible = visible
+            first = view.first.astype(np.float32)
+            ghost = self._ghosts[tracker] = add(f"/first/{tracker}", first, view.faces, color=GHOST, **options)
+        elif not np.array_equal(ghost.vertices, view.first.astype(np.float32)):
+            ghost.vertices, ghost.faces = view.first.astype(np.float32), view.faces.astype(np.uint32)
+        if ghost.visible != visible:
+            ghost.visible = visible
 
     def show_points(
         self, sensor: str, points: NDArray[np.float32], spacing_m: float, stale: bool, visible: bool
@@ -99,22 +107,12 @@ class Scene:
             text = f"/cameras/{name}/name"
             self._server.scene.add_label(text, name, position=(0.0, -CAMERA_M, CAMERA_M), visible=visible)
 
-    def on_next_click(self, call: Callable[[NDArray[np.float64], NDArray[np.float64]], None]) -> None:
-        """Calls once, from another thread, with origin [m] and direction of the ray (3,) under the next click."""
-        scene = self._server.scene
-        scene.remove_click_callback()
-
-        def clicked(event: viser.SceneClickEvent) -> None:
-            scene.remove_click_callback()
-            call(np.array(event.ray_origin), np.array(event.ray_direction))
-
-        scene.on_click()(clicked)
-
-    def _place_camera(self, view: MeshView) -> None:
-        """Aims the first view of every browser at the mesh, from behind the cameras."""
-        middle = view.vertices.mean(axis=0)
-        eye = middle + EYE * float(np.linalg.norm(np.ptp(view.vertices, axis=0)))
-        first = self._server.initial_camera
-        first.position, first.look_at, first.fov = eye, middle, FOV
-        for client in self._server.get_clients().values():
-            client.camera.position, client.camera.look_at, client.camera.fov = eye, middle, FOV
+    def _aim(self, client: viser.ClientHandle) -> None:
+        """Aims the view of a browser at the meshes, from behind the cameras; a narrow one from farther away."""
+        if not self._first:
+            return
+        vertices = np.concatenate([*self._first.values()])
+        middle, extent_m = vertices.mean(axis=0), float(np.linalg.norm(np.ptp(vertices, axis=0)))
+        camera = client.camera
+        eye = middle + EYE * extent_m * max(1.0, 1.0 / camera.aspect)
+        camera.position, camera.look_at, camera.fov = eye, middle, FOV

@@ -70,10 +70,9 @@ def slow(rate_hz: float, camera_hz: float, skipped: int) -> str:
     )
 
 
-def silence(age_s: float, endpoint: str) -> Words | None:
-    """The rig as a whole: None as long as it says something."""
+def silence(age_s: float, remedy: str) -> Words | None:
+    """The rig as a whole: None as long as it says something, else how long it has not, and what to do."""
     if age_s <= 3 * STALE_S:
         return None
     since = "yet" if age_s == float("inf") else f"for {age(age_s)}"
-    text = f"Is abs-service running at {endpoint}? This page connects again by itself; what it shows is old."
-    return Words(f"Nothing heard from the rig {since}", text, STALE_COLOR)
+    return Words(f"Nothing heard from the rig {since}", remedy, STALE_COLOR)

@@ -9,6 +9,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from abs_service.display.terminal import recorded_configuration
 from abs_service.recording.summary import Summary, Topic, Track
 from abs_service.supervision.rig_view import size
 from drivers.contract.text import printable
@@ -24,6 +25,7 @@ def show(summary: Summary) -> None:
         f"{summary.path}: {size(summary.size_bytes)}, {time}{state}{damage}",
         "sensors: " + (", ".join(f"{name} {w} × {h} px" for name, (w, h) in found["sensors"].items()) or "none"),
         f"configuration and calibration: {', '.join(found['attachments']) or 'none'}",
+        *recorded_configuration.lines(found["configuration"]),
         *(f"{name} = {number}" for name, number in found["losses"].items()),
     ]
     for line in lines:
@@ -43,6 +45,7 @@ def values(summary: Summary) -> dict[str, Any]:
         "damaged": summary.damaged,
         "start": datetime.fromtimestamp(contents.start_ns * 1e-9, UTC).isoformat(timespec="seconds"),
         "duration_s": (contents.end_ns - contents.start_ns) * 1e-9,
+        "configuration": recorded_configuration.values(contents),
         "attachments": sorted(map(printable, contents.attachments)),
         "sensors": {printable(name): pixels for name, pixels in sorted(summary.sensors.items())},
         "topics": {printable(name): _topic(topic) for name, topic in sorted(summary.topics.items())},

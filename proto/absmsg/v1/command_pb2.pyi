@@ -1,13 +1,14 @@
 from absmsg.v1 import common_pb2 as _common_pb2
+from google.protobuf.internal import containers as _containers
 from google.protobuf import descriptor as _descriptor
 from google.protobuf import message as _message
-from collections.abc import Mapping as _Mapping
+from collections.abc import Iterable as _Iterable, Mapping as _Mapping
 from typing import ClassVar as _ClassVar, Optional as _Optional, Union as _Union
 
 DESCRIPTOR: _descriptor.FileDescriptor
 
 class Reinitialize(_message.Message):
-    __slots__ = ("header", "tracker", "seed")
+    __slots__ = ("header", "tracker", "seed", "polygon")
     class Pixel(_message.Message):
         __slots__ = ("column", "row")
         COLUMN_FIELD_NUMBER: _ClassVar[int]
@@ -18,10 +19,12 @@ class Reinitialize(_message.Message):
     HEADER_FIELD_NUMBER: _ClassVar[int]
     TRACKER_FIELD_NUMBER: _ClassVar[int]
     SEED_FIELD_NUMBER: _ClassVar[int]
+    POLYGON_FIELD_NUMBER: _ClassVar[int]
     header: _common_pb2.Header
     tracker: str
     seed: Reinitialize.Pixel
-    def __init__(self, header: _Optional[_Union[_common_pb2.Header, _Mapping]] = ..., tracker: _Optional[str] = ..., seed: _Optional[_Union[Reinitialize.Pixel, _Mapping]] = ...) -> None: ...
+    polygon: _containers.RepeatedCompositeFieldContainer[Reinitialize.Pixel]
+    def __init__(self, header: _Optional[_Union[_common_pb2.Header, _Mapping]] = ..., tracker: _Optional[str] = ..., seed: _Optional[_Union[Reinitialize.Pixel, _Mapping]] = ..., polygon: _Optional[_Iterable[_Union[Reinitialize.Pixel, _Mapping]]] = ...) -> None: ...
 
 class Record(_message.Message):
     __slots__ = ("header", "recording")

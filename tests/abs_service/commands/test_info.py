@@ -4,6 +4,7 @@ import json
 
 import pytest
 
+from abs_service import config
 from abs_service.cli import main
 from tests.abs_service.commands.estimated_recording import NAMES, SIMULATION, TOML, write_estimated
 from tests.abs_service.commands.simulated_recording import write_take
@@ -28,6 +29,28 @@ def test_it_counts_images_estimates_and_statuses(tmp_path, capsys):
     )
     assert sheet["longest_untracked_s"] == pytest.approx(2 / 30, rel=1e-3)  # between the third estimate and the fifth
     assert sheet["deviation_m"]["median"] == pytest.approx(0.003)
+
+
+def test_the_configuration_is_told_in_short_as_values_and_as_it_is(tmp_path, capsys):
+    toml = config.to_toml(config.load_default())
+    path = write_take(tmp_path / "x.mcap", SIMULATION, [0], NAMES, toml)
+    assert main(["info", str(path)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert "device sim: simulated://sheet?seed=1" in lines
+    assert any(line.startswith("tracker sheet of tof, color: model nurbs, region nearest") for line in lines)
+    _, (found,) = info(capsys, path)
+    assert found["configuration"]["trackers"]["sheet"]["region"]["type"] == "nearest"
+    assert main(["info", str(path), "--config"]) == 0
+    assert capsys.readouterr().out == toml
+
+
+@pytest.mark.parametrize("toml", ["", "= no TOML", "devices = 1\n[trackers]\nsheet = 2\n"])
+def test_a_configuration_that_says_nothing_is_left_out(tmp_path, capsys, toml):
+    path = write_take(tmp_path / "x.mcap", SIMULATION, [0], NAMES, toml)
+    assert main(["info", str(path)]) == 0
+    assert not any(line.startswith(("device ", "tracker ")) for line in capsys.readouterr().out.splitlines()[1:4])
+    assert main(["info", str(path), "--config"]) == (0 if toml else 2)
+    assert ("no configuration is in this recording" in capsys.readouterr().err) == (not toml)
 
 
 def test_exposures_that_are_missing_are_lost_and_leave_a_gap(tmp_path, capsys):

@@ -1,5 +1,7 @@
 """`abs-service reinitialize` tells a tracker, and says what came of it."""
 
+from contextlib import nullcontext
+
 import pytest
 from absmsg.v1 import deformation_state_pb2
 
@@ -12,6 +14,7 @@ from abs_service.commands.running import reinitialize
 from abs_service.wire import commands
 from tests.abs_service.bus.loopback import LoopbackBus
 
+SEED = commands.Choice(seed=(111, 133))
 STATES = deformation_state_pb2.DeformationState.DESCRIPTOR.full_name
 
 
@@ -29,10 +32,10 @@ class Tracker:
     def publish(self) -> None:
         self._states.put(deformation_state_pb2.DeformationState(mesh_version=self._version).SerializeToString())
 
-    def _on_command(self, seed: commands.Pixel | None) -> str:
+    def _on_command(self, choice: commands.Choice) -> str:
         self._version += self._finds
         self.publish()
-        return f"[trackers.sheet.region]\npixel = {list(seed)}\n" if seed else ""
+        return f"[trackers.sheet.region]\npixel = {list(choice.seed)}\n" if choice.seed else ""
 
 
 def bus_of(monkeypatch, finds: bool) -> LoopbackBus:
@@ -62,7 +65,7 @@ def test_the_request_is_sent_and_the_new_mesh_reported(monkeypatch, capsys, find
 
 
 def test_with_a_seed_the_lines_that_keep_it_are_printed(monkeypatch, capsys):
-    assert reinitialize.request(bus_of(monkeypatch, True), "sheet", HeaderFactory("demo", WallClock()), (111, 133)) == 0
+    assert reinitialize.request(bus_of(monkeypatch, True), "sheet", HeaderFactory("demo", WallClock()), SEED) == 0
     assert capsys.readouterr().out.endswith("region:\n\n[trackers.sheet.region]\npixel = [111, 133]\n")
 
 
@@ -70,6 +73,37 @@ def test_with_a_seed_the_lines_that_keep_it_are_printed(monkeypatch, capsys):
 def test_a_seed_that_is_no_pixel_is_a_mistake_of_the_user(seed):
     with pytest.raises(SystemExit) as ended:
         main(["reinitialize", "--seed", *seed])
+    assert ended.value.code == 2
+
+
+def test_a_box_is_a_polygon_in_any_order():
+    assert commands.box(80, 90, 160, 170) == ((80, 90), (160, 90), (160, 170), (80, 170))
+    assert sorted(commands.box(160, 170, 80, 90)) == sorted(commands.box(80, 90, 160, 170))
+
+
+@pytest.mark.parametrize(
+    ("typed", "choice"),
+    [
+        ("", commands.AS_CONFIGURED),
+        ("--seed 111 133", SEED),
+        ("--box 80 90 160 170", commands.Choice(polygon=commands.box(80, 90, 160, 170))),
+        ("--polygon 80 90 160 90 120 170", commands.Choice(polygon=((80, 90), (160, 90), (120, 170)))),
+    ],
+)
+def test_what_is_typed_is_asked_for(monkeypatch, typed, choice):
+    asked = []
+    monkeypatch.setattr(reinitialize.rig_process, "open_bus", lambda *_: nullcontext(LoopbackBus()))
+    monkeypatch.setattr(reinitialize, "request", lambda bus, name, headers, choice: asked.append((name, choice)) or 0)
+    assert main(["reinitialize", *typed.split()]) == 0
+    assert asked == [("sheet", choice)]
+
+
+@pytest.mark.parametrize(
+    "typed", ["--polygon 1 2 3 4", "--polygon 1 2 3 4 5 6 7", "--box 1 2 3", "--seed 1 2 --box 1 2 3 4"]
+)
+def test_what_is_no_choice_is_a_mistake_of_the_user(typed):
+    with pytest.raises(SystemExit) as ended:
+        main(["reinitialize", *typed.split()])
     assert ended.value.code == 2
 
 

@@ -29,6 +29,20 @@ def test_run_serves_a_page_only_if_asked_with_the_options_of_view(options, given
         command_parser("view", view).parse_args(children["view"][1:])  # they are options of view
 
 
+@pytest.mark.parametrize(
+    ("arguments", "reason"),
+    [
+        (["x.mcap", "--connect", "tcp/127.0.0.1:1"], "a recording is read from its file"),
+        (["x.mcap"], "x.mcap: No such file"),
+        (["x.mcap.active"], "x.mcap.active: No such file"),
+    ],
+)
+def test_a_recording_that_cannot_be_shown_is_a_mistake_of_the_user(capsys, arguments, reason):
+    pytest.importorskip("viser")
+    assert main(["view", *arguments]) == 2
+    assert reason in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("command", ["view", "run"])
 def test_without_viser_the_extra_is_named(monkeypatch, capsys, command):
     monkeypatch.setattr(view, "find_spec", lambda _: None)

@@ -12,27 +12,34 @@ from abs_service.wire import commands
 from tests.abs_service.bus.loopback import LoopbackBus, health_now
 from tests.waiting import eventually
 
-OUTSIDE = (700, 3)
+OUTSIDE = commands.Choice(seed=(700, 3))
+TRIANGLE = ((80, 90), (160, 90), (120, 170))
 REGION = '[trackers.sheet.region]\ntype = "seed"\npixel = [111, 133]\n'
 SENDER = Header(rig="demo", boot_id="5f1c", host_clock="0b6c")
+
+
+def drawn(*rows, **others):
+    """A command with a polygon of corners in these rows."""
+    polygon = [Reinitialize.Pixel(column=row % 7, row=row) for row in rows]
+    return Reinitialize(tracker="sheet", header=SENDER, polygon=polygon, **others).SerializeToString()
 
 
 class Bench:
     """A tracker called sheet that counts how often it was told to detect its object anew."""
 
     def __init__(self, bus=None):
-        self.bus, self.acted, self.seeds = bus or LoopbackBus(), 0, []
+        self.bus, self.acted, self.choices = bus or LoopbackBus(), 0, []
         self.headers = HeaderFactory("demo", WallClock())
         self.health_bus = LoopbackBus()
         self.health = Health(self.health_bus, "track/sheet", self.headers)
         commands.answer_reinitialize(self.bus, "sheet", self.headers, self.health, self.act)
 
-    def act(self, seed):
+    def act(self, choice):
         self.acted += 1
-        self.seeds.append(seed)
-        if seed == OUTSIDE:
+        self.choices.append(choice)
+        if choice == OUTSIDE:
             raise commands.RefusedError("the pixel is outside the image")
-        return REGION if seed else ""
+        return "" if choice == commands.AS_CONFIGURED else REGION
 
     @property
     def said(self):
@@ -44,20 +51,27 @@ def test_a_command_is_carried_out_answered_and_told(caplog):
     with caplog.at_level(logging.WARNING):
         answer = commands.reinitialize(bench.bus, "sheet", bench.headers, 1.0)
     assert answer is not None
-    assert (answer.accepted, answer.reason, bench.acted) == (True, "", 1)
+    assert (answer.accepted, answer.reason, bench.choices) == (True, "", [commands.AS_CONFIGURED])
     assert bench.said.counters["commands.accepted"] == 1
     line = f"sheet/reinitialize from process {bench.headers.boot_id} on {bench.headers.host_clock}: accepted"
     assert bench.said.labels["command"] == line
     assert line in caplog.text
 
 
-@pytest.mark.parametrize("seed", [(111, 133), (0, 0)])
-def test_a_seed_arrives_and_the_answer_says_how_to_keep_it(seed):
+@pytest.mark.parametrize(
+    ("choice", "words"),
+    [
+        (commands.Choice(seed=(111, 133)), " at pixel [111, 133]"),
+        (commands.Choice(seed=(0, 0)), " at pixel [0, 0]"),
+        (commands.Choice(polygon=TRIANGLE), " in a polygon of 3 corners"),
+    ],
+)
+def test_a_choice_arrives_and_the_answer_says_how_to_keep_it(choice, words):
     bench = Bench()
-    answer = commands.reinitialize(bench.bus, "sheet", bench.headers, 1.0, seed)
+    answer = commands.reinitialize(bench.bus, "sheet", bench.headers, 1.0, choice)
     assert answer is not None
-    assert (answer.accepted, answer.region, bench.seeds) == (True, REGION, [seed])
-    assert f"sheet/reinitialize at {list(seed)} from" in bench.said.labels["command"]
+    assert (answer.accepted, answer.region, bench.choices) == (True, REGION, [choice])
+    assert f"sheet/reinitialize{words} from" in bench.said.labels["command"]
 
 
 def test_a_seed_that_the_tracker_cannot_use_is_refused_and_told():
@@ -66,7 +80,7 @@ def test_a_seed_that_the_tracker_cannot_use_is_refused_and_told():
     assert answer is not None
     assert (answer.accepted, answer.reason, answer.region) == (False, "the pixel is outside the image", "")
     assert bench.said.counters["commands.refused"] == 1
-    assert "at [700, 3] from" in bench.said.labels["command"]
+    assert "at pixel [700, 3] from" in bench.said.labels["command"]
 
 
 @pytest.mark.parametrize(
@@ -89,6 +103,10 @@ def test_a_seed_that_the_tracker_cannot_use_is_refused_and_told():
             Reinitialize(tracker="sheet", header=SENDER, seed=Reinitialize.Pixel(row=1 << 14)).SerializeToString(),
             "Pixel.row = 16384 must be in 0 … 16383",
         ),
+        (commands.REINITIALIZE, drawn(1 << 14, 1, 1), "Pixel.row = 16384 must be in 0 … 16383"),
+        (commands.REINITIALIZE, drawn(1, 2), "a polygon of 2 corners: 3 to 256 are allowed"),
+        (commands.REINITIALIZE, drawn(*range(257)), "a polygon of 257 corners: 3 to 256 are allowed"),
+        (commands.REINITIALIZE, drawn(1, 2, 3, seed=Reinitialize.Pixel()), "a seed and a polygon: one of them"),
     ],
 )
 def test_anything_else_is_refused_with_the_reason(message, payload, reason):

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from abs_service.tracker.detection.depth_view import DepthView, limited
 from abs_service.tracker.detection.initial_detection import DetectionError
 from abs_service.tracker.detection.segments.depth_segments import large_surfaces, surface_at
-from abs_service.tracker.detection.segments.within import Restricted, restricted
+from abs_service.tracker.detection.segments.within import Polygon, Restricted, restricted
 from calib.noise.base import NoiseError
 from calib.sequences import plane
 
@@ -33,6 +33,8 @@ class Settings:
         largest_step_m: largest difference in distance between neighbouring pixels of one surface [m].
         minimum_pixels: minimum number of pixels of a surface; smaller ones are ignored as noise.
         within: mask image as of the region `mask`; pixels outside are ignored, except for finding the plane.
+        polygon: corners (column, row) of a polygon around the object [px], three or more; pixels outside are ignored,
+            except for finding the plane.
     """
 
     clearance_m: Annotated[float, Gt(0)] = 0.01
@@ -40,10 +42,11 @@ class Settings:
     largest_step_m: Annotated[float, Gt(0)] = 0.04
     minimum_pixels: Annotated[int, Ge(16)] = 200
     within: Path | None = None
+    polygon: Polygon | None = None
 
     def build(self) -> Restricted:
         """The region; DetectionError if `within` is missing or no image."""
-        return Restricted(self._above, restricted(self._selected, self.within).select)
+        return Restricted(self._above, restricted(self._selected, self.within, self.polygon).select)
 
     def _above(self, view: DepthView) -> DepthView:
         """The view without the plane and everything beyond it; DetectionError if there is no plane."""

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.detection.depth_view import DepthView
 from abs_service.tracker.detection.initial_detection import DetectionError
-from abs_service.tracker.detection.segments.within import Restricted, restricted
+from abs_service.tracker.detection.segments.within import Polygon, Restricted, restricted
 from calib import pose
 
 MIN_PIXELS = 16
@@ -23,12 +23,14 @@ class Settings:
         highest: corner of largest x, y, z of the box in the rig's frame, before it is turned [m].
         rotation: rotation vector that turns the box about its centre, in the rig's frame [rad].
         within: mask image as of the region `mask`; pixels outside are ignored.
+        polygon: corners (column, row) of a polygon around the object [px], three or more; pixels outside are ignored.
     """
 
     lowest: tuple[float, float, float]
     highest: tuple[float, float, float]
     rotation: tuple[float, float, float] = (0.0, 0.0, 0.0)
     within: Path | None = None
+    polygon: Polygon | None = None
 
     def __post_init__(self) -> None:
         if not all(low < high for low, high in zip(self.lowest, self.highest)):
@@ -38,7 +40,7 @@ class Settings:
 
     def build(self) -> Restricted:
         """The region; DetectionError if `within` is missing or no image."""
-        return restricted(self._inside, self.within)
+        return restricted(self._inside, self.within, self.polygon)
 
     def _inside(self, view: DepthView) -> NDArray[np.bool_]:
         """Pixels (height, width) whose points lie inside the box; DetectionError if there are too few."""

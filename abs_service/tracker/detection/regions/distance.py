@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from abs_service.tracker.detection.depth_view import DepthView, limited
 from abs_service.tracker.detection.initial_detection import DetectionError
 from abs_service.tracker.detection.segments.depth_segments import large_surfaces
-from abs_service.tracker.detection.segments.within import Restricted, restricted
+from abs_service.tracker.detection.segments.within import Polygon, Restricted, restricted
 
 
 @dataclass(frozen=True)
@@ -24,6 +24,7 @@ class Settings:
         largest_step_m: largest difference in distance between neighbouring pixels of one surface [m].
         minimum_pixels: minimum number of pixels of a surface; smaller ones are ignored as noise.
         within: mask image as of the region `mask`; pixels outside are ignored.
+        polygon: corners (column, row) of a polygon around the object [px], three or more; pixels outside are ignored.
     """
 
     farthest_m: Annotated[float, Gt(0)]
@@ -31,6 +32,7 @@ class Settings:
     largest_step_m: Annotated[float, Gt(0)] = 0.04
     minimum_pixels: Annotated[int, Ge(16)] = 200
     within: Path | None = None
+    polygon: Polygon | None = None
 
     def __post_init__(self) -> None:
         if not self.nearest_m < self.farthest_m:
@@ -38,7 +40,7 @@ class Settings:
 
     def build(self) -> Restricted:
         """The region; DetectionError if `within` is missing or no image."""
-        return restricted(self._largest, self.within)
+        return restricted(self._largest, self.within, self.polygon)
 
     def _largest(self, view: DepthView) -> NDArray[np.bool_]:
         """Pixels (height, width) of the largest connected surface in the range; DetectionError if there is none."""

@@ -12,7 +12,7 @@ from abs_service.tracker.detection.depth_view import DepthView
 from abs_service.tracker.detection.initial_detection import DetectionError
 from abs_service.tracker.detection.plausibility import is_scene
 from abs_service.tracker.detection.segments.depth_segments import large_surfaces
-from abs_service.tracker.detection.segments.within import Restricted, restricted
+from abs_service.tracker.detection.segments.within import Polygon, Restricted, restricted
 
 
 @dataclass(frozen=True)
@@ -23,15 +23,17 @@ class Settings:
         largest_step_m: largest difference in distance between neighbouring pixels of one surface [m].
         minimum_pixels: minimum number of pixels of a surface; smaller ones are ignored as noise.
         within: mask image as of the region `mask`; pixels outside are ignored.
+        polygon: corners (column, row) of a polygon around the object [px], three or more; pixels outside are ignored.
     """
 
     largest_step_m: Annotated[float, Gt(0)] = 0.04
     minimum_pixels: Annotated[int, Ge(16)] = 200
     within: Path | None = None
+    polygon: Polygon | None = None
 
     def build(self) -> Restricted:
         """The region; DetectionError if `within` is missing or no image."""
-        return restricted(self._nearest, self.within)
+        return restricted(self._nearest, self.within, self.polygon)
 
     def _nearest(self, view: DepthView) -> NDArray[np.bool_]:
         """Pixels (height, width) of the connected surface whose median distance is smallest.

@@ -12,7 +12,7 @@ from abs_service.tracker.detection.depth_view import DepthView
 from abs_service.tracker.detection.initial_detection import DetectionError
 from abs_service.tracker.detection.segments.color_growth import grown_by_color
 from abs_service.tracker.detection.segments.seeds import ColorSeed, MotionSeed, PixelSeed, Seed, Surfaces
-from abs_service.tracker.detection.segments.within import Restricted, restricted
+from abs_service.tracker.detection.segments.within import Polygon, Restricted, restricted
 
 Level = Annotated[int, Ge(0), Le(255)]
 
@@ -31,6 +31,7 @@ class Settings:
         largest_step_m: largest difference in distance between neighbouring pixels of one surface [m].
         minimum_pixels: minimum number of pixels of a surface, and of what moved or has the colour; less is noise.
         within: mask image as of the region `mask`; pixels outside are ignored.
+        polygon: corners (column, row) of a polygon around the object [px], three or more; pixels outside are ignored.
     """
 
     pixel: tuple[Annotated[int, Ge(0)], Annotated[int, Ge(0)]] | None = None
@@ -41,6 +42,7 @@ class Settings:
     largest_step_m: Annotated[float, Gt(0)] = 0.04
     minimum_pixels: Annotated[int, Ge(16)] = 16
     within: Path | None = None
+    polygon: Polygon | None = None
 
     def __post_init__(self) -> None:
         self._seed()
@@ -53,7 +55,7 @@ class Settings:
             seeded = seed(view, surfaces)
             return seeded.surface if self.grow == "depth" else grown_by_color(seeded, view.colors.rgb)
 
-        return restricted(select, self.within)
+        return restricted(select, self.within, self.polygon)
 
     def _seed(self) -> Seed:
         match self.pixel, self.color, self.motion_s:

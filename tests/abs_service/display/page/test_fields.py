@@ -26,6 +26,14 @@ def view(vertices, faces, first=None, covariance=None, measured=None) -> MeshVie
     return MeshView(vertices, vertices if first is None else first, faces, covariance, measured, camera)
 
 
+def test_several_meshes_are_drawn_as_one():
+    vertices, faces = grid(lambda x, y: 1 + 0 * x)
+    both, sides = fields.joined([view(vertices, faces), view(vertices + 1.0, faces)])
+    np.testing.assert_array_equal(both[sides[len(faces) :]], vertices[faces] + 1.0)
+    np.testing.assert_array_equal(both[sides[: len(faces)]], vertices[faces])
+    assert [part.shape for part in fields.joined([])] == [(0, 3), (0, 3)]
+
+
 def test_displacement_is_the_distance_from_the_first_pose():
     vertices, faces = grid(lambda x, y: 1 + 0 * x)
     np.testing.assert_allclose(fields.displacement(view(vertices + np.array([0.003, 0, 0.004]), faces, vertices)), 5.0)

@@ -8,8 +8,10 @@ from abs_service.bus import keys
 from abs_service.bus.contract import STATE
 from abs_service.display.page.feed import Feed
 from abs_service.display.page.reinitialization import ANSWER_S, Reinitialization
+from abs_service.wire.commands import Choice
 from tests.abs_service.bus.loopback import LoopbackBus
 
+SEED = Choice(seed=(111, 133))
 REGION = '[trackers.sheet.region]\ntype = "seed"\npixel = [111, 133]\n'
 
 
@@ -35,8 +37,8 @@ class Bench:
 
 def test_a_chosen_pixel_is_sent_and_the_lines_that_keep_it_are_offered():
     bench = Bench(CommandAnswer(accepted=True, region=REGION))
-    bench.page.ask("sheet", (111, 133))
-    assert bench.asked == [("sheet", (111, 133))]
+    bench.page.ask("sheet", SEED)
+    assert bench.asked == [("sheet", SEED)]
     bench.page.look()
     assert bench.said == ["Asks the tracker to detect its object again at pixel [111, 133] …"]
     bench.publish(2)
@@ -65,7 +67,7 @@ def test_without_a_pixel_there_is_nothing_to_keep():
 )
 def test_a_refusal_is_told_at_once(answer, words):
     bench = Bench(answer)
-    bench.page.ask("sheet", (1, 2))
+    bench.page.ask("sheet", SEED)
     bench.publish(2)
     bench.page.look()
     assert bench.said[-1] == words
@@ -73,7 +75,7 @@ def test_a_refusal_is_told_at_once(answer, words):
 
 def test_when_no_object_was_found_that_is_told():
     bench = Bench(CommandAnswer(accepted=True, region=REGION))
-    bench.page.ask("sheet", (1, 2))
+    bench.page.ask("sheet", SEED)
     bench.now_ns = round((ANSWER_S + 1) * 1e9)
     bench.page.look()
     assert "No object was found" in bench.said[-1]

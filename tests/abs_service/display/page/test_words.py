@@ -38,7 +38,7 @@ def test_a_tracker_that_does_not_keep_up_is_told():
     assert words.slow(29.0, 30.0, 0) == words.slow(5.0, 0.0, 0) == ""
 
 
-def test_a_silent_rig_is_told_with_its_address():
+def test_a_silent_rig_is_told_with_what_to_do():
     assert words.silence(0.5, "tcp/rig:1") is None
     said = words.silence(12.0, "tcp/rig:1")
     assert said is not None

@@ -55,6 +55,21 @@ def test_noise_neither_cuts_nor_connects():
     assert not inside.any()
 
 
+def test_a_polygon_leaves_out_what_is_nearer_beside_it():
+    inside = selected(nearest.Settings(polygon=((29, 4), (63, 4), (63, 46), (29, 46))), scene(NEAR, MIDDLE))
+    assert inside[12:38, 37:58].all()
+    inside[10:40, 35:60] = False
+    assert not inside.any()
+
+
+def test_a_lasso_cuts_the_object_from_what_it_touches():
+    triangle = ((10, 5), (50, 5), (10, 45))
+    inside = selected(nearest.Settings(minimum_pixels=16, polygon=triangle), scene())
+    rows, columns = np.nonzero(inside)
+    assert (columns + rows <= 55).all()
+    assert inside[8:30, 12:20].all()
+
+
 def test_small_surfaces_are_noise():
     speck = (slice(36, 44), slice(2, 10), 0.5)
     inside = selected(nearest.Settings(minimum_pixels=100), scene(NEAR, speck))

@@ -1,0 +1,77 @@
+"""All that the page says of a rig: every tracker, slow ones, and components with a warning, once each."""
+
+import math
+
+import pytest
+from absmsg.v1.deformation_state_pb2 import DeformationState
+from absmsg.v1.health_pb2 import Health
+
+from abs_service.bus.contract import EVENTS
+from abs_service.display.page import status
+from abs_service.display.page.feed import Feed
+from tests.abs_service.bus.loopback import LoopbackBus
+
+
+class Rig:
+    """Publishes what a test says, at the time that it says."""
+
+    def __init__(self):
+        self.bus, self.now_ns = LoopbackBus(), 0
+        self.feed = Feed(self.bus, lambda: self.now_ns)
+
+    def send(self, topic, message):
+        self.bus.publisher(topic, message.DESCRIPTOR.full_name, EVENTS).put(message.SerializeToString())
+
+    def state(self, tracker, name):
+        self.send(f"{tracker}/state", DeformationState(tracker=tracker, status=f"STATUS_{name}", deviation_m=math.nan))
+
+    def health(self, component, message, level=Health.LEVEL_WARNING, **more):
+        self.send(f"health/{component}", Health(component=component, message=message, level=level, **more))
+
+    def titles(self, tracker="left"):
+        return [line.title for line in status.lines(self.feed, tracker, "Start it.")]
+
+
+@pytest.fixture
+def rig():
+    return Rig()
+
+
+def test_a_rig_that_says_nothing(rig):
+    (line,) = status.lines(rig.feed, "left", "Start it.")
+    assert (line.title, line.text) == ("Nothing heard from the rig yet", "Start it.")
+
+
+def test_the_name_of_a_tracker_is_told_where_there_are_several_the_shown_one_first(rig):
+    rig.state("left", "TRACKING")
+    assert rig.titles() == ["Tracking"]
+    rig.state("right", "LOST")
+    assert rig.titles() == ["left: Tracking", "right: Object lost"]
+    assert rig.titles("right") == ["right: Object lost", "left: Tracking"]
+
+
+def test_what_a_status_says_is_not_said_again_as_health(rig):
+    rig.state("left", "TRACKING")
+    rig.state("right", "DEGRADED")
+    rig.health("track/right", "DEGRADED: too few vertices")
+    assert rig.titles() == ["left: Tracking", "right: Tracking with doubts"]
+    rig.health("track/right", "color errs 1.4 times as much")
+    rig.health("capture", "tof is silent", Health.LEVEL_ERROR)
+    rig.health("record", "all is well", Health.LEVEL_OK)
+    assert rig.titles()[2:] == ["capture", "track/right"]
+    rig.now_ns = 4_000_000_000
+    rig.state("left", "TRACKING")
+    assert rig.titles()[0] == "left: Tracking"
+    assert "No estimate for 4.0 s" in rig.titles()[1]
+    assert len(rig.titles()) == 2
+
+
+def test_a_slow_tracker_is_told_while_it_has_estimates(rig):
+    rig.send("tof/depth/image", DeformationState())  # no image, but its stream is there
+    rig.feed.watch_images(True)
+    rig.send("tof/depth/image", DeformationState())
+    rig.health("capture", "", Health.LEVEL_OK, gauges={"rate_hz.tof/depth/image": 30.0})
+    rig.state("left", "TRACKING")
+    assert rig.titles() == ["Tracking", "The tracker is slow"]
+    rig.now_ns = 2_000_000_000
+    assert rig.titles() == ["No estimate for 2.0 s"]
