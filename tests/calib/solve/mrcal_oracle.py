@@ -31,7 +31,7 @@ inputs = {
     "calibration_object_spacing": given["spacing"],
     "do_optimize_intrinsics_core": True,
     "do_optimize_intrinsics_distortions": True,
-    "do_optimize_extrinsics": False,
+    "do_optimize_extrinsics": True,
     "do_optimize_frames": True,
     "do_optimize_calobject_warp": False,
     "do_apply_outlier_rejection": False,

@@ -31,7 +31,9 @@ ORACLE = Path(__file__).with_name("mrcal_oracle.py")
 
 def run_python(*arguments: str, text: str = "") -> subprocess.CompletedProcess[str]:
     """Runs the system's Python without our environment."""
-    return subprocess.run([PYTHON, "-I", *arguments], input=text, capture_output=True, text=True, timeout=120)
+    return subprocess.run(
+        [PYTHON, "-I", *arguments], check=False, input=text, capture_output=True, text=True, timeout=120
+    )
 
 
 @pytest.fixture(scope="module")
