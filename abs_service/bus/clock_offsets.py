@@ -23,6 +23,8 @@ READING = Header.DESCRIPTOR.full_name
 PERIOD_S, TIMEOUT_S = 1.0, 0.5
 #: Readings that are kept; the best of them counts.
 READINGS = 30
+#: Clocks that are measured: those asked for last. A message from the bus must not make us measure more.
+CLOCKS = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,44 +52,47 @@ class ClockOffsets:
         self._bus = bus
         self._clock = clock
         self._own = own
-        self._asked_for = ""
-        self._readings: deque[tuple[int, Offset]] = deque(maxlen=READINGS)
+        self._readings: dict[str, deque[tuple[int, Offset]]] = {}  # by clock, the one asked for last at the end
         self._lock = threading.Lock()
 
     def offset(self, host_clock: str) -> Offset | None:
         """The offset of a clock, see `drivers.contract.host_clock`; None if it is not known yet.
 
-        Only the clock that was asked for last is measured: a tracker's frames are of one.
+        Only the `CLOCKS` that were asked for last are measured.
         """
         if host_clock in ("", self._own):
             return NO_OFFSET
         with self._lock:
-            if host_clock != self._asked_for:
-                self._asked_for = host_clock
-                self._readings.clear()
+            readings = self._readings.pop(host_clock, deque(maxlen=READINGS))
+            self._readings[host_clock] = readings
+            if len(self._readings) > CLOCKS:
+                del self._readings[next(iter(self._readings))]
             now_ns = self._clock()
-            offsets = [Offset(one.ns, one.error_ns + _drift_ns(now_ns - t_ns)) for t_ns, one in self._readings]
+            offsets = [Offset(one.ns, one.error_ns + _drift_ns(now_ns - t_ns)) for t_ns, one in readings]
         return min(offsets, key=lambda one: one.error_ns, default=None)
 
     def measure(self) -> None:
-        """Reads the other clock; takes as long as the answer, `TIMEOUT_S` at most."""
-        asked_for = self._asked_for
-        if not is_name(asked_for):
-            return
+        """Reads the other clocks; takes as long as their answers, `TIMEOUT_S` each at most."""
+        with self._lock:
+            asked_for = [*filter(is_name, self._readings)]
+        for host_clock in asked_for:
+            self._measure(host_clock)
+
+    def _measure(self, host_clock: str) -> None:
         before_ns = self._clock()
-        samples = self._bus.query(keys.clock(asked_for), TIMEOUT_S)
+        samples = self._bus.query(keys.clock(host_clock), TIMEOUT_S)
         after_ns = self._clock()
         for sample in samples:
             try:
                 header = Header.FromString(sample.payload)
             except DecodeError:
                 continue
-            if header.host_clock == asked_for:
+            if header.host_clock == host_clock:
                 middle_ns = (before_ns + after_ns) // 2
                 reading = Offset(middle_ns - header.t_host_ns, (after_ns - before_ns + 1) // 2)
                 with self._lock:
-                    if asked_for == self._asked_for:
-                        self._readings.append((before_ns, reading))
+                    if host_clock in self._readings:
+                        self._readings[host_clock].append((before_ns, reading))
 
     def measure_until(self, stop: threading.Event) -> None:
         """Measures once a second: the target of a thread."""

@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping
 from statistics import median
 from typing import Protocol
 
+from abs_service.pairing.common_clock import CommonClock
 from abs_service.pairing.synchroniser import Synchroniser
 from drivers.contract.frame import Frame, FrameSet
 
@@ -55,6 +56,7 @@ class FrameSetQueue:
 
     Args:
         frames: where they come from, in the order of their arrival.
+        common_clock: brings their times to one clock.
         synchroniser: makes sets of them.
         clock: CLOCK_MONOTONIC [ns].
 
@@ -62,8 +64,11 @@ class FrameSetQueue:
         skipped: frame sets passed over.
     """
 
-    def __init__(self, frames: FrameSource, synchroniser: Synchroniser, clock: Callable[[], int]):
+    def __init__(
+        self, frames: FrameSource, common_clock: CommonClock, synchroniser: Synchroniser, clock: Callable[[], int]
+    ):
         self.skipped = 0
+        self._common_clock = common_clock
         self._frames = frames
         self._synchroniser = synchroniser
         self._clock = clock
@@ -82,18 +87,24 @@ class FrameSetQueue:
         counters |= {f"lost.{topic}": number for topic, number in self._frames.lost.items()}
         counters |= {f"dropped.{topic}": number for topic, number in self._frames.dropped.items()}
         counters |= {f"malformed.{topic}": number for topic, number in self._frames.malformed.items()}
-        counters |= {f"unused.{stream}": number for stream, number in self._synchroniser.counters.items()}
+        for unused in (self._synchroniser.counters, self._common_clock.counters):
+            counters |= {f"unused.{stream}": number for stream, number in unused.items()}
         return counters
 
     @property
     def dropped(self) -> Mapping[str, int]:
         """Frames so far that are in no set, by sensor, whatever the cause."""
         total: Counter[str] = Counter()
-        frames = self._frames
-        for counts in (frames.lost, frames.dropped, frames.malformed, self._synchroniser.counters):
+        frames, unused = self._frames, (self._synchroniser.counters, self._common_clock.counters)
+        for counts in (frames.lost, frames.dropped, frames.malformed, *unused):
             for name, number in counts.items():
                 total[name.partition("/")[0]] += number
         return total
+
+    @property
+    def clock_doubt(self) -> str:
+        """See `CommonClock.doubt`."""
+        return self._common_clock.doubt
 
     @property
     def last_error(self) -> str:
@@ -115,7 +126,8 @@ class FrameSetQueue:
     def _collect(self) -> None:
         frame = self._frames.take(0 if self._waiting else POLL_S)
         while frame is not None:
-            self._waiting.extend(self._synchroniser.add(frame))
+            if (converted := self._common_clock.convert(frame)) is not None:
+                self._waiting.extend(self._synchroniser.add(*converted))
             frame = self._frames.take(0)
         self._waiting.extend(self._synchroniser.poll(self._clock()))
 

@@ -1,24 +1,15 @@
 """Groups frames of several streams by exposure time. Deterministic: no thread, no clock."""
 
-from bisect import insort
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from types import MappingProxyType
 
+from abs_service.pairing.waiting_stream import Key, WaitingStream
 from drivers.contract.frame import Frame, FrameSet
-
-Key = tuple[str, str]
 
 #: Queue length per stream.
 DEPTH = 32
-#: Sequence numbers remembered per stream, to detect duplicates.
-MEMORY = 256
-
-#: So many frames in a row that the latest one would exclude, by its epoch or by more than this time [ns], are right.
-FOREIGN, FOREIGN_NS = 30, 10_000_000_000
-
-_NEVER_NS = -(1 << 63)
 
 
 class Synchroniser:
@@ -49,14 +40,19 @@ class Synchroniser:
         deadline_ns: int = 100_000_000,
         offsets_ns: Mapping[str, int] = MappingProxyType({}),
     ) -> None:
-        self._reference = _Stream(reference)
-        self._members = {key: _Stream(key) for key in members if key != reference}
+        self._reference = WaitingStream(reference)
+        self._members = {key: WaitingStream(key) for key in members if key != reference}
         self._tolerance_ns = tolerance_ns
         self._deadline_ns = deadline_ns
         self._offsets_ns = offsets_ns
         self._host_clock: str | None = None
         self._seq = 0
         self._rejected: Counter[str] = Counter()
+
+    @property
+    def tolerance_ns(self) -> int:
+        """Largest difference between a member's and the reference's times of one clock [ns]."""
+        return self._tolerance_ns
 
     @property
     def counters(self) -> Mapping[str, int]:
@@ -68,8 +64,13 @@ class Synchroniser:
         """
         return dict(self._rejected)
 
-    def add(self, frame: Frame) -> list[FrameSet]:
-        """Takes one frame and returns the sets that are decided now, in order of time."""
+    def add(self, frame: Frame, error_ns: int = 0) -> list[FrameSet]:
+        """Takes one frame and returns the sets that are decided now, in order of time.
+
+        Args:
+            frame: the frame.
+            error_ns: of its times against the reference's clock, by which the tolerance grows [ns], see `CommonClock`.
+        """
         if frame.key != self._reference.key and frame.key not in self._members:
             self._count(frame.key, "unexpected")
             return []
@@ -82,7 +83,7 @@ class Synchroniser:
             self._count(frame.key, "other_clock")
             return sets
         frame, offset_ns = frame.at_middle(), self._offsets_ns.get(frame.sensor, 0)
-        self._insert(replace(frame, t_host_ns=frame.t_host_ns + offset_ns) if offset_ns else frame)
+        self._insert(replace(frame, t_host_ns=frame.t_host_ns + offset_ns) if offset_ns else frame, error_ns)
         return sets + self._form()
 
     def group(self, frames: Iterable[Frame]) -> Iterator[FrameSet]:
@@ -119,17 +120,17 @@ class Synchroniser:
         for stream in self._members.values():
             for _ in range(len(stream.waiting)):
                 self._drop_oldest(stream, "other_clock")
-        self._reference = _Stream(self._reference.key)
-        self._members = {key: _Stream(key) for key in self._members}
+        self._reference = WaitingStream(self._reference.key)
+        self._members = {key: WaitingStream(key) for key in self._members}
         self._host_clock = frame.host_clock
         return sets
 
-    def _insert(self, frame: Frame) -> None:
+    def _insert(self, frame: Frame, error_ns: int) -> None:
         stream = self._members.get(frame.key, self._reference)
         if rejection_cause := stream.rejection_cause(frame):
             self._count(frame.key, rejection_cause)
             return
-        stream.insert(frame)
+        stream.insert(frame, error_ns)
         if stream is not self._reference and len(stream.waiting) > DEPTH:
             self._drop_oldest(stream, "overflow")
 
@@ -139,13 +140,14 @@ class Synchroniser:
             sets.append(self._emit())
         return sets
 
-    def _incomplete_streams(self) -> list["_Stream"]:
+    def _incomplete_streams(self) -> list[WaitingStream]:
         """The streams for which the first waiting set has no frame, but may still get one."""
         t_ns = self._reference.waiting[0].t_host_ns
         return [
             stream
             for stream in self._members.values()
-            if stream.latest_ns <= t_ns + self._tolerance_ns and stream.nearest(t_ns, self._tolerance_ns) is None
+            if stream.latest_ns <= t_ns + self._tolerance_ns + stream.error_ns
+            and stream.nearest(t_ns, self._tolerance_ns) is None
         ]
 
     def _emit(self) -> FrameSet:
@@ -157,7 +159,7 @@ class Synchroniser:
             nearest = stream.nearest(t_ns, self._tolerance_ns)
             stream.stalled = stream in stalled
             # What lies before its frame, or before the reach of any later set, is of no use any more.
-            obsolete_ns = t_ns - self._tolerance_ns if nearest is None else nearest.t_host_ns - 1
+            obsolete_ns = t_ns - self._tolerance_ns - stream.error_ns if nearest is None else nearest.t_host_ns - 1
             while stream.waiting and stream.waiting[0].t_host_ns <= obsolete_ns:
                 self._drop_oldest(stream, "unmatched")
             stream.passed_ns = max(stream.passed_ns, obsolete_ns)
@@ -169,7 +171,7 @@ class Synchroniser:
         self._seq += 1
         return FrameSet(self._seq - 1, t_ns, frames, tuple(missing), spread_ns, reference.host_clock)
 
-    def _drop_oldest(self, stream: "_Stream", cause: str) -> None:
+    def _drop_oldest(self, stream: WaitingStream, cause: str) -> None:
         stream.take_oldest()
         self._count(stream.key, cause)
 
@@ -177,74 +179,6 @@ class Synchroniser:
         self._rejected[f"{key[0]}/{key[1]}.{cause}"] += 1
 
 
-class _Stream:
-    """Queued frames of one stream, by time, and the state of the stream."""
-
-    def __init__(self, key: Key) -> None:
-        self.key = key
-        self.waiting: list[Frame] = []
-        self.passed_ns = _NEVER_NS  # frames up to here are in a set or of no use
-        self.latest_ns = _NEVER_NS  # of the frame that arrived last: the stream has come so far
-        self.stalled = False  # made the last set wait in vain
-        self._epoch = -1
-        self._foreign = 0
-        self._form: tuple[object, ...] = ()
-        self._seen: deque[int] = deque(maxlen=MEMORY)
-
-    def rejection_cause(self, frame: Frame) -> str:
-        """Cause for which a frame is rejected; "" if it is accepted.
-
-        One frame of a wrong epoch or time must not stop its stream: after `FOREIGN` older ones, it begins anew.
-        """
-        cause = self._cause(frame)
-        is_foreign = cause == "old_epoch" or (cause == "stale" and self.passed_ns - frame.t_host_ns > FOREIGN_NS)
-        self._foreign = self._foreign + 1 if is_foreign else 0
-        if self._foreign <= FOREIGN:
-            return cause
-        self.passed_ns, self._epoch, self._foreign = _NEVER_NS, -1, 0
-        return ""
-
-    def _cause(self, frame: Frame) -> str:
-        if frame.epoch < self._epoch:
-            return "old_epoch"
-        if frame.epoch == self._epoch:
-            if _form_of(frame) != self._form:
-                return "changed"
-            if frame.seq in self._seen:
-                return "duplicate"
-        if frame.t_host_ns <= self.passed_ns:
-            return "stale"
-        if any(frame.t_host_ns == other.t_host_ns for other in self.waiting):
-            return "duplicate"
-        return ""
-
-    def insert(self, frame: Frame) -> None:
-        """Inserts an accepted frame; a new epoch resets the state of the stream."""
-        if frame.epoch > self._epoch:
-            self._epoch = frame.epoch
-            self._form = _form_of(frame)
-            self._seen.clear()
-        self._seen.append(frame.seq)
-        self.latest_ns = frame.t_host_ns
-        self.stalled = False
-        insort(self.waiting, frame, key=lambda other: other.t_host_ns)
-
-    def take_oldest(self) -> Frame:
-        """Removes the first waiting frame; nothing before it is accepted from now on."""
-        frame = self.waiting.pop(0)
-        self.passed_ns = frame.t_host_ns
-        return frame
-
-    def nearest(self, t_ns: int, tolerance_ns: int) -> Frame | None:
-        """The waiting frame nearest to a time, if it is within the tolerance."""
-        frame = min(self.waiting, key=lambda other: abs(other.t_host_ns - t_ns), default=None)
-        return frame if frame is not None and abs(frame.t_host_ns - t_ns) <= tolerance_ns else None
-
-
 def _received_ns(frame: Frame) -> int:
     """Time at which the frame reached this process, on this host's clock [ns]."""
     return frame.t_arrival_ns if frame.t_received_ns is None else frame.t_received_ns
-
-
-def _form_of(frame: Frame) -> tuple[object, ...]:
-    return frame.data.shape, frame.encoding, frame.geometry, frame.scale

@@ -58,6 +58,8 @@ class TrackerHealth:
         self._health.count_up_to(self._sets.counters)
         if self._sets.last_error:
             self._health.label("malformed", self._sets.last_error)
+        doubt = self._sets.clock_doubt
+        self._health.report("clocks", Level.WARNING if doubt else Level.OK, doubt)
         silence = self._silence_monitor.check()
         message = f"{silence}: {self._cause_of_silence()}" if silence else ""
         self._health.report("estimates", Level.ERROR if silence else Level.OK, message)

@@ -23,6 +23,7 @@ from abs_service.bus.frames import FrameSubscriber
 from abs_service.bus.health import Health, Level
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.commands.parts import chosen_region, rig_process
+from abs_service.pairing.common_clock import CommonClock
 from abs_service.pairing.frame_set_queue import FrameSetQueue
 from abs_service.supervision import gc_tuning
 from abs_service.supervision.exit_codes import Exit
@@ -76,7 +77,7 @@ def run(arguments: argparse.Namespace) -> int:
         act = partial(chosen_region.reinitialize, tracking, rig, plan, name)
         commands.answer_reinitialize(bus, name, headers, health, act)
         clocks, measuring = _clocks(bus, headers, stop)
-        sets = _frame_sets(bus, settings, name, rig)
+        sets = _frame_sets(bus, settings, name, rig, clocks)
         tracker_health = TrackerHealth(health, sets, time.monotonic_ns)
         publisher, budget_ms = _publisher(bus, settings, name, rig, headers), settings.trackers[name].budget_ms
         live = LiveTracker(tracking, sets, publisher, tracker_health, time.monotonic_ns, clocks, budget_ms)
@@ -112,10 +113,11 @@ def _clocks(bus: Bus, headers: HeaderFactory, stop: threading.Event) -> tuple[Cl
     return clocks, measuring
 
 
-def _frame_sets(bus: Bus, settings: config.ServiceConfig, name: str, rig: Rig) -> FrameSetQueue:
+def _frame_sets(bus: Bus, settings: config.ServiceConfig, name: str, rig: Rig, clocks: ClockOffsets) -> FrameSetQueue:
     frames = FrameSubscriber(bus, streams(rig.sensors.values()), time.monotonic_ns)
     synchroniser = wiring.synchroniser(settings, name, rig.sensors.values())
-    return FrameSetQueue(frames, synchroniser, time.monotonic_ns)
+    common_clock = CommonClock(settings.reference(name), synchroniser.tolerance_ns, clocks.offset)
+    return FrameSetQueue(frames, common_clock, synchroniser, time.monotonic_ns)
 
 
 def _publisher(

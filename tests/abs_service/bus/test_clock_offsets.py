@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from abs_service.bus import keys
-from abs_service.bus.clock_offsets import READINGS, ClockOffsets, Offset, answer
+from abs_service.bus.clock_offsets import CLOCKS, READINGS, ClockOffsets, Offset, answer
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from tests.abs_service.bus.loopback import LoopbackBus
 
@@ -85,6 +85,19 @@ def test_after_a_reboot_of_the_other_host_the_old_offset_is_forgotten():
     hosts = TwoHosts(5 * S)
     hosts.measure((0, 0))
     assert hosts.offsets.offset("there, second boot") is None
+
+
+def test_two_hosts_are_measured_and_no_more_than_the_last_few_that_were_asked_for():
+    hosts = TwoHosts(5 * S)
+    answer(hosts, HeaderFactory("demo", WallClock(monotonic=lambda: hosts.now_ns, wall=lambda: 0), host="third"))
+    assert hosts.offsets.offset("third") is None
+    hosts.measure((0, 0))
+    third = hosts.offsets.offset("third")
+    assert third is not None
+    assert (hosts.known.ns, third.ns) == (-5 * S, 0)
+    for number in range(CLOCKS):
+        hosts.offsets.offset(f"invented-{number}")
+    assert hosts.offsets.offset("third") is None
 
 
 @pytest.mark.parametrize("payload", [b"\xff\xff", b""])

@@ -12,6 +12,7 @@ from abs_service.bus.contract import IMAGES
 from abs_service.bus.frames import FrameSubscriber
 from abs_service.bus.health import Health
 from abs_service.bus.stamps import HeaderFactory, WallClock
+from abs_service.pairing.common_clock import CommonClock
 from abs_service.pairing.frame_set_queue import FrameSetQueue
 from abs_service.pairing.synchroniser import Synchroniser
 from abs_service.tracker.optimizers import cma
@@ -39,9 +40,11 @@ class Bench:
         self.headers = self.capture = HeaderFactory("demo", self.wall, host="here")
         self.health = Health(self.bus, "track/sheet", self.headers)
         frames = FrameSubscriber(self.bus, MEMBERS, lambda: self.now_ns)
-        self.sets = FrameSetQueue(frames, Synchroniser(MEMBERS[0], MEMBERS, tolerance_ns), lambda: self.now_ns)
-        self.tracking = TrackingSession(RIG, default_plan(optimizer=cma.Settings(generations=2), **parts))
         self.clocks = ClockOffsets(self.bus, lambda: self.now_ns, "here")
+        common_clock = CommonClock(MEMBERS[0], tolerance_ns, self.clocks.offset)
+        synchroniser = Synchroniser(MEMBERS[0], MEMBERS, tolerance_ns)
+        self.sets = FrameSetQueue(frames, common_clock, synchroniser, lambda: self.now_ns)
+        self.tracking = TrackingSession(RIG, default_plan(optimizer=cma.Settings(generations=2), **parts))
         self.tracker_health = TrackerHealth(self.health, self.sets, self.clock)
         self.live = LiveTracker(
             self.tracking,

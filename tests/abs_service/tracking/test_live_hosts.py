@@ -85,3 +85,23 @@ def test_on_one_host_the_age_has_no_error(bench):
     bench.expose(0)
     bench.live.process_next()
     assert bench.states[0].age_error_ms == 0
+
+
+def test_sensors_of_two_capture_hosts_are_paired_once_their_clocks_are_compared(bench):
+    depth = next(kind for kind in Kind if kind.value == MEMBERS[0][1])
+    behind_ns = 3600 * 10**9
+    here, there = bench.capture, Elsewhere(bench, behind_ns, boot="colour-host")
+    clock = WallClock(monotonic=lambda: bench.now_ns - behind_ns, wall=lambda: 0)
+    elsewhere = bench.capture
+    answer(bench.bus, HeaderFactory("demo", clock, host="colour-host"))
+    for k in range(6):
+        bench.capture = here
+        bench.expose(k, kinds=(depth,))
+        bench.capture = elsewhere
+        there.expose(k, kinds=set(Kind) - {depth})
+        bench.now_ns += 200_000_000
+        bench.live.process_next()
+        bench.clocks.measure()
+    missing = [any(sensor.missing for sensor in state.sensors) for state in bench.states]
+    assert missing[0]
+    assert missing[-3:] == [False, False, False]

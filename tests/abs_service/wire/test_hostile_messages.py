@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from rich.console import Console
 from rich.text import Text
 
-from abs_service.bus.clock_offsets import ClockOffsets
+from abs_service.bus.clock_offsets import NO_OFFSET, ClockOffsets
 from abs_service.bus.contract import Sample
 from abs_service.bus.frames import FrameSubscriber
 from abs_service.bus.health import Health
@@ -25,8 +25,10 @@ from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.commands.processes import track
 from abs_service.display.terminal.lines import JsonDisplay, PlainDisplay
 from abs_service.display.terminal.table import draw
+from abs_service.pairing.common_clock import CommonClock
 from abs_service.pairing.frame_set_queue import FrameSetQueue
-from abs_service.pairing.synchroniser import FOREIGN, Synchroniser
+from abs_service.pairing.synchroniser import Synchroniser
+from abs_service.pairing.waiting_stream import FOREIGN
 from abs_service.recording.recorder import Recorder
 from abs_service.recording.recorder_settings import RecorderSettings
 from abs_service.supervision.rig_view import Display
@@ -202,7 +204,8 @@ class Tracking:
         checked = CheckedBus(self.bus, time.monotonic_ns)
         frames = FrameSubscriber(checked, [("tof", "depth")], time.monotonic_ns)
         key = ("tof", "depth")
-        self.sets = FrameSetQueue(frames, Synchroniser(key, [key], 12_000_000), time.monotonic_ns)
+        common_clock = CommonClock(key, 12_000_000, lambda _: NO_OFFSET)
+        self.sets = FrameSetQueue(frames, common_clock, Synchroniser(key, [key], 12_000_000), time.monotonic_ns)
 
     def publish(self, seq, epoch=0, t_ns=None):
         t_ns = seq * S // 30 if t_ns is None else t_ns
