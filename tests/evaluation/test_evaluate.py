@@ -196,7 +196,7 @@ def test_what_could_not_be_measured_meets_no_goal() -> None:
 
 def test_the_header_of_every_experiment_states_goals_and_seeds():
     """Written before the run; see the rules in evaluation/README.md."""
-    headers = {name: one.__doc__.lower() for name, one in running.available().items()}
+    headers = {name: (one.__doc__ or "").lower() for name, one in running.available().items()}
     assert len(headers) > 10
     assert [name for name, text in headers.items() if "goal" not in text or "seeds" not in text] == []
 

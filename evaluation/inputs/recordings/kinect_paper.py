@@ -5,7 +5,7 @@ only.
 """
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise, product
 from pathlib import Path
@@ -36,6 +36,10 @@ WALL_M = 0.85
 
 #: A frame is wrong if its median error is above this many of its own claimed σ, and above this [mm].
 WRONG_SIGMA, WRONG_MM = 3.0, 5.0
+
+
+#: Number, z (height, width) [m] and colours (height, width, 3), if any.
+Frame = tuple[int, Points, NDArray[np.uint8] | None]
 
 
 @dataclass(frozen=True)
@@ -102,9 +106,10 @@ class MaterialErrors:
 
 @dataclass(frozen=True, eq=False)
 class PaperRun:
-    """One cell, tracked.
+    """One way of tracking the sheet.
 
     Attributes:
+        name: of the way.
         errors: in every frame with a truth after the first, in which the points are bound.
         bound, beyond: how many of the measured points are bound, and how many are beyond the mesh.
         tracking: share of all frames that are TRACKING.
@@ -112,7 +117,7 @@ class PaperRun:
         shown: estimates of the first and the last frame with a truth.
     """
 
-    cell: Cell
+    name: str
     errors: tuple[MaterialErrors, ...]
     bound: int
     beyond: int
@@ -154,7 +159,7 @@ def beside_flow(folder: Path, known: Truth, later: int = COLORS_LATER) -> NDArra
     return np.array(result)
 
 
-def images(folder: Path, cell: Cell, last: int) -> Iterator[tuple[int, Points, NDArray[np.uint8] | None]]:
+def images(folder: Path, cell: Cell, last: int) -> Iterator[Frame]:
     """Number, z (height, width) [m] and colours (height, width, 3) of every frame up to a number."""
     for path in sorted(folder.glob("depth_*.png")):
         number = int(path.stem.removeprefix("depth_"))
@@ -170,31 +175,31 @@ def color(folder: Path, number: int, later: int = COLORS_LATER) -> NDArray[np.ui
     return np.asarray(_image(_color_path(folder, number, later), cv2.IMREAD_COLOR_RGB), np.uint8)
 
 
-def follow(folder: Path, cell: Cell, known: Truth, clock: Callable[[], int] = time.process_time_ns) -> PaperRun:
-    """Tracks the sheet and compares it with the truth.
+def follow(name: str, tracker: a.Tracker, frames: Iterable[Frame], known: Truth) -> PaperRun:
+    """Tracks the sheet with a new tracker and compares it with the truth, in those frames with one that are given.
 
     Raises:
         UnboundError: the sheet is not found in the first frame.
     """
-    tracker = cell.tracker()
     tracker.warm_up()
     estimates: dict[int, a.Estimate] = {}
     solve_ms = []
-    for number, depth_m, image in images(folder, cell, known.numbers[-1]):
-        begin_ns = clock()
+    for number, depth_m, image in frames:
+        begin_ns = time.process_time_ns()
         estimates[number] = tracker.track(depth_m, time_s=number / RATE_HZ, image=image)
-        solve_ms.append((clock() - begin_ns) * 1e-6)
-    first, last = (estimates[known.numbers[k]] for k in (0, -1))
+        solve_ms.append((time.process_time_ns() - begin_ns) * 1e-6)
+    truths = [(number, points) for number, points in zip(known.numbers, known.points) if number in estimates]
+    first, last = (estimates[truths[k][0]] for k in (0, -1))
     if not len(first.faces):
-        raise UnboundError(f"{cell.name}: {', '.join(first.reasons)}")
-    binding = bind(known.points[0], first.vertices, first.faces)
+        raise UnboundError(f"{name}: {', '.join(first.reasons)}")
+    binding = bind(truths[0][1], first.vertices, first.faces)
     errors = tuple(
         _errors(number, binding, estimates[number], points, known.sigma, first.mesh_version)
-        for number, points in zip(known.numbers[1:], known.points[1:], strict=True)
+        for number, points in truths[1:]
     )
     bound, tracking = int(binding.bound.sum()), [one.status == a.Status.TRACKING for one in estimates.values()]
     beyond, times = len(binding.bound) - bound, np.array(solve_ms[1:])
-    return PaperRun(cell, errors, bound, beyond, float(np.mean(tracking)), times, (first, last))
+    return PaperRun(name, errors, bound, beyond, float(np.mean(tracking)), times, (first, last))
 
 
 def _errors(

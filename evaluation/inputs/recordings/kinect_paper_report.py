@@ -59,14 +59,24 @@ def findings(folder: Path, frames: int, cells: int, progress: Callable[[str], No
     known, runs = kinect_paper.truth(folder, frames), []
     for cell in CELLS[:cells]:
         progress(f"the sheet of paper: {cell.name}")
-        runs.append(kinect_paper.follow(folder, cell, known))
-    table = Table("Errors at measured material points", _COLUMNS, tuple(_row(run) for run in runs))
+        images = kinect_paper.images(folder, cell, known.numbers[-1])
+        runs.append(kinect_paper.follow(cell.name, cell.tracker(), images, known))
+    table = errors_table(runs)
     picture, beside = _picture(folder, runs[0], known), kinect_paper.beside_flow(folder, known)
-    values = {run.cell.name: _values(run) for run in runs}
+    values = {run.name: _values(run) for run in runs}
     as_numbered = kinect_paper.beside_flow(folder, known, 0)
     by_frame = _by_frame(runs, beside, as_numbered)
     section = Section("Kinect v1: a bent sheet of paper", (_WHAT, table, by_frame, _FLOW, picture))
-    return Findings(_goals(runs), (section,), {"kinect_paper": values, "kinect_paper_beside_flow_px": beside})
+    return Findings(
+        goals(runs, "Kinect paper", f"of {len(runs)} cells"),
+        (section,),
+        {"kinect_paper": values, "kinect_paper_beside_flow_px": beside},
+    )
+
+
+def errors_table(runs: Sequence[PaperRun]) -> Table:
+    """The errors, one row for each way of tracking."""
+    return Table("Errors at measured material points", _COLUMNS, tuple(_row(run) for run in runs))
 
 
 _WHAT = (
@@ -91,18 +101,16 @@ _FLOW = (
 )
 
 
-def _goals(runs: Sequence[PaperRun]) -> tuple[Goal, ...]:
-    """Each over the worst of all cells; NaN, a lost mesh, misses it."""
+def goals(runs: Sequence[PaperRun], name: str, of: str) -> tuple[Goal, ...]:
+    """Each for the worst way of tracking; NaN, a lost mesh, misses it."""
     rows = np.array([_numbers(run) for run in runs])
-    inside, cells = rows[:, _INSIDE], f"of {len(runs)} cells"
+    inside = rows[:, _INSIDE]
     return (
-        at_most(f"Kinect paper: median error, the worst {cells}", rows[:, _MEDIAN].max(), MEDIAN_MM, "mm"),
-        at_most(f"Kinect paper: error of a frame, the worst {cells}", rows[:, _WORST].max(), WORST_MM, "mm"),
-        at_least(f"Kinect paper: points in their 95 % region, the least {cells}", inside.min(), INSIDE[0], "%"),
-        at_most(f"Kinect paper: points in their 95 % region, the most {cells}", inside.max(), INSIDE[1], "%"),
-        at_most(
-            f"Kinect paper: frames that are TRACKING and wrong, the worst {cells}", rows[:, _WRONG].max(), WRONG, "%"
-        ),
+        at_most(f"{name}: median error, the worst {of}", rows[:, _MEDIAN].max(), MEDIAN_MM, "mm"),
+        at_most(f"{name}: error of a frame, the worst {of}", rows[:, _WORST].max(), WORST_MM, "mm"),
+        at_least(f"{name}: points in their 95 % region, the least {of}", inside.min(), INSIDE[0], "%"),
+        at_most(f"{name}: points in their 95 % region, the most {of}", inside.max(), INSIDE[1], "%"),
+        at_most(f"{name}: frames that are TRACKING and wrong, the worst {of}", rows[:, _WRONG].max(), WRONG, "%"),
     )
 
 
@@ -135,11 +143,11 @@ def _rms(values: Sequence[float]) -> float:
 
 def _row(run: PaperRun) -> tuple[TableCell, ...]:
     times = (float(np.median(run.solve_ms)), float(np.quantile(run.solve_ms, 0.95)))
-    return (run.cell.name, *_numbers(run), run.bound, run.beyond, *times)
+    return (run.name, *_numbers(run), run.bound, run.beyond, *times)
 
 
 def _by_frame(runs: Sequence[PaperRun], beside: NDArray[np.float64], as_numbered: NDArray[np.float64]) -> Table:
-    columns = (Column("frame"), *(Column(run.cell.name, "mm", ".2f") for run in runs))
+    columns = (Column("frame"), *(Column(run.name, "mm", ".2f") for run in runs))
     columns += (Column("points beside flow", "px", ".2f"), Column("same numbers", "px", ".2f"))
     per_frame = zip(*(run.errors for run in runs), strict=True)
     rows = (
@@ -171,7 +179,7 @@ def _picture(folder: Path, run: PaperRun, known: Truth) -> Picture:
     figure = plots.figure(12, 5.8)
     for axes, place, estimate in zip(figure.subplots(1, 2), (0, -1), run.shown):
         _draw(axes, folder, known.numbers[place], estimate, known.points[place])
-    caption = f"{run.cell.name}: mesh and measured points (red) over the edges of the first and the last frame"
+    caption = f"{run.name}: mesh and measured points (red) over the edges of the first and the last frame"
     return drawing(figure, caption, "Meshes and points over edges of images")
 
 

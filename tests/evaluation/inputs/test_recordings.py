@@ -9,7 +9,7 @@ import pytest
 
 from calib.camera import Camera
 from evaluation.experiment import Context, UnavailableError
-from evaluation.inputs import recordings
+from evaluation.inputs import changed_paper, recordings
 from evaluation.inputs.recordings import azure, kinect_paper, kinect_paper_report, sigma_image, sigma_report
 from evaluation.inputs.recordings.agreement import agreement
 from evaluation.inputs.recordings.toy import dropouts, sponge_report, toy
@@ -98,3 +98,12 @@ def test_without_recordings_the_experiment_says_what_it_needs(tmp_path: Path) ->
     for data in (None, tmp_path):
         with pytest.raises(UnavailableError, match="sl_rgbd_deform_petit"):
             recordings.run(recordings.QUICK, Context(0, data))
+
+
+@pytest.mark.slow
+def test_the_truth_stays_where_it_is_in_changed_images(data_set: Callable[[str], Path]) -> None:
+    settings = changed_paper.Settings(frames=4, changes=len(changed_paper.CHANGES))
+    found = changed_paper.run(settings, Context(0, data_set(kinect_paper.FOLDER).parent, lambda text: None))
+    assert len(found.values["changes"]) == 2 * len(changed_paper.CHANGES)
+    errors = {goal.name.partition(": ")[2]: goal.value for goal in found.goals}
+    assert errors[f"error of a frame, the worst of {len(found.values['changes'])}"] < 5  # a pixel of the coarsest

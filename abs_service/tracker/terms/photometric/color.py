@@ -10,6 +10,7 @@ from abs_service.tracker.synthesis.window import NOTHING_HAS, Bordered, Window
 from abs_service.tracker.terms.base import Bounds, SensorFit, facing, summarize
 from abs_service.tracker.terms.gradients import color_rows
 from abs_service.tracker.terms.linearization import PointLinearization
+from abs_service.tracker.terms.photometric.exposure import gains
 from abs_service.tracker.terms.photometric.shadow import Shadow
 from abs_service.tracker.terms.photometric.texture_registration_noise import (
     NO_REGISTRATION_NOISE,
@@ -47,6 +48,7 @@ class ColorTerm:
         self._registration_noise = registration_noise
         self._inverse = np.zeros((0, 3), np.float32)
         self._normalizer = np.zeros(0, np.float32)
+        self._gains = np.ones(3, np.float32)
         self._texture = np.zeros((0, 3), np.float32)
         self._image: NDArray[np.float32] | NDArray[np.uint8] = np.zeros((1, 1, 3), np.float32)
         self._levels = np.zeros((0, 0, 3), np.uint8)
@@ -62,11 +64,16 @@ class ColorTerm:
         self._bordered.inside[:] = self._image[window]
         self._texture = texture.reshape(-1, 3)
         self._view.look(predicted)
+        seen = self._view.synthesize(predicted)
+        self._gains = gains(self._texture[seen.pixel[0]], seen.attributes[0].T)
+        self._bordered.inside[:] *= 1 / self._gains
         widening = self._registration_noise.widening(self._view, predicted, self._sigma)
         self._inverse = np.repeat(
             np.float32(1) / (self._sigma * widening.factor), 3 // widening.factor.shape[1], axis=1
         )
-        self._normalizer = (self._constant + 3 * widening.log.mean(axis=1)).astype(np.float32)
+        self._inverse = np.ascontiguousarray(self._inverse * self._gains)
+        gain = float(np.log(self._gains).sum())
+        self._normalizer = (self._constant + 3 * widening.log.mean(axis=1) - gain).astype(np.float32)
 
     def _resampled(self, rgb: NDArray[np.uint8]) -> NDArray[np.float32]:
         """The image in the view's camera, NaN where unknown."""
@@ -113,7 +120,7 @@ class ColorTerm:
         use = measured & (self._normalizer + 0.5 * np.sum(residual**2, axis=1) < self._bounds.outlier)
         vertices = self._view.spread(surface, surface.vertices[0].T)
         inverse = np.broadcast_to(self._inverse, residual.shape)[use, :, None]
-        rows = color_rows(self._image, self._view.camera, vertices[use]) * inverse
+        rows = color_rows(self._image, self._view.camera, vertices[use]) * (inverse / self._gains[:, None])
         points = np.repeat(np.flatnonzero(use), residual.shape[1])
         samples = self._view.follow(surface, sparse_jacobian)
         return PointLinearization(residual[use].ravel(), rows.reshape(-1, 3), points, samples, vertices)
