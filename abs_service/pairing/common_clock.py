@@ -56,7 +56,7 @@ class CommonClock:
 
     @property
     def doubt(self) -> str:
-        """Why the latest frames of some sensors are refused, and what to do; "" if none are."""
+        """The reason for which the latest frames of some sensors are refused, and what to do; "" if none are."""
         return "; ".join(self._doubts.values())
 
     def convert(self, frame: Frame) -> tuple[Frame, int] | None:
