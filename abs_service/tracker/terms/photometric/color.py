@@ -1,5 +1,7 @@
 """Term of a colour sensor: measured colours compared with those of the vertices."""
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -48,7 +50,7 @@ class ColorTerm:
         self._registration_noise = registration_noise
         self._inverse = np.zeros((0, 3), np.float32)
         self._normalizer = np.zeros(0, np.float32)
-        self._gains = np.ones(3, np.float32)
+        self._gains = np.ones((3, 1), np.float32)
         self._texture = np.zeros((0, 3), np.float32)
         self._image: NDArray[np.float32] | NDArray[np.uint8] = np.zeros((1, 1, 3), np.float32)
         self._levels = np.zeros((0, 0, 3), np.uint8)
@@ -65,15 +67,12 @@ class ColorTerm:
         self._texture = texture.reshape(-1, 3)
         self._view.look(predicted)
         seen = self._view.synthesize(predicted)
-        self._gains = gains(self._texture[seen.pixel[0]], seen.attributes[0].T)
-        self._bordered.inside[:] *= 1 / self._gains
+        self._gains = gains(self._texture[seen.pixel[0]], seen.attributes[0].T)[:, None]
         widening = self._registration_noise.widening(self._view, predicted, self._sigma)
         self._inverse = np.repeat(
             np.float32(1) / (self._sigma * widening.factor), 3 // widening.factor.shape[1], axis=1
         )
-        self._inverse = np.ascontiguousarray(self._inverse * self._gains)
-        gain = float(np.log(self._gains).sum())
-        self._normalizer = (self._constant + 3 * widening.log.mean(axis=1) - gain).astype(np.float32)
+        self._normalizer = (self._constant + 3 * widening.log.mean(axis=1)).astype(np.float32)
 
     def _resampled(self, rgb: NDArray[np.uint8]) -> NDArray[np.float32]:
         """The image in the view's camera, NaN where unknown."""
@@ -101,7 +100,12 @@ class ColorTerm:
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
         """−Σ_v log of the density of the measured colours (population,)."""
-        return self._cost_of(self._view.synthesize(surface), surface)
+        return self._cost_of(self._synthesize(surface), surface)
+
+    def _synthesize(self, surface: Surface) -> Synthesis:
+        """The colours of a population as this frame's exposure shows them."""
+        seen = self._view.synthesize(surface)
+        return replace(seen, attributes=seen.attributes * self._gains)
 
     def _cost_of(self, seen: Synthesis, surface: Surface) -> NDArray[np.float64]:
         """Cost (population,) of what is synthesised."""
@@ -116,18 +120,18 @@ class ColorTerm:
 
     def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> PointLinearization:
         """Normalised residuals of the inliers, three channels each, and their derivatives with respect to theta."""
-        residual, measured = self._residuals(self._view.synthesize(surface))
+        residual, measured = self._residuals(self._synthesize(surface))
         use = measured & (self._normalizer + 0.5 * np.sum(residual**2, axis=1) < self._bounds.outlier)
         vertices = self._view.spread(surface, surface.vertices[0].T)
         inverse = np.broadcast_to(self._inverse, residual.shape)[use, :, None]
-        rows = color_rows(self._image, self._view.camera, vertices[use]) * (inverse / self._gains[:, None])
+        rows = color_rows(self._image, self._view.camera, vertices[use]) * inverse
         points = np.repeat(np.flatnonzero(use), residual.shape[1])
         samples = self._view.follow(surface, sparse_jacobian)
         return PointLinearization(residual[use].ravel(), rows.reshape(-1, 3), points, samples, vertices)
 
     def fit(self, surface: Surface) -> SensorFit:
         """Agreement of the sensor with a population of one."""
-        seen = self._view.synthesize(surface)
+        seen = self._synthesize(surface)
         residual, measured = self._residuals(seen)
         pixel, known = seen.pixel[0], np.isfinite(seen.attributes[0]).all(axis=0)
         hidden = np.isinf(self._texture[pixel, 0])
