@@ -64,6 +64,17 @@ def read(path: Path, target: Target) -> BoardObservations:
     Raises:
         CornerFileError: no such file, no file of detections, or of another board.
     """
+    seen = read_any(path)
+    _require_board(path, target, seen.corners)
+    return seen
+
+
+def read_any(path: Path) -> BoardObservations:
+    """Reads detections of whatever board.
+
+    Raises:
+        CornerFileError: no such file, or no file of detections.
+    """
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}
@@ -74,11 +85,9 @@ def read(path: Path, target: Target) -> BoardObservations:
     if "version" not in arrays or int(arrays["version"]) != VERSION:
         raise CornerFileError(f"{path}: is no file of detections of version {VERSION}")
     try:
-        seen = _observations(arrays)
+        return _observations(arrays)
     except (KeyError, IndexError, ValueError) as error:
         raise CornerFileError(f"{path}: is damaged: {error}") from error
-    _require_board(path, target, seen.corners)
-    return seen
 
 
 def _columns(

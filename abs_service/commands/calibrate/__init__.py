@@ -7,6 +7,7 @@ COMMANDS = {
     "intrinsics": "cameras one by one, from images of a board",
     "rig": "a whole rig in one solve: cameras, poses, distances",
     "noise": "noise model of a depth sensor, from recordings of static scenes",
+    "compare": "two calibrations of the same cameras: where they differ, and by how many pixels",
     "convert": "calibrations from and to the formats of other programs",
     "verify": "whether a stored calibration still holds, and which sensor has moved if not",
 }

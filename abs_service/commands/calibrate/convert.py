@@ -18,25 +18,21 @@ import json
 import re
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from abs_service.bus import keys
 from abs_service.calibration.files import exchange, rig_file
-from abs_service.commands.calibrate import calibrations
+from abs_service.commands.calibrate import camera_files
 from abs_service.config.problems import allowed_instead
 from abs_service.report import provenance
 from abs_service.supervision.exit_codes import Exit
 from calib.camera import Camera
-from calib.files import limited
 from calib.formats import opencv, plausibility
 from calib.formats.content import Content, Hints
 from calib.formats.resizing import resized
-
-#: Metres per unit, as values of `--unit`.
-UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 
 
 class ConvertError(Exception):
@@ -72,9 +68,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--sensor", metavar="NAME", action="append", default=[], help="write only this one; repeatable")
     parser.add_argument("--rename", metavar="OLD=NEW", action="append", default=[], help="call it so; repeatable")
     parser.add_argument("--size", metavar="WxH", help="size of the images, if IN does not say it or they have another")
-    parser.add_argument(
-        "--unit", choices=list(UNITS), help="unit of translations, if IN does not have it (default: its format's, or m)"
-    )
+    help_text = "unit of translations, if IN does not have it (default: its format's, or m)"
+    parser.add_argument("--unit", choices=list(camera_files.UNITS), help=help_text)
     parser.add_argument("--lens", choices=[opencv.BROWN_CONRADY, opencv.FISHEYE], help="kind, if IN leaves it open")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
 
@@ -84,11 +79,11 @@ def run(arguments: argparse.Namespace) -> int:
     out = arguments.out
     if out.exists():
         raise ConvertError(f"{out}: exists already; choose another name or remove it")
-    hints = Hints(size=_size(arguments.size), lens=arguments.lens or "")
+    hints = Hints(size=camera_files.size(arguments.size), lens=arguments.lens or "")
     options = Options(
         arguments.source, arguments.target, tuple(arguments.sensor), _names(arguments.rename), arguments.unit, hints
     )
-    read = [_read(path, options) for path in arguments.inputs]
+    read = [camera_files.read(path, options.hints, options.source, options.unit) for path in arguments.inputs]
     content = _chosen(read, options)
     target = options.target or exchange.of_name(out)
     lost = [*content.lost, *_write(out, target, content.cameras, arguments)]
@@ -101,60 +96,6 @@ def run(arguments: argparse.Namespace) -> int:
     for pair, (length, angle) in plausibility.baselines(content.cameras).items():
         print(f"  {pair}: {length * 1e3:.1f} mm apart, turned by {np.rad2deg(angle):.2f}°")
     return Exit.OK
-
-
-def _read(path: Path, options: Options) -> Content:
-    try:
-        text = limited.text(path)
-    except OSError as error:
-        raise ConvertError(f"{path}: cannot be read: {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        raise ConvertError(f"{path}: all formats are UTF-8 text, byte {error.start} is not") from error
-    name = options.source or exchange.of_content(path, text)
-    if options.hints.lens and name != "opencv":
-        raise ConvertError(f"--lens {options.hints.lens}: {path} says itself which lens it has")
-    if name == exchange.OWN:
-        return _own(path)
-    stem = re.sub(r"[^A-Za-z0-9_-]+", "_", path.stem).strip("_-") or "camera"
-    content = exchange.read(path, text, name, replace(options.hints, name=stem))
-    scaled = {key: _scaled(one, UNITS[options.unit or "m"]) for key, one in content.cameras.items()}
-    _check(path, scaled, options.unit)
-    return replace(content, cameras=scaled)
-
-
-def _scaled(one: Camera, unit: float) -> Camera:
-    """Camera whose translation was in another unit [m]."""
-    T_rs = one.T_rs.copy()
-    T_rs[:3, 3] *= unit
-    return replace(one, T_rs=T_rs)
-
-
-def _check(path: Path, cameras: Mapping[str, Camera], unit: str | None) -> None:
-    """Refuses what no camera of a rig is, unless the unit was given."""
-    for doubt in plausibility.doubts(cameras):
-        raise ConvertError(f"{path}: {doubt}")
-    for pair, (length, _) in plausibility.baselines(cameras).items():
-        if length > plausibility.LARGEST_BASELINE_M and unit is None:
-            raise ConvertError(
-                f"{path}: {pair} are {length:.4g} m apart, if lengths are in metres; say what they are in with --unit, "
-                f"one of {', '.join(UNITS)}"
-            )
-
-
-def _own(path: Path) -> Content:
-    """Cameras of our own file."""
-    known = calibrations.load(path)
-    lost = ["the covariances"] if known.covariance.names else []
-    for name, sensor in known.sensors.items():
-        parts = {
-            "depth terms": sensor.depth_offset or sensor.depth_scale,
-            "time offset": sensor.time_offset,
-            "noise model": sensor.noise,
-            "texture": sensor.texture,
-            "factory calibration": sensor.factory,
-        }
-        lost += [f"{name}: {part}" for part, given in parts.items() if given]
-    return Content({name: sensor.camera for name, sensor in known.sensors.items()}, tuple(lost))
 
 
 def _chosen(contents: list[Content], options: Options) -> Content:
@@ -203,15 +144,6 @@ def _command_line(arguments: argparse.Namespace) -> list[str]:
     options += [("--sensor", name) for name in arguments.sensor] + [("--rename", pair) for pair in arguments.rename]
     given = [word for option, value in options if value is not None for word in (option, value)]
     return ["calibrate", "convert", *map(str, arguments.inputs), str(arguments.out), *given]
-
-
-def _size(given: str | None) -> tuple[int, int] | None:
-    if given is None:
-        return None
-    match = re.fullmatch(r"([1-9]\d{0,4})x([1-9]\d{0,4})", given)
-    if match is None:
-        raise ConvertError(f"--size {given}: must be width and height in pixels, such as 640x480")
-    return int(match[1]), int(match[2])
 
 
 def _names(given: list[str]) -> dict[str, str]:

@@ -51,7 +51,7 @@ class Hosts:
         self._clocks: list[int] = []
         self._running: dict[str, subprocess.Popen[bytes]] = {}
         self.boot()
-        _await_port(self._endpoint)
+        await_port(self._endpoint)
         for command in ("track", "record"):
             self._running[command] = self._start(command, "--connect", self._endpoint)
 
@@ -101,7 +101,7 @@ class Hosts:
             return subprocess.Popen(words, stdout=log, stderr=log)
 
 
-def _await_port(endpoint: str) -> None:
+def await_port(endpoint: str) -> None:
     """Waits until somebody listens."""
     host, _, port = endpoint.rpartition("/")[2].rpartition(":")
     deadline_s = time.monotonic() + START_S

@@ -1,0 +1,99 @@
+"""Cameras are read from calibrations of any format."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+from abs_service.calibration.files import exchange
+from abs_service.commands.calibrate import calibrations
+from calib.camera import Camera
+from calib.files import limited
+from calib.formats import plausibility
+from calib.formats.content import Content, Hints
+
+#: Metres per unit, as values of `--unit`.
+UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
+
+
+class CamerasError(Exception):
+    """A calibration that cannot be read, or that no camera has."""
+
+
+def read(path: Path, hints: Hints, source: str | None = None, unit: str | None = None) -> Content:
+    """The cameras of a file.
+
+    Args:
+        path: the file.
+        hints: values that it omits.
+        source: its format; None to detect it.
+        unit: of its translations, one of `UNITS`; None if it is the format's.
+
+    Raises:
+        CamerasError: it cannot be read, or what it says cannot be.
+    """
+    try:
+        text = limited.text(path)
+    except OSError as error:
+        raise CamerasError(f"{path}: cannot be read: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise CamerasError(f"{path}: all formats are UTF-8 text, byte {error.start} is not") from error
+    name = source or exchange.of_content(path, text)
+    if hints.lens and name != "opencv":
+        raise CamerasError(f"--lens {hints.lens}: {path} says itself which lens it has")
+    if name == exchange.OWN:
+        return _own(path)
+    stem = re.sub(r"[^A-Za-z0-9_-]+", "_", path.stem).strip("_-") or "camera"
+    content = exchange.read(path, text, name, replace(hints, name=stem))
+    scaled = {key: _scaled(one, UNITS[unit or "m"]) for key, one in content.cameras.items()}
+    _check(path, scaled, unit)
+    return replace(content, cameras=scaled)
+
+
+def size(given: str | None) -> tuple[int, int] | None:
+    """Width and height [px] as given on the command line, such as 640x480; None if they are not.
+
+    Raises:
+        CamerasError: it is written otherwise.
+    """
+    if given is None:
+        return None
+    match = re.fullmatch(r"([1-9]\d{0,4})x([1-9]\d{0,4})", given)
+    if match is None:
+        raise CamerasError(f"--size {given}: must be width and height in pixels, such as 640x480")
+    return int(match[1]), int(match[2])
+
+
+def _scaled(one: Camera, unit: float) -> Camera:
+    """Camera whose translation was in another unit [m]."""
+    T_rs = one.T_rs.copy()
+    T_rs[:3, 3] *= unit
+    return replace(one, T_rs=T_rs)
+
+
+def _check(path: Path, cameras: Mapping[str, Camera], unit: str | None) -> None:
+    """Refuses what no camera of a rig is, unless the unit was given."""
+    for doubt in plausibility.doubts(cameras):
+        raise CamerasError(f"{path}: {doubt}")
+    for pair, (length, _) in plausibility.baselines(cameras).items():
+        if length > plausibility.LARGEST_BASELINE_M and unit is None:
+            raise CamerasError(
+                f"{path}: {pair} are {length:.4g} m apart, if lengths are in metres; say what they are in with --unit, "
+                f"one of {', '.join(UNITS)}"
+            )
+
+
+def _own(path: Path) -> Content:
+    """Cameras of our own file."""
+    known = calibrations.load(path)
+    lost = ["the covariances"] if known.covariance.names else []
+    for name, sensor in known.sensors.items():
+        parts = {
+            "depth terms": sensor.depth_offset or sensor.depth_scale,
+            "time offset": sensor.time_offset,
+            "noise model": sensor.noise,
+            "texture": sensor.texture,
+            "factory calibration": sensor.factory,
+        }
+        lost += [f"{name}: {part}" for part, given in parts.items() if given]
+    return Content({name: sensor.camera for name, sensor in known.sensors.items()}, tuple(lost))
