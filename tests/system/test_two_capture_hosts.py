@@ -26,9 +26,9 @@ def write(path, *sensors):
     rig["bus"]["endpoint"] = ENDPOINT
     rig["devices"]["sim"]["uri"] = f"simulated://sheet?seed=1&sensors={','.join(sensors)}"
     rig["sensors"] = {name: table for name, table in rig["sensors"].items() if name in sensors}
-    rig["synchronisation"] = {"tolerance_ms": 16.0}  # two simulations begin when they like: up to half a period apart
+    rig["synchronisation"]["tolerance_ms"] = 16.0  # two simulations begin when they like: up to half a period apart
     if len(sensors) == 1:
-        del rig["trackers"]
+        del rig["trackers"], rig["synchronisation"]
     path.write_text(tomli_w.dumps(rig), encoding="utf-8")
     return path
 
