@@ -58,7 +58,7 @@ def port():
 
 def _opened(browser, port, **screen):
     """The page, once it says something, and how long that took [s]."""
-    small = {"viewport": {"width": 640, "height": 480}}  # every pixel is rendered in software
+    small = {"viewport": {"width": 800, "height": 900}}  # as high as the panel; every pixel is rendered in software
     page = browser.new_page(**(screen or small))
     page.set_default_timeout(1e3 * PATIENCE_S)
     begin_s = time.monotonic()
