@@ -6,17 +6,11 @@ from typing import Literal
 import numpy as np
 import scipy  # its parts are imported when they are first used
 
-#: Approximate number of vertices of a mesh; "auto": as many as the object's pixels resolve.
+#: Approximate number of vertices of a mesh; "auto": the usual number, fewer if the object has fewer pixels.
 Vertices = Literal["auto"] | int
 
 #: Usual number of vertices; that of a template's mesh, which is made before the object is seen.
 USUAL_VERTICES = 300
-
-#: A larger mesh has a vertex for so many pixels: the mean of its distance in the first image is over more than that.
-PIXELS_PER_VERTEX = 4.0
-
-#: A larger mesh takes more time for each frame.
-MAX_VERTICES = 450
 
 #: A coarser grid loses too much of a small object at its rim.
 MIN_VERTICES = 100
@@ -34,8 +28,7 @@ CUBIC = 3
 
 def vertices(pixels: int) -> int:
     """Number of vertices for an object of so many pixels in the first depth image: never more than it has pixels."""
-    wanted = min(max(pixels / PIXELS_PER_VERTEX, USUAL_VERTICES), MAX_VERTICES)
-    return round(min(wanted, max(pixels, MIN_VERTICES)))
+    return min(USUAL_VERTICES, max(pixels, MIN_VERTICES))
 
 
 def degree(cells: Iterable[float]) -> int:

@@ -74,8 +74,8 @@ class MeshTable(Table):
     """`[trackers.<name>.mesh]`: the triangle mesh whose deformation is estimated.
 
     Attributes:
-        vertices: approximate number of its vertices. "auto": one for every four pixels of the object in the first
-            image, 300 to 450, and fewer if it has fewer pixels, down to 100; a template's mesh has 300.
+        vertices: approximate number of its vertices. "auto": 300, fewer if the object has fewer pixels in the
+            first image, down to 100; a template's mesh has 300.
     """
 
     vertices: Literal["auto"] | Annotated[int, Field(ge=4, le=100_000)] = "auto"

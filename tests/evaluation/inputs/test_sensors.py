@@ -14,6 +14,6 @@ def test_another_sensor_does_no_harm() -> None:
     assert all(goal.met for goal in found.goals), found.goals
     assert all("of 10 ratios" in goal.name for goal in found.goals)
     errors = {name: values.mean(axis=0) for name, values in found.values["errors_mm"].items()}
-    # Beside colours, a second depth sensor gains nothing since the mesh follows from what is resolved (decision 0029):
-    # what is left are the steps of structured light. Without colours it holds the sheet along itself.
+    # Beside colours, a second depth sensor gains little since control points follow from what is resolved (decision
+    # 0029): what is left are the steps of structured light. Without colours it holds the sheet along itself.
     assert errors["structured_light + tof"][0] < 0.95 * errors["tof"][0]
