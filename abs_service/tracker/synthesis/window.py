@@ -28,6 +28,8 @@ NOTHING_HAS = 1e6
 def around(camera: Camera, projection: Projection, predicted: Surface, reach_m: float) -> Window:
     """Rows and columns that can contain a surface; the first ones are even, for images of half the size.
 
+    At least one of each: of a surface beside the image, those at the image's edge.
+
     Args:
         camera: the camera.
         projection: of the same camera.
@@ -42,9 +44,9 @@ def around(camera: Camera, projection: Projection, predicted: Surface, reach_m: 
     low, high = np.full(2, np.inf), np.full(2, -np.inf)
     extent(place, inverse_z, low, high)
     size = np.array([camera.height, camera.width])
-    first = (np.clip(np.floor(low - margin), 0, size).astype(int) // 2 * 2).tolist()
-    last = np.clip(np.ceil(high + margin) + 1, first, size).astype(int).tolist()
-    return slice(first[0], last[0]), slice(first[1], last[1])
+    first = np.clip(np.floor(low - margin), 0, size - 1).astype(int) // 2 * 2
+    last = np.clip(np.ceil(high + margin) + 1, first + 1, size).astype(int).tolist()
+    return slice(int(first[0]), last[0]), slice(int(first[1]), last[1])
 
 
 def corner(window: Window) -> tuple[int, int]:

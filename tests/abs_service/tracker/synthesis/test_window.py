@@ -68,6 +68,17 @@ def depth_term(outline: bool = False) -> DepthTerm:
     return term(outline=lambda camera: RimOutline(camera, Rim.of(MESH), 0.5)) if outline else term()
 
 
+@pytest.mark.parametrize("down", [0.4, -0.4, 3.0])
+def test_a_surface_beside_the_image_has_a_window_and_a_cost(down):
+    away = moved(0, down, 0)
+    window = around(WIDE, Projection(WIDE), away, 0.0)
+    assert scene()[window].size > 0
+    term = depth_term(outline=True)
+    term.observe(depth_image(scene()), moved(0, 0, 0), REACH_M)
+    term.observe(depth_image(scene()), away, 0.0)
+    assert np.isfinite(term.cost(away)).all()
+
+
 @settings(max_examples=60, deadline=None)
 @given(seeds, st.sampled_from([CAMERA, FISHEYE, WIDE]), st.floats(0, 0.2))
 def test_a_window_holds_all_that_is_within_reach(seed, camera, reach):
