@@ -55,7 +55,7 @@ class GroupedLinearization:
         _add_square(self.jacobian, weights, self.parameters, self.start, total)
 
     def leverage(self, covariance: NDArray[np.float64]) -> NDArray[np.float64]:
-        """diag(J Σ Jᵀ) (m,) of a covariance Σ (dim, dim), which is symmetric."""
+        """diag(J Σ Jᵀ) (m,) of a covariance Σ (dim, dim)."""
         result = np.empty(len(self.residual))
         _quadratic_forms(self.jacobian, self.parameters, self.start, covariance, result)
         return result
@@ -151,36 +151,22 @@ def _quadratic_forms(
     matrix: NDArray[np.float64],
     result: NDArray[np.float64],
 ) -> None:
-    """Products row matrix rowᵀ (m,) of rows (m, k) with a symmetric matrix (dim, dim).
-
-    They are 2 row T rowᵀ with the matrix's lower triangle T, of half its diagonal; one of four blocks of T is zero.
-    """
-    k, half = rows.shape[1], rows.shape[1] // 2
-    left, corner = np.empty((k, half)), np.empty((k - half, k - half))
+    """Products row matrix rowᵀ (m,) of rows (m, k) with a matrix (dim, dim)."""
+    part = np.empty((parameters.shape[1], parameters.shape[1]))
     for g in range(parameters.shape[0]):
-        n, own = start[g + 1] - start[g], parameters[g]
-        if n == 0:
+        if start[g] == start[g + 1]:
             continue
-        for i in range(k):
-            line = matrix[own[i]]
-            for j in range(k):
-                value = line[own[j]] if j < i else 0.5 * line[own[j]] if j == i else 0.0
-                if j < half:
-                    left[i, j] = value
-                elif i >= half:
-                    corner[i - half, j - half] = value
-        right = np.empty((n, k - half))
-        for m in range(n):
-            for d in range(k - half):
-                right[m, d] = rows[start[g] + m, half + d]
-        by_left, by_corner = np.dot(rows[start[g] : start[g + 1]], left), np.dot(right, corner)
-        for m in range(n):
-            row, total = rows[start[g] + m], 0.0
-            for d in range(half):
-                total += by_left[m, d] * row[d]
-            for d in range(k - half):
-                total += by_corner[m, d] * right[m, d]
-            result[start[g] + m] = 2 * total
+        for i in range(part.shape[0]):
+            line = matrix[parameters[g, i]]
+            for j in range(part.shape[1]):
+                part[i, j] = line[parameters[g, j]]
+        own = rows[start[g] : start[g + 1]]
+        products = np.dot(own, part)
+        for m in range(own.shape[0]):
+            total = 0.0
+            for d in range(own.shape[1]):
+                total += products[m, d] * own[m, d]
+            result[start[g] + m] = total
 
 
 @kernel

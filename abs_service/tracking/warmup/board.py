@@ -42,13 +42,22 @@ def warm_up(rig: Rig, plan: Plan, report: Callable[[Progress], None] = ignore) -
 def _track_board(rig: Rig, plan: Plan) -> None:
     frames = [_board(head, Kind(stream), plan.model.board) for head, stream in streams(rig.sensors.values())]
     tracking = TrackingSession(rig, replace(plan, region=nearest.Settings(), template=first_image.Settings()))
-    for seq, seen in enumerate((frames, frames, [_without_object(frame) for frame in frames])):
+    changed = [[change(frame) for frame in frames] for change in (_with_dropout, _without_object)]
+    for seq, seen in enumerate((frames, *changed)):
         tracking.track(FrameSet(seq, round(seq * 33e6), {frame.key: frame for frame in seen}), lambda: False)
 
 
 def _sensor(sensor: Sensor) -> Sensor:
     noise = _NOISE if isinstance(sensor.noise, DepthNoise) else sensor.noise
     return Sensor(sensor.name, replace(_CAMERA, lens=sensor.camera.lens), noise)
+
+
+def _with_dropout(frame: Frame) -> Frame:
+    if frame.kind != Kind.DEPTH:
+        return frame
+    z = frame.data.copy()
+    z[z.shape[0] // 2, z.shape[1] // 2] = np.nan
+    return replace(frame, data=z)
 
 
 def _without_object(frame: Frame) -> Frame:

@@ -34,8 +34,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from calib.jit import kernel
-
 #: Share λ of a residual's variance that comes from the first frame. Its colours are interpolated between four pixels,
 #: which leaves 4/9 of their variance on average (a share of 0.31); its distances are averaged over more (about 0.1).
 LASTING = 0.25
@@ -91,14 +89,14 @@ class ErrorPropagation:
 
     def update(self, motion: Motion, errors: FrameErrors) -> NDArray[np.float64]:
         """Covariance (dim, dim) of the estimate of a frame."""
-        inverse, precision, own = errors.inverse, errors.precision, errors.gradient - errors.precision
+        inverse, own = errors.inverse, errors.gradient - errors.precision
+        gain = inverse @ errors.precision
         if self._began:
             self._move(motion)
         self._began = True
-        before = product(precision, product(precision, self._error).T).T  # W E W, of which G E Gᵀ = Σ W E W Σ
-        self._error = inverse @ (before + (1 - LASTING) * own) @ inverse
-        self._cross = inverse @ product(precision, self._cross)
-        self._response = inverse @ product(precision, self._response) + inverse
+        self._error, self._cross = gain @ self._error @ gain.T, gain @ self._cross
+        self._error += (1 - LASTING) * inverse @ own @ inverse
+        self._response = gain @ self._response + inverse
         return self._response @ (LASTING * own + errors.shared) @ self._response.T + self._error
 
     def _move(self, motion: Motion) -> None:
@@ -109,23 +107,3 @@ class ErrorPropagation:
         cross = rho * self._cross
         self._error = self._error + cross + cross.T + self._velocity + motion.unpredicted
         self._cross = cross + self._velocity
-
-
-def product(sparse: NDArray[np.float64], right: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Product (dim, k) of a matrix (dim, dim) of few elements that are not zero, as a precision W, and another one."""
-    result = np.zeros((len(sparse), right.shape[1]))
-    _add_product(sparse, np.ascontiguousarray(right), result)
-    return result
-
-
-@kernel
-def _add_product(sparse: NDArray[np.float64], right: NDArray[np.float64], result: NDArray[np.float64]) -> None:
-    """Adds the product, whose zeros are passed over."""
-    for i in range(sparse.shape[0]):
-        total = result[i]
-        for j in range(sparse.shape[1]):
-            share = sparse[i, j]
-            if share != 0:
-                row = right[j]
-                for d in range(row.size):
-                    total[d] += share * row[d]

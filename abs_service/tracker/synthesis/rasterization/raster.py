@@ -25,6 +25,7 @@ class Raster:
         self._faces = np.ascontiguousarray(faces, np.int32)
         self._ray_length = camera.lookup.ray_length.astype(np.float32)
         self._nearness = np.zeros(self._ray_length.shape, np.float32)
+        self._unwanted = np.full(self._ray_length.shape, np.float32(np.inf))
         self._distance = np.full(self._ray_length.shape, np.float32(np.inf))
         self._box = np.s_[0:0, 0:0]
 
@@ -47,12 +48,13 @@ class Raster:
     ) -> NDArray[np.float32]:
         """The same distances (k,) [m] at some pixels alone, with rows (k,) and columns (k,) inside the image."""
         place, inverse_z = self._projection.project(np.ascontiguousarray(vertices[None], np.float32))
-        order = np.argsort(rows, kind="stable")
-        start = np.searchsorted(rows[order], np.arange(len(self._ray_length) + 1))
-        nearness = np.zeros(len(rows), np.float32)
-        _nearest_at(place[0], inverse_z[0], self._faces, start, order, columns, nearness)
+        nearness = self._unwanted
+        nearness[rows, columns] = 0
+        _nearest(place[0], inverse_z[0], self._faces, nearness)
         with np.errstate(divide="ignore"):
-            return self._ray_length[rows, columns] / nearness
+            distance = self._ray_length[rows, columns] / nearness[rows, columns]
+        nearness[rows, columns] = np.inf
+        return distance
 
     def _around(self, place: NDArray[np.float32], inverse_z: NDArray[np.float32]) -> tuple[slice, slice]:
         """Rows and columns in which the projected vertices (1, n, 2) lie."""
@@ -77,7 +79,7 @@ def _nearest(
         place: pixel coordinates (n, 2) of the vertices.
         inverse_z: their 1/z (n,), NaN where the camera cannot see them; linear in the image (exactly for a pinhole).
         faces: vertex indices (m, 3).
-        nearness: result, zeros at the start.
+        nearness: result, at the start zeros where the mesh may be; pixels that are infinite are passed over.
     """
     height, width = nearness.shape
     for f in range(faces.shape[0]):
@@ -95,53 +97,11 @@ def _nearest(
         last_column = min(int(np.floor(max(ax, bx, cx))), width - 1)
         for row in range(first_row, last_row + 1):
             for column in range(first_column, last_column + 1):
-                at_b = ((column - ax) * (cy - ay) - (row - ay) * (cx - ax)) / area
-                at_c = ((bx - ax) * (row - ay) - (by - ay) * (column - ax)) / area
-                at_a = 1 - at_b - at_c
-                if at_a >= 0 and at_b >= 0 and at_c >= 0:
-                    near = at_a * inverse_z[a] + at_b * inverse_z[b] + at_c * inverse_z[c]
-                    nearness[row, column] = max(nearness[row, column], near)
-
-
-@kernel
-def _nearest_at(
-    place: NDArray[np.float32],
-    inverse_z: NDArray[np.float32],
-    faces: NDArray[np.int32],
-    start: NDArray[np.int64],
-    order: NDArray[np.int64],
-    columns: NDArray[np.intp],
-    nearness: NDArray[np.float32],
-) -> None:
-    """Largest 1/z of all faces at some pixel centres (k,).
-
-    Args:
-        place, inverse_z, faces: as in `_nearest`.
-        start: first of the pixels of every row, and their number (height + 1,).
-        order: the pixels (k,) sorted by row.
-        columns: of the pixels (k,).
-        nearness: result (k,), zeros at the start.
-    """
-    for f in range(faces.shape[0]):
-        a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
-        if np.isnan(inverse_z[a] + inverse_z[b] + inverse_z[c]):
-            continue
-        ax, ay, bx, by = place[a, 0], place[a, 1], place[b, 0], place[b, 1]
-        cx, cy = place[c, 0], place[c, 1]
-        area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
-        if area == 0:
-            continue
-        first_column, last_column = np.ceil(min(ax, bx, cx)), np.floor(max(ax, bx, cx))
-        first_row = max(int(np.ceil(min(ay, by, cy))), 0)
-        last_row = min(int(np.floor(max(ay, by, cy))), start.size - 2)
-        for row in range(first_row, last_row + 1):
-            for at in range(start[row], start[row + 1]):
-                column = columns[order[at]]
-                if column < first_column or column > last_column:
+                if nearness[row, column] == np.inf:
                     continue
                 at_b = ((column - ax) * (cy - ay) - (row - ay) * (cx - ax)) / area
                 at_c = ((bx - ax) * (row - ay) - (by - ay) * (column - ax)) / area
                 at_a = 1 - at_b - at_c
                 if at_a >= 0 and at_b >= 0 and at_c >= 0:
                     near = at_a * inverse_z[a] + at_b * inverse_z[b] + at_c * inverse_z[c]
-                    nearness[order[at]] = max(nearness[order[at]], near)
+                    nearness[row, column] = max(nearness[row, column], near)

@@ -183,22 +183,3 @@ def _cost_of(
             part += bounded if pixel[v] >= 0 else none
         total += part
     return float(total)
-
-
-def every(step: int, mask: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Places of the first, and then of every `step`-th pixel of a mask (height, width), in the flattened image."""
-    places = np.empty(-(-int(np.count_nonzero(mask)) // step), np.int64)
-    _count_off(step, mask.ravel(), places)
-    return places
-
-
-@kernel
-def _count_off(step: int, mask: NDArray[np.bool_], places: NDArray[np.int64]) -> None:
-    """Writes what `every` returns."""
-    count, left = 0, 1
-    for k in range(mask.size):
-        if mask[k]:
-            left -= 1
-            if left == 0:
-                places[count] = k
-                count, left = count + 1, step

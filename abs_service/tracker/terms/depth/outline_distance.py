@@ -29,7 +29,8 @@ def inwards(distance: NDArray[np.float32], seen: Visibility, reach: int) -> tupl
         The part of the image that is not farther outside, and the distances there (rows, columns).
     """
     beside = (seen.free_m > 0) | (np.isnan(distance) & ~(seen.hole | seen.dropout))
-    beside |= outvoted(seen.dropout, beside)
+    if seen.dropout.any():
+        beside |= outvoted(seen.dropout, beside)
     if not (beside.any() and seen.object.any()):
         return WHOLE, np.full(distance.shape, np.nan, np.float32)
     part = _around(~beside, reach)

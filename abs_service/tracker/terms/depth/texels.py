@@ -13,7 +13,7 @@ from abs_service.pairing.images import DepthImage
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.synthesis.window import Bordered, Window, corner, within
 from abs_service.tracker.terms.base import Bounds
-from abs_service.tracker.terms.depth.depth_cost import distances, every, median_inlier_cost, settle, write_constants
+from abs_service.tracker.terms.depth.depth_cost import distances, median_inlier_cost, settle, write_constants
 from calib.jit import kernel
 from calib.noise.base import DepthNoise
 from calib.noise.texture import corrected_distances, write_pixels, write_texture
@@ -145,8 +145,8 @@ class TexelsOnDemand:
 
     def explain(self, unusable: Unusable) -> float:
         """Remembers what is unusable, and renders some pixels on the object."""
-        step = max(int(np.count_nonzero(unusable.shown)) // SAMPLED, 1)
-        rows, columns = np.divmod(every(step, unusable.shown), unusable.shown.shape[1])
+        shown = np.flatnonzero(unusable.shown)
+        rows, columns = np.divmod(shown[:: max(len(shown) // SAMPLED, 1)], unusable.shown.shape[1])
         top, left = corner(self._window)
         some = ((rows + top + 1) * self._texture.shape[1] + columns + left + 1).astype(np.int32)
         texture = self.at(some[None])

@@ -6,7 +6,6 @@ from hypothesis import strategies as st
 
 from abs_service.pairing.images import DepthImage
 from abs_service.tracker.synthesis.window import Bordered
-from abs_service.tracker.terms.depth.depth_cost import every
 from abs_service.tracker.terms.depth.texels import TexelsOnDemand, Unusable, WholeTexels
 from calib.noise.tof_amplitude import TofAmplitude
 from tests.abs_service.tracker.scenes import CAMERA, sparse
@@ -47,10 +46,3 @@ def test_single_candidates_and_populations_read_what_the_whole_texture_holds(see
         for pixel in (np.append(some, [-1, 0]).astype(np.int32)[None], np.tile(some, (2, 1))):
             np.testing.assert_array_equal(on_demand.at(pixel)[some], expected[some])
         np.testing.assert_array_equal(on_demand.at(np.zeros((2, 1), np.int32)), expected)
-
-
-@given(st.integers(0, 2**32 - 1), st.integers(1, 9))
-def test_every_so_many_pixels_are_those_that_numpy_finds(seed, step):
-    generator = np.random.default_rng(seed)
-    mask = generator.random((5, 6)) < generator.random()
-    np.testing.assert_array_equal(every(step, mask), np.flatnonzero(mask)[::step])

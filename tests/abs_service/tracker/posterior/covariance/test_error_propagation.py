@@ -5,13 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from abs_service.tracker.posterior.covariance.error_propagation import (
-    LASTING,
-    ErrorPropagation,
-    FrameErrors,
-    Motion,
-    product,
-)
+from abs_service.tracker.posterior.covariance.error_propagation import LASTING, ErrorPropagation, FrameErrors, Motion
 
 DIM, FRAMES = 3, 40
 NONE = np.zeros((DIM, DIM))
@@ -90,14 +84,6 @@ def test_after_a_relocation_it_begins_with_what_that_leaves_open():
     propagation.restart(25 * np.eye(DIM))
     found = propagation.update(STILL, errors_of(inverse, PRECISION))
     assert found[2, 2] == pytest.approx(25)
-
-
-@given(st.integers(0, 2**32 - 1), st.integers(1, 9), st.integers(1, 9))
-def test_the_product_that_passes_over_zeros_is_that_of_numpy(seed, dim, columns):
-    generator = np.random.default_rng(seed)
-    sparse = generator.normal(size=(dim, dim)) * (generator.random((dim, dim)) < 0.3)
-    right = generator.normal(size=(columns, dim)).T  # in the other order of memory
-    np.testing.assert_allclose(product(sparse, right), sparse @ right, rtol=1e-12, atol=1e-12)
 
 
 @given(st.integers(0, 2**32 - 1))
