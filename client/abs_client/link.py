@@ -145,6 +145,11 @@ class Link:
         answers = self._session.liveliness().get(self.key(topic), timeout=QUERY_S)
         return [str(answer.ok.key_expr) for answer in answers if answer.ok is not None]
 
+    def trackers(self) -> set[str]:
+        """Names of the trackers that live."""
+        prefix = self.key("live/track/")
+        return {key.removeprefix(prefix) for key in self.tokens("live/track/*")}
+
     def key(self, topic: str) -> str:
         """The zenoh key of a topic of the rig."""
         return f"abs/{self.rig}/{topic}"

@@ -10,6 +10,7 @@ Seeds: the context's, of noise and dropouts.
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -76,7 +77,7 @@ class Change:
     def images(self, folder: Path, cell: Cell, last: int, seed: int) -> Iterator[Frame]:
         """Every image that is kept, changed."""
         generator = np.random.default_rng(seed)
-        for number, depth_m, image in list(kinect_paper.images(folder, cell, last))[:: self.every]:
+        for number, depth_m, image in islice(kinect_paper.images(folder, cell, last), 0, None, self.every):
             kept = np.s_[:: self.stride, self.left :: self.stride]
             colors = None if image is None else self.color(image, number / last)[kept]
             yield number, self.depth(depth_m, generator)[kept], colors

@@ -1,7 +1,7 @@
 """Cameras are read from calibrations of any format."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -62,6 +62,24 @@ def size(given: str | None) -> tuple[int, int] | None:
     if match is None:
         raise CamerasError(f"--size {given}: must be width and height in pixels, such as 640x480")
     return int(match[1]), int(match[2])
+
+
+def pairs(option: str, given: Sequence[str]) -> dict[str, str]:
+    """Second names by first ones, of an option that may be repeated.
+
+    Args:
+        option: its name and form, such as `--rename OLD=NEW`.
+        given: its values.
+
+    Raises:
+        CamerasError: a value of another form.
+    """
+    name, form = option.split()
+    split = [one.partition("=") for one in given]
+    wrong = [one for one, (first, _, second) in zip(given, split) if not (first and second)]
+    if wrong:
+        raise CamerasError(f"{name} {wrong[0]}: must be {form}")
+    return {first: second for first, _, second in split}
 
 
 def _scaled(one: Camera, unit: float) -> Camera:

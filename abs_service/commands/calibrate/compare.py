@@ -74,7 +74,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _pairs(arguments: argparse.Namespace, one: Mapping[str, Camera], other: Mapping[str, Camera]) -> Mapping[str, str]:
     """Names of the same camera in both."""
-    given = dict(pair.partition("=")[::2] for pair in arguments.pair)
+    given = camera_files.pairs("--pair A=B", arguments.pair)
     for name, its_name in given.items():
         for path, chosen, known in ((arguments.one, name, one), (arguments.other, its_name, other)):
             if chosen not in known:

@@ -80,9 +80,9 @@ def run(arguments: argparse.Namespace) -> int:
     if out.exists():
         raise ConvertError(f"{out}: exists already; choose another name or remove it")
     hints = Hints(size=camera_files.size(arguments.size), lens=arguments.lens or "")
-    options = Options(
-        arguments.source, arguments.target, tuple(arguments.sensor), _names(arguments.rename), arguments.unit, hints
-    )
+    names = camera_files.pairs("--rename OLD=NEW", arguments.rename)
+    sensors = tuple(arguments.sensor)
+    options = Options(arguments.source, arguments.target, sensors, names, arguments.unit, hints)
     read = [camera_files.read(path, options.hints, options.source, options.unit) for path in arguments.inputs]
     content = _chosen(read, options)
     target = options.target or exchange.of_name(out)
@@ -144,11 +144,3 @@ def _command_line(arguments: argparse.Namespace) -> list[str]:
     options += [("--sensor", name) for name in arguments.sensor] + [("--rename", pair) for pair in arguments.rename]
     given = [word for option, value in options if value is not None for word in (option, value)]
     return ["calibrate", "convert", *map(str, arguments.inputs), str(arguments.out), *given]
-
-
-def _names(given: list[str]) -> dict[str, str]:
-    pairs = [one.partition("=") for one in given]
-    wrong = [one for one, (old, _, new) in zip(given, pairs) if not (old and new)]
-    if wrong:
-        raise ConvertError(f"--rename {wrong[0]}: must be OLD=NEW")
-    return {old: new for old, _, new in pairs}

@@ -7,13 +7,13 @@ the small rigid motion of the camera that best makes one calibration of the othe
 
 from dataclasses import dataclass, replace
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from calib import pose
 from calib.camera import Camera
 from calib.solve.validation.projection_uncertainty import MotionCompensation, grid, viewing_directions
+from calib.solve.validation.support import in_hull
 
 #: Distances at which the motion is determined, in parts of the one that is asked for.
 VOLUME = (0.6, 1.0, 1.4)
@@ -66,7 +66,7 @@ def projection_difference(
     one, other = (replace(camera, T_rs=pose.identity()) for camera in (one, other))
     pixels = grid(one)
     flat = pixels.reshape(-1, 2)
-    inside = np.ones(len(flat), np.bool_) if corners is None else _in_hull(corners, flat)
+    inside = np.ones(len(flat), np.bool_) if corners is None else in_hull(corners, flat)
     rays = viewing_directions(one, flat)
     changes, volume, in_volume = _changes(one, other, flat, rays * distance), [], []
     usable = inside & np.isfinite(changes).all(axis=1)
@@ -91,8 +91,3 @@ def _changes(
     with np.errstate(invalid="ignore"):
         found[~(np.linalg.norm(found, axis=1) < max(one.width, one.height) / 2)] = np.nan
     return found
-
-
-def _in_hull(corners: NDArray[np.floating], pixels: NDArray[np.float64]) -> NDArray[np.bool_]:
-    hull = np.asarray(cv2.convexHull(np.asarray(corners, np.float32)), np.float32)
-    return np.array([cv2.pointPolygonTest(hull, (u, v), False) >= 0 for u, v in pixels.tolist()])

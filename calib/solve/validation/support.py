@@ -13,11 +13,12 @@ def supported(solution: Solution, sensor: str, pixels: NDArray[np.float64]) -> N
         camera = solution.cameras[sensor]
         with np.errstate(invalid="ignore"):
             return np.all((pixels >= -0.5) & (pixels <= (camera.width - 0.5, camera.height - 0.5)), axis=1)
-    hull = _hull(solution, sensor)
+    corners = [view.pixels for view in solution.task.corners if view.sensor == sensor]
+    return in_hull(np.concatenate(corners), pixels)
+
+
+def in_hull(corners: NDArray[np.floating], pixels: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Mask (n,) of pixels (n, 2) in the hull of corners (m, 2); NaN is outside."""
+    hull = np.asarray(cv2.convexHull(corners.astype(np.float32)), np.float32)
     sides = [cv2.pointPolygonTest(hull, (u, v), False) for u, v in np.nan_to_num(pixels, nan=-1e9).tolist()]
     return np.array(sides) >= 0
-
-
-def _hull(solution: Solution, sensor: str) -> NDArray[np.float32]:
-    corners = [view.pixels for view in solution.task.corners if view.sensor == sensor]
-    return np.asarray(cv2.convexHull(np.concatenate(corners).astype(np.float32)), np.float32)

@@ -67,11 +67,8 @@ class Republisher:
 
     def run(self, end: threading.Event) -> None:
         """Looks for trackers, and tells its own counters, once a second until `end`; then closes the link."""
-        prefix = self._link.key("live/track/")
         while not end.wait(LOOK_S):
-            for tracker in {key.removeprefix(prefix) for key in self._link.tokens("live/track/*")} - set(
-                self._trackers
-            ):
+            for tracker in self._link.trackers() - self._trackers.keys():
                 stream = states.states(self._link, tracker, self._largest_age_s)
                 self._trackers[tracker] = threading.Thread(target=self._follow, args=(tracker, stream), daemon=True)
                 self._trackers[tracker].start()

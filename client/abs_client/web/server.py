@@ -33,8 +33,7 @@ class EstimateServer(ThreadingHTTPServer):
 
     def trackers(self) -> list[str]:
         """Names of the trackers that live."""
-        prefix = self._link.key("live/track/")
-        return sorted(key.removeprefix(prefix) for key in self._link.tokens("live/track/*"))
+        return sorted(self._link.trackers())
 
     def follow(self, tracker: str, write: Callable[[bytes], object]) -> None:
         """Writes the events of a tracker until the reader is gone or the link is closed.
