@@ -12,8 +12,9 @@ Each stream has its own mapping per epoch, because the clocks of one device's st
 """
 
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,6 +50,24 @@ class Stamp:
     t_host_ns: int
     t_sigma_ns: int
     stepped: bool
+
+
+class Mapped(Protocol):
+    """A mapping to host times that measures itself."""
+
+    @property
+    def gauges(self) -> Mapping[str, float]:
+        """Its measurements, by name."""
+        ...
+
+
+def stream_gauges(clocks: Iterable[tuple[tuple[str, str], Mapped]]) -> dict[str, float]:
+    """Gauges of the clock mappings of streams (sensor, stream), as `clock.<sensor>/<stream>.<name>`."""
+    return {
+        f"clock.{sensor}/{stream}.{name}": value
+        for (sensor, stream), clock in clocks
+        for name, value in clock.gauges.items()
+    }
 
 
 @dataclass(slots=True)

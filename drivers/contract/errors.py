@@ -1,5 +1,8 @@
 """Device errors, classified by whether a retry can help."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 
 class DeviceError(Exception):
     """A device cannot be opened or stopped working; the message names the remedy. A retry may help."""
@@ -40,3 +43,27 @@ class ControlError(FinalError):
     def __init__(self, control: str, given: str, allowed: str) -> None:
         self.control, self.given, self.allowed = control, given, allowed
         super().__init__(f"{control} = {given}: {allowed}" if given else f"{control}: {allowed}")
+
+
+@contextmanager
+def translated_sdk_errors(uri: str, access_remedy: str) -> Iterator[None]:
+    """Translates exceptions of a library into errors that name the device and the remedy.
+
+    Args:
+        uri: of the device.
+        access_remedy: what helps against a missing permission.
+
+    Raises:
+        DeviceError: any exception.
+    """
+    try:
+        yield
+    except DeviceError:
+        raise
+    except Exception as error:
+        message = str(error)
+        if "permission" in message.lower() or "access" in message.lower():
+            message = f"{message}; {access_remedy}"
+        elif "busy" in message.lower():
+            message = f"another program uses it ({message})"
+        raise DeviceError(f"{uri}: {message}") from error

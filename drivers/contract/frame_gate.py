@@ -6,8 +6,10 @@ Every driver has one; it implements the contract's guarantees about counters, st
 import threading
 from collections import Counter
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 
 from drivers.contract.capabilities import StreamInfo
+from drivers.contract.clock import Stamp
 from drivers.contract.device import DeviceError, DeviceState, Sink, Truth
 from drivers.contract.frame import Frame
 
@@ -122,6 +124,14 @@ class FrameGate:
             elif self._sink is not None:
                 self._counters["frames"] += 1
                 self._sink.on_frame(frame)
+
+    def deliver_stamped(self, frames: Iterable[Frame], stamp: Stamp, t_arrival_ns: int) -> None:
+        """Delivers frames of one exposure with its host times; if the device's clock has stepped, in a new epoch."""
+        if stamp.stepped:
+            self.begin_epoch()
+        times = {"t_host_ns": stamp.t_host_ns, "t_sigma_ns": stamp.t_sigma_ns, "t_arrival_ns": t_arrival_ns}
+        for frame in frames:
+            self.deliver(replace(frame, **times, epoch=self.epoch))
 
     def drop(self, cause: str, number: int = 1) -> None:
         """Counts frames that the driver itself dropped."""

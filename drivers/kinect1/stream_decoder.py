@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from calib.camera import Camera
 from drivers.contract.capabilities import ClockInfo, StreamInfo
-from drivers.contract.clock import DeviceClock
+from drivers.contract.clock import DeviceClock, stream_gauges
 from drivers.contract.frame import Frame, Geometry, Kind, Reference
 from drivers.kinect1 import unpacking
 from drivers.kinect1.assembly import LONGEST_GAP, Assembler, RawImage
@@ -79,7 +79,7 @@ class StreamDecoder:
     def gauges(self) -> Mapping[str, float]:
         """Clock mapping, and numbers of lost packets and of images that were delivered without some."""
         return {
-            **{f"clock.{'/'.join(self.info.key)}.{name}": value for name, value in self._clock.gauges.items()},
+            **stream_gauges([(self.info.key, self._clock)]),
             f"{self.info.stream}.missing_packets": float(self._assembler.missing),
             f"{self.info.stream}.incomplete_images": float(self._incomplete),
         }

@@ -5,12 +5,11 @@ ifm3d's frame grabber calls back from a thread of its own, which only puts messa
 
 import threading
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from typing import Any
 
 from calib.camera import Camera
 from drivers.contract.capabilities import Capabilities, StreamInfo
-from drivers.contract.clock import DeviceClock
+from drivers.contract.clock import DeviceClock, stream_gauges
 from drivers.contract.controls import Controls
 from drivers.contract.device import DeviceError, DeviceInfo, DeviceState, Sink
 from drivers.contract.frame import Frame, Kind
@@ -68,7 +67,7 @@ class O3rDevice:
     @property
     def gauges(self) -> Mapping[str, float]:
         """Clock mapping, which all streams share."""
-        return {f"clock.{SENSOR}/depth.{name}": value for name, value in self._mapping.gauges.items()}
+        return stream_gauges([((SENSOR, "depth"), self._mapping)])
 
     def start(self, sink: Sink) -> None:
         """See `drivers.contract.device.Device.start`."""
@@ -132,11 +131,7 @@ class O3rDevice:
             return
         self._gate.drop("missing", max(len(self.capabilities.streams) - len(frames), 0))
         stamp = self._mapping.stamp(exposure.time_ns, t_arrival_ns)
-        if stamp.stepped:
-            self._gate.begin_epoch()
-        times = {"t_host_ns": stamp.t_host_ns, "t_sigma_ns": stamp.t_sigma_ns, "t_arrival_ns": t_arrival_ns}
-        for frame in frames:
-            self._gate.deliver(replace(frame, **times, epoch=self._gate.epoch))
+        self._gate.deliver_stamped(frames, stamp, t_arrival_ns)
 
 
 def _info(frame: Frame, rate_hz: float) -> StreamInfo:

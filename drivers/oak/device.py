@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from calib.camera import Camera
 from drivers.contract.capabilities import Capabilities, StreamInfo
+from drivers.contract.clock import stream_gauges
 from drivers.contract.device import DeviceError, DeviceState, Sink
 from drivers.contract.frame_gate import FrameGate
 from drivers.oak.eeprom import EepromError
@@ -69,11 +70,7 @@ class OakDevice:
     @property
     def gauges(self) -> Mapping[str, float]:
         """Self-measurements of the device, and the clock mapping of each stream."""
-        clocks = {
-            f"clock.{role.sensor}/{role.stream}.{name}": value
-            for role, clock in list(self._clocks.items())
-            for name, value in clock.gauges.items()
-        }
+        clocks = stream_gauges((role.key, clock) for role, clock in list(self._clocks.items()))
         return clocks | dict(self._connection.gauges()) if self._open else clocks
 
     def start(self, sink: Sink) -> None:
@@ -150,14 +147,10 @@ class OakDevice:
         made = frame(picture, role, self.cameras[role.sensor].calib_id, filters)
         came_ns = self._connection.stamp(picture, t_arrival_ns) - picture.half_exposure_ns
         stamp = self._clocks[role].stamp(made.t_device_ticks, came_ns)
-        if stamp.stepped:
-            self._gate.begin_epoch()
-        times = {"t_host_ns": stamp.t_host_ns, "t_sigma_ns": stamp.t_sigma_ns, "t_arrival_ns": t_arrival_ns}
         modulation = self._connection.modulation(role, stamp.t_host_ns)
-        if modulation is None:
-            self._gate.drop("range_changes")
-            return
-        self._gate.deliver(replace(made, **times, epoch=self._gate.epoch, modulation=modulation))
+        known = [] if modulation is None else [replace(made, modulation=modulation)]
+        self._gate.drop("range_changes", 1 - len(known))
+        self._gate.deliver_stamped(known, stamp, t_arrival_ns)
 
 
 def _join(threads: Sequence[threading.Thread]) -> None:

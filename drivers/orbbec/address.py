@@ -4,8 +4,9 @@ import ipaddress
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from urllib.parse import parse_qsl, urlsplit
+from urllib.parse import urlsplit
 
+from drivers.contract.address import query
 from drivers.contract.device import AddressError
 
 _DEFAULTS = {"depth": "1", "ir": "1", "color": "1", "confidence": "0", "recording": ""}
@@ -51,11 +52,7 @@ def parse(uri: str) -> Address:
         AddressError: unknown key or invalid value; names both and the allowed values.
     """
     parts = urlsplit(uri)
-    values = dict(_DEFAULTS)
-    for key, value in parse_qsl(parts.query, keep_blank_values=True):
-        if key not in values:
-            raise AddressError(f"{uri}: unknown key {key!r}; allowed are {', '.join(sorted(values))}")
-        values[key] = value
+    values = query(uri, _DEFAULTS)
     if parts.path.strip("/"):
         raise AddressError(f"{uri}: a serial number or an IP address is all that may stand before the '?'")
     host = parts.netloc if _is_ip(parts.netloc) else ""

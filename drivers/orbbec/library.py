@@ -4,12 +4,13 @@ import ctypes
 import os
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Any
 
-from drivers.contract.device import DeviceError, SdkMissingError
+from drivers.contract.device import SdkMissingError
 from drivers.contract.discovery import UDEV_REMEDY
+from drivers.contract.errors import translated_sdk_errors
 
 #: The wheel's requirements are those of its examples: 2 GB, and an older NumPy than ours.
 _INSTALL = "pip install --no-deps pyorbbecsdk2"
@@ -34,24 +35,13 @@ def context(ob: Any) -> Any:
     return ob.Context(str(Path(__file__).with_name("sdk.xml")))
 
 
-@contextmanager
-def translated_errors(uri: str) -> Iterator[None]:
+def translated_errors(uri: str) -> AbstractContextManager[None]:
     """Translates exceptions into errors that name the device and the remedy; the SDK's own have no common base.
 
     Raises:
         DeviceError: any exception.
     """
-    try:
-        yield
-    except DeviceError:
-        raise
-    except Exception as error:
-        message = str(error)
-        if "permission" in message.lower() or "access" in message.lower():
-            message = f"{message}; {UDEV_REMEDY}"
-        elif "busy" in message.lower():
-            message = f"another program uses it ({message})"
-        raise DeviceError(f"{uri}: {message}") from error
+    return translated_sdk_errors(uri, UDEV_REMEDY)
 
 
 @contextmanager

@@ -3,8 +3,9 @@
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from urllib.parse import parse_qsl, urlsplit
+from urllib.parse import urlsplit
 
+from drivers.contract.address import query
 from drivers.contract.device import AddressError
 
 _DEFAULTS = {"depth": "640x480", "color": "640x480", "fps": "30", "ir": "1", "confidence": "1", "recording": ""}
@@ -43,11 +44,7 @@ def parse(uri: str) -> Address:
         AddressError: unknown key or invalid value; names both and the allowed values.
     """
     parts = urlsplit(uri)
-    values = dict(_DEFAULTS)
-    for key, value in parse_qsl(parts.query, keep_blank_values=True):
-        if key not in values:
-            raise AddressError(f"{uri}: unknown key {key!r}; allowed are {', '.join(sorted(values))}")
-        values[key] = value
+    values = query(uri, _DEFAULTS)
     if parts.path.strip("/"):
         raise AddressError(f"{uri}: a serial number is all that may stand before the '?'")
     if not re.fullmatch(_RATE, values["fps"]):

@@ -8,12 +8,12 @@ import logging
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from calib.camera import Camera
 from drivers.contract.capabilities import Capabilities, StreamInfo, SyncRole
-from drivers.contract.clock import DeviceClock
+from drivers.contract.clock import DeviceClock, stream_gauges
 from drivers.contract.device import DeviceError, DeviceInfo, DeviceState, Sink
 from drivers.contract.frame import Kind
 from drivers.contract.frame_gate import FrameGate
@@ -104,11 +104,7 @@ class RealsenseDevice:
     @property
     def gauges(self) -> Mapping[str, float]:
         """Clock mapping of each stream."""
-        return {
-            f"clock.{role.sensor}/{role.stream}.{name}": value
-            for role, clock in list(self._clocks.items())
-            for name, value in clock.gauges.items()
-        }
+        return stream_gauges(((role.sensor, role.stream), clock) for role, clock in list(self._clocks.items()))
 
     def start(self, sink: Sink) -> None:
         """See `drivers.contract.device.Device.start`."""
@@ -209,10 +205,7 @@ class RealsenseDevice:
             self._warned = True
             self._gate.warn("clock", _NO_METADATA.format(picture.domain))
         stamp = self._clocks[role].stamp(picture.ticks, t_arrival_ns)
-        if stamp.stepped:
-            self._gate.begin_epoch()
-        times = {"t_host_ns": stamp.t_host_ns, "t_sigma_ns": stamp.t_sigma_ns, "t_arrival_ns": t_arrival_ns}
-        self._gate.deliver(replace(made, **times, epoch=self._gate.epoch))
+        self._gate.deliver_stamped([made], stamp, t_arrival_ns)
 
 
 def _info(stream: Stream) -> StreamInfo:

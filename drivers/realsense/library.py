@@ -1,10 +1,10 @@
 """Lazy import of pyrealsense2, and translation of its errors."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from typing import Any
 
-from drivers.contract.device import DeviceError, SdkMissingError
+from drivers.contract.device import SdkMissingError
+from drivers.contract.errors import translated_sdk_errors
 
 
 def load() -> Any:
@@ -20,23 +20,12 @@ def load() -> Any:
     return pyrealsense2
 
 
-@contextmanager
-def translated_errors(uri: str) -> Iterator[None]:
+def translated_errors(uri: str) -> AbstractContextManager[None]:
     """Translates exceptions of librealsense, plain `RuntimeError`s, into errors that name the device and the remedy.
 
     Raises:
         DeviceError: any exception of librealsense.
     """
-    try:
-        yield
-    except DeviceError:
-        raise
-    except Exception as error:
-        message = str(error)
-        if "permission" in message.lower() or "access" in message.lower():
-            message = (
-                f"{message}; librealsense's udev rules give access: config/99-realsense-libusb.rules of its sources"
-            )
-        elif "busy" in message.lower():
-            message = f"another program uses it ({message})"
-        raise DeviceError(f"{uri}: {message}") from error
+    return translated_sdk_errors(
+        uri, "librealsense's udev rules give access: config/99-realsense-libusb.rules of its sources"
+    )

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 from calib.camera import Camera
 from drivers.contract.capabilities import Capabilities, ClockInfo
-from drivers.contract.clock import DeviceClock
+from drivers.contract.clock import DeviceClock, stream_gauges
 from drivers.contract.controls import Controls
 from drivers.contract.device import DeviceInfo, DeviceState, Sink
 from drivers.contract.frame import Frame
@@ -73,11 +73,7 @@ class RemoteDevice:
     def gauges(self) -> Mapping[str, float]:
         """Clock mapping of each stream, see `drivers.contract.clock.DeviceClock.gauges`."""
         streams = {} if self._same_clock else dict(self._streams)
-        return {
-            f"clock.{sensor}/{stream}.{name}": value
-            for (sensor, stream), one in streams.items()
-            for name, value in one.clock.gauges.items()
-        }
+        return stream_gauges((key, one.clock) for key, one in streams.items())
 
     def start(self, sink: Sink) -> None:
         """Subscribes.
