@@ -78,6 +78,11 @@ def _says(page, text):
     page.get_by_text(text).first.wait_for()
 
 
+def _box(element) -> dict[str, float]:
+    """Where an element stands; an element that the page is just drawing anew has no place until it is drawn."""
+    return wait_until(element.bounding_box, PATIENCE_S, "a place of the element")
+
+
 def _picture(page) -> bytes:
     return page.locator("canvas").first.screenshot()
 
@@ -100,7 +105,7 @@ def _chosen(page, listener, button, hint, gesture) -> int:
 
 def _at(page, right, down):
     """A place in the scene, from its middle, in widths of the scene; a warning of the browser's covers the top."""
-    box = page.locator("canvas").first.bounding_box()
+    box = _box(page.locator("canvas").first)
     return box["x"] + (0.5 + right) * box["width"], box["y"] + box["height"] / 2 + down * box["width"]
 
 
@@ -221,9 +226,8 @@ def test_on_a_phone_the_panel_leaves_half_of_the_scene_and_its_controls_are_in_r
     _says(page, "Tracking")
     play = page.get_by_role("button", name="Play", exact=True)
     play.wait_for()
-    status, canvas = page.locator(".abs-status").first.bounding_box(), page.locator("canvas").first.bounding_box()
-    assert canvas["width"] == 390
-    for box in (status, play.bounding_box()):
+    assert _box(page.locator("canvas").first)["width"] == 390
+    for box in (_box(page.locator(".abs-status").first), _box(play)):
         assert 0 <= box["x"] <= 390 - box["width"]
         assert 844 / 3 <= box["y"] <= 844 - box["height"]
     page.get_by_role("button", name="Back").tap(force=True)
