@@ -18,8 +18,8 @@ from drivers.contract.frame import Frame, FrameSet, Geometry, Kind
 
 #: Placeholder camera: kernels accept images of any size, and in a small one there is little to compute.
 _CAMERA = Camera(160, 120, 200.0, 200.0, 79.5, 59.5)
-#: Placeholder for every depth noise: kernels use its texture only, and a per-pixel map would not fit the camera.
-_NOISE = GaussianPolynomial(((0.01,),))
+#: Placeholder for every depth noise, of which a per-pixel map would not fit the camera; a polynomial that is evaluated.
+_NOISE = GaussianPolynomial(((0.01,), (1e-4,)))
 
 
 def warm_up(rig: Rig, plan: Plan, report: Callable[[Progress], None] = ignore) -> None:
@@ -42,7 +42,7 @@ def warm_up(rig: Rig, plan: Plan, report: Callable[[Progress], None] = ignore) -
 def _track_board(rig: Rig, plan: Plan) -> None:
     frames = [_board(head, Kind(stream), plan.model.board) for head, stream in streams(rig.sensors.values())]
     tracking = TrackingSession(rig, replace(plan, region=nearest.Settings(), template=first_image.Settings()))
-    changed = [[change(frame) for frame in frames] for change in (_with_dropout, _without_object)]
+    changed = [[change(frame) for frame in frames] for change in (_with_dropout, _moved, _without_object)]
     for seq, seen in enumerate((frames, *changed)):
         tracking.track(FrameSet(seq, round(seq * 33e6), {frame.key: frame for frame in seen}), lambda: False)
 
@@ -50,6 +50,14 @@ def _track_board(rig: Rig, plan: Plan) -> None:
 def _sensor(sensor: Sensor) -> Sensor:
     noise = _NOISE if isinstance(sensor.noise, DepthNoise) else sensor.noise
     return Sensor(sensor.name, replace(_CAMERA, lens=sensor.camera.lens), noise)
+
+
+def _moved(frame: Frame) -> Frame:
+    """The object has left a part of its place, before a background; in integers, as most devices deliver distances."""
+    if frame.kind != Kind.DEPTH:
+        return frame
+    z = np.roll(np.nan_to_num(frame.data, nan=2 * np.nanmax(frame.data)), _CAMERA.width // 20, axis=1)
+    return replace(frame, data=np.round(z / 1e-3).astype("<u2"), encoding="16UC1", scale=1e-3)
 
 
 def _with_dropout(frame: Frame) -> Frame:

@@ -37,11 +37,11 @@ simulation = address.parse(table.get("uri", settings.devices["sim"].uri) + table
 rig = wiring.rig(settings, "sheet", {name: head.camera for name, head in simulation.heads.items()})
 warm_up(rig, plan)
 
-exposures = [simulation.expose(k)[0] for k in range(3)]
+exposures = [simulation.expose(k)[0] for k in range(8)]
 
 def forms():
     return {f.py_func.__module__ + "." + f.py_func.__qualname__: len(f.signatures) for f in gc.get_objects()
-             if isinstance(f, Dispatcher) and f.py_func.__module__.startswith("abs_service")}
+             if isinstance(f, Dispatcher) and f.py_func.__module__.partition(".")[0] in ("abs_service", "drivers", "calib")}
 
 before = forms()
 tracking = TrackingSession(rig, plan)
