@@ -1,8 +1,8 @@
 """Plane of a target as q · X = 1 in the sensor's frame: along a unit ray, 1 / r = ray · q."""
 
 import numpy as np
+import scipy  # its parts are imported when they are first used
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from calib.noise.base import NoiseError
 
@@ -55,7 +55,7 @@ def find(
     q = _least_squares(q, r, along, t)
     pixels = where & (np.abs(distance - radial(q, rays)) < tolerance)
     labels = np.zeros(where.shape, np.int32)
-    ndimage.label(ndimage.binary_dilation(pixels, iterations=2), output=labels)
+    scipy.ndimage.label(scipy.ndimage.binary_dilation(pixels, iterations=2), output=labels)
     pixels &= labels == np.argmax(np.bincount(labels[pixels], minlength=1))
     if pixels.sum() < _FEWEST:
         raise NoiseError("there is no plane in what is static")

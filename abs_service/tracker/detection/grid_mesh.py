@@ -90,27 +90,34 @@ def _local_planes(
     Both are NaN off the object. The deviation of a single pixel is estimated from the residuals of all planes together,
     because a single plane may have no more pixels than coefficients.
     """
-    height, width = distance.shape
     reach = int(np.ceil(radius))
     steps = np.stack(np.meshgrid(np.arange(-reach, reach + 1), np.arange(-reach, reach + 1)), axis=-1).reshape(-1, 2)
+    around = np.floor(pixels[:, None] + 0.5).astype(int) + steps
+    offset = around - pixels[:, None]
+    within = np.linalg.norm(offset, axis=2) <= radius
+    inside = np.all((around >= 0) & (around < distance.shape[::-1]), axis=2)
+    column, row = np.moveaxis(np.where(inside[..., None], around, 0), -1, 0)
+    values = np.where(within & inside, distance[row, column], np.nan).astype(np.float64)
+    near = np.abs(values - _row_medians(values)) < LARGEST_RELIEF_M
+    count = np.count_nonzero(near, axis=1)
+    usable = np.flatnonzero(count >= np.maximum(MIN_COVER * np.count_nonzero(within, axis=1), 3))
+    near, values = near[usable], np.where(near[usable], values[usable], 0.0)
+    planes = np.concatenate([near[..., None], offset[usable] * near[..., None]], axis=2)
+    transposed = planes.transpose(0, 2, 1)
+    inverse = np.linalg.pinv(transposed @ planes, rcond=1e-10, hermitian=True) @ transposed  # pixels may lie in a line
+    fitted = (inverse @ values[..., None])[..., 0]
     result, share = np.full((2, len(pixels)), np.nan)
-    squares, freedom = 0.0, 0
-    for g, pixel in enumerate(pixels):
-        around = np.floor(pixel + 0.5).astype(int) + steps
-        around = around[np.linalg.norm(around - pixel, axis=1) <= radius]
-        inside = np.all((around >= 0) & (around < (width, height)), axis=1)
-        values = np.full(len(around), np.nan)
-        values[inside] = distance[around[inside, 1], around[inside, 0]]
-        near = np.abs(values - np.nanmedian(values)) < LARGEST_RELIEF_M if np.isfinite(values).any() else inside & False
-        if np.count_nonzero(near) < max(MIN_COVER * len(around), 3):
-            continue
-        plane = np.column_stack([np.ones(np.count_nonzero(near)), around[near] - pixel])
-        inverse = np.linalg.pinv(plane)
-        fitted = inverse @ values[near]
-        result[g], share[g] = fitted[0], np.linalg.norm(inverse[0])
-        squares += float(np.sum((values[near] - plane @ fitted) ** 2))
-        freedom += len(plane) - 3
-    return result, share * np.sqrt(squares / max(freedom, 1))
+    result[usable], share[usable] = fitted[:, 0], np.linalg.norm(inverse[:, 0], axis=1)
+    squares = float(np.sum((values - (planes @ fitted[..., None])[..., 0]) ** 2))
+    return result, share * np.sqrt(squares / max(int(np.sum(count[usable] - 3)), 1))
+
+
+def _row_medians(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Medians (g, 1) of the finite values in each row (g, s); NaN for a row without any."""
+    medians = np.full((len(values), 1), np.nan)
+    some = np.isfinite(values).any(axis=1)
+    medians[some, 0] = np.nanmedian(values[some], axis=1)
+    return medians
 
 
 def triangles(place: NDArray[np.int64]) -> NDArray[np.int64]:
