@@ -37,6 +37,7 @@ COMMANDS = {
     "capture": "only the devices: publish their images",
     "track": "only one tracker: subscribe to images, publish the deformation",
     "reinitialize": "make a running tracker detect its object again",
+    "reload": "make a running rig read its file again; what is not concerned goes on",
     "trigger": "make a running recorder record, with the seconds before, or wait again",
     "keys": "make the certificates with which hosts and applications prove who they are",
     "completion": "print a script that completes commands and options in bash, zsh or fish",
@@ -47,7 +48,7 @@ COMMANDS = {
 MODULES = {
     "import": "images.import_images",
     "new": "new.new",
-    **{name: f"running.{name}" for name in ("reinitialize", "status", "trigger", "view")},
+    **{name: f"running.{name}" for name in ("reinitialize", "reload", "status", "trigger", "view")},
     **{name: f"processes.{name}" for name in ("capture", "record", "track")},
     **{name: f"recordings.{name}" for name in ("export", "info", "recover", "replay", "stiffness")},
 }

@@ -8,12 +8,14 @@ SCHEMA = "schema"
 TRANSFORMS = "tf"
 #: Topic of commands to the recorder: queries with an absmsg.v1.Record.
 RECORD = "record"
+#: Topic of commands to read the rig file again: queries with an absmsg.v1.Reload.
+RELOAD = "reload"
 
 #: Coordinate frame that all poses and vertices refer to.
 RIG_FRAME = "rig"
 
 #: First parts of topics, not allowed as names of sensors, devices and trackers.
-RESERVED = frozenset({CONFIG, SCHEMA, TRANSFORMS, "clock", "health", "live", RECORD})
+RESERVED = frozenset({CONFIG, SCHEMA, TRANSFORMS, "clock", "health", "live", RECORD, RELOAD})
 
 
 class KeyNameError(ValueError):

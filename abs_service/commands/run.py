@@ -27,6 +27,7 @@ from abs_service.bus import keys
 from abs_service.bus.session import Role
 from abs_service.bus.stamps import WallClock
 from abs_service.commands.parts import logs, rig_process
+from abs_service.commands.parts.rig_in_memory import in_memory
 from abs_service.commands.running import view
 from abs_service.display.terminal import journal
 from abs_service.display.terminal.journal import JournalDisplay
@@ -40,6 +41,7 @@ from abs_service.supervision.rig_view import Display
 from abs_service.supervision.run_session import RunSession
 from abs_service.supervision.standby import Standby
 from abs_service.supervision.supervisor import Child, Limits, Supervisor
+from abs_service.wire.commands import RefusedError
 
 #: Receives the lines of a child's output, with its name.
 PassOn = Callable[[str, str], None]
@@ -74,17 +76,18 @@ def run(arguments: argparse.Namespace) -> int:
     stop = rig_process.stop_on_signals()
     with (
         rig_process.open_bus_at(rig.bus.endpoint, Role.ROUTER, rig, arguments) as bus,
-        file(rig) as path,
+        in_memory(rig) as file,
         make_display(as_json=arguments.json) as display,
         _logging_to(display, logs.on_stderr(arguments)) if not arguments.log_file else nullcontext(),
         closing(starting(display, arguments)) as starts,
         metrics.served(rig.run.metrics_port) as measure,
     ):
-        supervisor = Supervisor(children(rig, path, page), starts, time.monotonic_ns, limits(rig))
+        supervisor = Supervisor(children(rig, file.path, page), starts, time.monotonic_ns, limits(rig))
         about = (rig.name, rig.bus.endpoint, rig.record.directory)
         notifier = systemd.notifier(os.environ)
         watchers = (notifier.update, measure)
         session = RunSession(bus, *about, rig.trackers, supervisor, display, WallClock(), watchers)
+        session.answer_reloads(lambda: file.exchange(partial(read_again, arguments), supervisor.children))
         try:
             session.run_until(lambda: stop.is_set() or session.elapsed_s >= arguments.duration)
         finally:
@@ -95,7 +98,7 @@ def run(arguments: argparse.Namespace) -> int:
     if refused is not None:
         # The child has read a temporary file of ours.
         reason = log_lines.final_error(refused.reason)
-        raise ChildError(reason.replace(str(path), str(arguments.config or "demo.toml")))
+        raise ChildError(reason.replace(str(file.path), str(arguments.config or "demo.toml")))
     return supervisor.exit_code() or recording_code(supervisor.children.values())
 
 
@@ -120,6 +123,26 @@ def effective(rig: config.ServiceConfig, arguments: argparse.Namespace) -> confi
         "record": rig.record.model_copy(update=record),
     }
     return rig.model_copy(update=changes)
+
+
+def read_again(arguments: argparse.Namespace) -> config.ServiceConfig:
+    """The configuration that the rig file has now, checked, and overridden by the command line.
+
+    Raises:
+        RefusedError: no file was given.
+        ConfigError: it cannot be used.
+        CheckError: something that it names does not exist or cannot be made.
+        FolderError: its folder of recordings cannot be used.
+    """
+    from abs_service.commands import check  # noqa: PLC0415 - needs all parts of trackers, which this process has not
+
+    if not arguments.config:
+        raise RefusedError("it is the demo rig, which no file describes")
+    rig = effective(rig_process.load_config(arguments), arguments)
+    check.describe(rig, str(arguments.config))
+    if rig.record.enabled:
+        folder.check(rig.record.directory)
+    return rig
 
 
 def page_options(arguments: argparse.Namespace) -> list[str] | None:
@@ -151,15 +174,6 @@ def children(rig: config.ServiceConfig, path: Path, page: Sequence[str] | None =
     recorder = [Child("record", ("record", str(path)), 2)] if rig.record.enabled else []
     pages = [] if page is None else [Child("view", ("view", str(path), *page), 0)]
     return [Child("capture", ("capture", str(path)), 0), *trackers, *recorder, *pages]
-
-
-@contextmanager
-def file(rig: config.ServiceConfig) -> Iterator[Path]:
-    """A configuration as a file in memory, of which nothing is left when this process ends, however it ends."""
-    with open(os.memfd_create(rig.name), "w", encoding="utf-8") as stream:
-        stream.write(config.to_toml(rig))
-        stream.flush()
-        yield Path(f"/proc/{os.getpid()}/fd/{stream.fileno()}")
 
 
 def limits(rig: config.ServiceConfig) -> Limits:

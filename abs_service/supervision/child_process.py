@@ -52,6 +52,10 @@ class Process(Protocol):
         """Kills its process group; no effect if it has ended."""
         ...
 
+    def wake(self) -> None:
+        """Writes it a line, see `parent_watchdog`; no effect if it has ended."""
+        ...
+
     def output_tail(self) -> str:
         """Last lines of its output."""
         ...
@@ -74,6 +78,9 @@ class _NoProcess:
         """Does nothing."""
 
     def kill(self) -> None:
+        """Does nothing."""
+
+    def wake(self) -> None:
         """Does nothing."""
 
     def output_tail(self) -> str:
@@ -154,7 +161,7 @@ class ChildProcess:
                 self._process.wait(1.0)
 
     def wake(self) -> None:
-        """Wakes a process that waits, see `parent_watchdog.wait_until_needed`; no effect if it has ended."""
+        """See `Process`."""
         with contextlib.suppress(BrokenPipeError, ValueError):  # which is closed after its end
             print(file=self._process.stdin, flush=True)
 
@@ -168,6 +175,17 @@ class ChildProcess:
             for line in output:
                 self._lines.append(line.rstrip("\n"))
                 on_line(component, line.rstrip("\n"))
+
+
+def longest_wait_ns(before: Mapping[int, ThreadTimes], now: Mapping[int, ThreadTimes], elapsed_ns: int) -> int:
+    """Longest time that a thread has waited for a processor within the elapsed time [ns]."""
+    waits_ns = [0]
+    for thread, times in now.items():
+        earlier = before.get(thread, ThreadTimes())
+        # The kernel counts a wait when it is over; a thread that would run now has waited since it ran last.
+        waited_ns = elapsed_ns if times.runnable else times.waited_ns - earlier.waited_ns
+        waits_ns.append(min(waited_ns, elapsed_ns - (times.ran_ns - earlier.ran_ns)))
+    return max(waits_ns)
 
 
 def _thread_times(task: Path) -> ThreadTimes:

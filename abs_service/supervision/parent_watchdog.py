@@ -1,8 +1,8 @@
 """Ends a child process when its supervisor has died, so that no orphans remain.
 
 The supervisor holds the writing end of the child's standard input. When the supervisor dies, even by `kill -9`, the
-kernel closes that end and the child reads the end of the file. All that is ever written there is one line, which wakes
-a child that was started before it is needed (`standby`).
+kernel closes that end and the child reads the end of the file. What is written there are lines, which wake a child that
+was started before it is needed (`standby`), or tell one that works that its configuration has changed.
 """
 
 import os
@@ -51,6 +51,14 @@ def wait_until_needed() -> None:
     """Returns when the supervisor needs this process: at once, unless it was started as one that waits."""
     if os.environ.pop(STANDBY, ""):
         _needed.wait()
+        _needed.clear()
+
+
+def was_woken() -> bool:
+    """True if the supervisor has written a line since the last call, because the configuration has changed."""
+    woken = _needed.is_set()
+    _needed.clear()
+    return woken
 
 
 def _watch(descriptor: int, grace_s: float) -> None:

@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
+from queue import SimpleQueue
 
 from abs_service.bus import keys
 from abs_service.bus.contract import Sample
@@ -15,6 +16,7 @@ from abs_service.supervision import rig_state
 from abs_service.supervision.rig_view import Display, RigView
 from abs_service.supervision.supervisor import Child, State, Supervisor
 from abs_service.tracking.monitors.silence_monitor import SilenceMonitor
+from abs_service.wire import commands
 from abs_service.wire.checked_bus import CheckedBus
 
 #: Messages per topic that may wait to be shown.
@@ -61,8 +63,9 @@ class RunSession:
         self._bus, self._rig, self._endpoint, self._directory = bus, rig, endpoint, directory
         # Before the first estimate, the tracker itself says why there is none.
         trackers = tuple(trackers)
-        monitor = partial(SilenceMonitor, clock.monotonic, math.inf)
-        self._silence_monitors = {keys.state(name): monitor() for name in trackers}
+        self._monitor = partial(SilenceMonitor, clock.monotonic, math.inf)
+        self._silence_monitors = {keys.state(name): self._monitor() for name in trackers}
+        self._renewals: SimpleQueue[tuple[Path, Sequence[str]]] = SimpleQueue()
         self._supervisor = supervisor
         self._display = display
         self._clock = clock
@@ -80,9 +83,25 @@ class RunSession:
         """Time since the start [s]."""
         return (self._clock.monotonic() - self._begin_ns) * 1e-9
 
+    def answer_reloads(self, read: Callable[[], tuple[Path, Sequence[str]]]) -> None:
+        """Answers requests to read the rig file again.
+
+        Args:
+            read: reads it, and returns the folder of the recordings and the processes that have to start again; raises
+                RefusedError. Called from a thread of the transport.
+        """
+
+        def act() -> Sequence[str]:
+            self._renewals.put(renewal := read())
+            return renewal[1]
+
+        commands.answer_reload(self._bus, self._headers, self._health, act)
+
     def run_until(self, stop_requested: Callable[[], bool]) -> None:
         """Runs until `stop_requested` returns True or the supervisor has an exit code."""
         while not stop_requested() and self._supervisor.exit_code() is None:
+            while not self._renewals.empty():
+                self._renew(*self._renewals.get())
             self._supervisor.poll()
             self._report()
             self._report_silence()
@@ -127,6 +146,17 @@ class RunSession:
         self._display.update(view)
         for watch in self._watchers:
             watch(view)
+
+    def _renew(self, directory: Path, components: Sequence[str]) -> None:
+        """Starts some processes again with another configuration; the others go on, capture with what it publishes."""
+        self._directory = directory
+        if components and "capture" not in components:
+            self._supervisor.children["capture"].process.wake()
+        for component in components:
+            self._supervisor.renew(component)
+            topic = keys.state(component.removeprefix("track/"))
+            if topic in self._silence_monitors:
+                self._silence_monitors[topic] = self._monitor()
 
     def _request_missing_topologies(self) -> None:
         """Queries topologies that the network dropped: each is sent once, and errors cannot be computed without."""

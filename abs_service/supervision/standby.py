@@ -2,20 +2,11 @@
 
 import threading
 from collections.abc import Callable, Sequence
-from typing import Protocol
 
 from abs_service.supervision.child_process import Process, Spawn
 
 #: Time from the start of a process to that of the one that waits: loading it would slow the start of all [s].
 DELAY_S = 5.0
-
-
-class WaitingProcess(Process, Protocol):
-    """A process that is loaded and does nothing until it is woken."""
-
-    def wake(self) -> None:
-        """Lets it begin its work."""
-        ...
 
 
 class Standby:
@@ -24,7 +15,7 @@ class Standby:
     Args:
         component: its name.
         spawn: starts a process of any component.
-        prepare: starts a process that waits.
+        prepare: starts a process that is loaded, and waits until it is woken.
         delay_s: time from the start of a process to that of the one that waits [s].
     """
 
@@ -32,12 +23,12 @@ class Standby:
         self,
         component: str,
         spawn: Spawn,
-        prepare: Callable[[str, Sequence[str]], WaitingProcess],
+        prepare: Callable[[str, Sequence[str]], Process],
         delay_s: float = DELAY_S,
     ) -> None:
         self._component, self._spawn, self._prepare, self._delay_s = component, spawn, prepare, delay_s
         self._lock = threading.Lock()
-        self._waiting: list[WaitingProcess] = []  # one at most
+        self._waiting: list[Process] = []  # one at most
         self._timer = threading.Timer(0.0, str)
 
     def __call__(self, component: str, arguments: Sequence[str]) -> Process:

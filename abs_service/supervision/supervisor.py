@@ -10,14 +10,14 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 from abs_service.supervision import log_lines
-from abs_service.supervision.child_process import NO_PROCESS, Process, Spawn, ThreadTimes
+from abs_service.supervision.child_process import NO_PROCESS, Process, Spawn, ThreadTimes, longest_wait_ns
 from abs_service.supervision.exit_codes import Exit
 
 _log = logging.getLogger(__name__)
 
 #: Backoff before a restart: doubles with each end of a process soon after its start, up to the longest.
 FIRST_BACKOFF_NS, LONGEST_BACKOFF_NS = 200_000_000, 3_000_000_000
-#: A process that has run for longer than this had worked: the next backoff is the first one again [ns].
+#: After a run that was longer than this the next backoff is the first one again [ns].
 WORKED_NS = 10_000_000_000
 #: A longer time between two calls of `poll` was a stop of this process, without messages of the children [ns].
 PAUSE_NS = 1_000_000_000
@@ -48,6 +48,7 @@ class State(StrEnum):
     RUNNING = "running"
     BACKOFF = "backoff"  # not started yet, or ended; starts when its backoff is over
     STALLED = "stalled"  # sent no health in time and was killed; will be restarted
+    RENEWED = "renewed"  # was told to end, and starts again as soon as it has
     FINISHED = "finished"  # ended in order by itself
     FAILED = "failed"  # given up
     STOPPED = "stopped"
@@ -111,7 +112,9 @@ class Supervisor:
         for child in self.children.values():
             if child.state is State.RUNNING:
                 self._check(child, now_ns)
-            if child.state in (State.BACKOFF, State.STALLED) and now_ns >= child.start_at_ns:
+            if child.state is State.RENEWED and child.process.poll() is not None:
+                child.start_at_ns = now_ns
+            if child.state in (State.BACKOFF, State.STALLED, State.RENEWED) and now_ns >= child.start_at_ns:
                 self._start(child, now_ns)
 
     def heartbeat(self, component: str, busy: bool = False) -> None:
@@ -122,9 +125,18 @@ class Supervisor:
             child.deadline_ns = child.heard_ns + (self._limits.startup_ns if busy else self._limits.stall_ns)
             child.threads, child.reason = child.process.threads(), ""
 
+    def renew(self, component: str) -> None:
+        """Ends a process in order, and starts it again, which is no failure; also one that was given up."""
+        child = self.children[component]
+        child.process.terminate()
+        child.exits_ns.clear()
+        child.state, child.reason = State.RENEWED, "starts again with the configuration that was read"
+        child.start_at_ns = self._clock() + self._limits.stop_ns
+
     def misconfigured(self) -> Child | None:
         """A child that ended with a user error, after which the rig should stop; None if there is none."""
-        return next((child for child in self._failed() if child.exit_code == Exit.USER), None)
+        failed = (child for child in self.children.values() if child.state is State.FAILED)
+        return next((child for child in failed if child.exit_code == Exit.USER), None)
 
     def exit_code(self) -> Exit | None:
         """The exit code with which the whole rig should end now; None as long as there is something to do.
@@ -171,13 +183,14 @@ class Supervisor:
     def _is_starved(self, child: Child, now_ns: int) -> bool:
         """True if a child that is late has waited for a processor in the meantime, instead of hanging."""
         silent_ns = now_ns - child.heard_ns
-        waited_ns = _longest_wait_ns(child.threads, child.process.threads(), silent_ns)
+        waited_ns = longest_wait_ns(child.threads, child.process.threads(), silent_ns)
         if now_ns >= child.deadline_ns + min(waited_ns, self._limits.startup_ns):
             return False
         child.reason = f"no health for {silent_ns / 1e9:.0f} s, because it waits for a processor"
         return True
 
     def _start(self, child: Child, now_ns: int) -> None:
+        child.process.kill()  # no effect unless it was told to end, and has not
         child.process = self._spawn(child.component, child.arguments)
         started = {"component": child.component, "child": child.process.pid, "restarts": child.restarts}
         _log.info("%s is started", child.component, extra={"fields": started})
@@ -225,23 +238,9 @@ class Supervisor:
         if child.process.poll() is None:
             child.process.kill()
             child.reason = "did not end in time and was killed"
-        if child.state in (State.RUNNING, State.BACKOFF, State.STALLED):
+        if child.state in (State.RUNNING, State.BACKOFF, State.STALLED, State.RENEWED):
             child.state, child.exit_code = State.STOPPED, child.process.poll() or 0
         child.process = NO_PROCESS
-
-    def _failed(self) -> list[Child]:
-        return [child for child in self.children.values() if child.state is State.FAILED]
-
-
-def _longest_wait_ns(before: Mapping[int, ThreadTimes], now: Mapping[int, ThreadTimes], elapsed_ns: int) -> int:
-    """Longest time that a thread has waited for a processor within the elapsed time."""
-    waits_ns = [0]
-    for thread, times in now.items():
-        earlier = before.get(thread, ThreadTimes())
-        # The kernel counts a wait when it is over; a thread that would run now has waited since it ran last.
-        waited_ns = elapsed_ns if times.runnable else times.waited_ns - earlier.waited_ns
-        waits_ns.append(min(waited_ns, elapsed_ns - (times.ran_ns - earlier.ran_ns)))
-    return max(waits_ns)
 
 
 def _exit_reason(code: int, output_tail: str) -> str:

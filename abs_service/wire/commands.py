@@ -1,10 +1,11 @@
-"""Commands to a tracker and to the recorder, their answers, and a line in health and log for each."""
+"""Commands to the parts of a rig, their answers, and a line in health and log for each."""
 
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
-from absmsg.v1.command_pb2 import CommandAnswer, Record, Reinitialize
+from absmsg.v1.command_pb2 import CommandAnswer, Record, Reinitialize, Reload
 
 from abs_service.bus import keys
 from abs_service.bus.contract import Bus, Sample, Subscription
@@ -18,7 +19,12 @@ _log = logging.getLogger(__name__)
 
 REINITIALIZE = Reinitialize.DESCRIPTOR.full_name
 RECORD = Record.DESCRIPTOR.full_name
-_SCHEMAS: Mapping[str, type[Reinitialize | Record]] = {REINITIALIZE: Reinitialize, RECORD: Record}
+RELOAD = Reload.DESCRIPTOR.full_name
+_SCHEMAS: Mapping[str, type[Reinitialize | Record | Reload]] = {
+    REINITIALIZE: Reinitialize,
+    RECORD: Record,
+    RELOAD: Reload,
+}
 ANSWER = CommandAnswer.DESCRIPTOR.full_name
 
 #: Column and row of a pixel.
@@ -73,8 +79,8 @@ def answer_reinitialize(
             from a thread of the transport.
     """
 
-    def on_command(payload: bytes) -> str:
-        return act(_choice(payload))
+    def on_command(payload: bytes) -> CommandAnswer:
+        return CommandAnswer(region=printable(act(_choice(payload))))
 
     def where(payload: bytes) -> str:
         return str(_choice(payload))
@@ -92,15 +98,29 @@ def answer_record(bus: Bus, headers: HeaderFactory, health: Health, act: Callabl
         act: records, or waits; returns why it does not, "" if it does. Called from a thread of the transport.
     """
 
-    def on_command(payload: bytes) -> str:
+    def on_command(payload: bytes) -> CommandAnswer:
         if reason := act(Record.FromString(payload).recording):
             raise RefusedError(reason)
-        return ""
+        return CommandAnswer()
 
     def which(payload: bytes) -> str:
         return " on" if Record.FromString(payload).recording else " off"
 
     return _answer(bus, keys.RECORD, RECORD, headers, health, on_command, which)
+
+
+def answer_reload(bus: Bus, headers: HeaderFactory, health: Health, act: Callable[[], Sequence[str]]) -> Subscription:
+    """Answers requests to read the rig file again; counts and tells them as `answer_reinitialize`.
+
+    Args:
+        bus: of the rig.
+        headers: of the answers.
+        health: of who answers.
+        act: reads it and returns the components that start again, or raises RefusedError. Called from a thread of the
+            transport.
+    """
+    reply = partial(_answer, bus, keys.RELOAD, RELOAD, headers, health)
+    return reply(lambda payload: CommandAnswer(restarts=act()), lambda payload: "")
 
 
 def reinitialize(
@@ -132,39 +152,44 @@ def record(bus: Bus, headers: HeaderFactory, recording: bool, timeout_s: float) 
     return CommandAnswer.FromString(answers[0].payload) if answers else None
 
 
+def reload(bus: Bus, headers: HeaderFactory, timeout_s: float) -> CommandAnswer | None:
+    """Asks a rig to read its file again; returns its answer, None if there is none."""
+    answers = bus.command(keys.RELOAD, RELOAD, Reload(header=headers.now(0)).SerializeToString(), timeout_s)
+    return CommandAnswer.FromString(answers[0].payload) if answers else None
+
+
 def _answer(
     bus: Bus,
     topic: str,
     message: str,
     headers: HeaderFactory,
     health: Health,
-    act: Callable[[bytes], str],
+    act: Callable[[bytes], CommandAnswer],
     details: Callable[[bytes], str],
 ) -> Subscription:
     """Answers commands on a topic.
 
-    `act` gets the payload of those that are valid and returns the answer's region or raises RefusedError; `details`
-    makes what the log says of them.
+    `act` gets the payload of those that are valid and returns what is particular of their answer, or raises
+    RefusedError; `details` makes what the log says of them.
     """
 
-    def answer(command: Sample) -> bytes:
+    def reply(command: Sample) -> bytes:
         reason, sender = _refusal(command, message, headers.rig)
-        region, said = "", ""
+        answer, said = CommandAnswer(), ""
         if not reason:
             said = details(command.payload)
             try:
-                region = act(command.payload)
+                answer = act(command.payload)
             except RefusedError as error:
                 reason = str(error)
         count = health.counted("commands.refused" if reason else "commands.accepted")
         line = printable(f"{topic}{said} from {sender}: {reason or 'accepted'}")
         _log.warning("command %d: %s", count, line)
         health.label("command", line)
-        return CommandAnswer(
-            header=headers.now(count), accepted=not reason, reason=printable(reason), region=printable(region)
-        ).SerializeToString()
+        answer.MergeFrom(CommandAnswer(header=headers.now(count), accepted=not reason, reason=printable(reason)))
+        return answer.SerializeToString()
 
-    return bus.answer_commands(topic, ANSWER, answer)
+    return bus.answer_commands(topic, ANSWER, reply)
 
 
 def _refusal(command: Sample, message: str, rig: str) -> tuple[str, str]:

@@ -153,6 +153,7 @@ SCHEMAS: Mapping[str, type[Message]] = {
         common_pb2.Header,
         command_pb2.Reinitialize,
         command_pb2.Record,
+        command_pb2.Reload,
         command_pb2.CommandAnswer,
         FileDescriptorSet,
     )
@@ -171,5 +172,6 @@ _TOPICS: Mapping[type[Message], Callable[[Any], str]] = {
     common_pb2.Header: lambda message: keys.clock(message.host_clock),
     command_pb2.Reinitialize: lambda message: keys.reinitialize(message.tracker),
     command_pb2.Record: lambda message: keys.RECORD,
+    command_pb2.Reload: lambda message: keys.RELOAD,
     FileDescriptorSet: lambda message: keys.SCHEMA,
 }

@@ -79,7 +79,7 @@ def _says(page, text):
 
 
 def _box(element) -> dict[str, float]:
-    """Where an element stands; an element that the page is just drawing anew has no place until it is drawn."""
+    """Place of an element, which has none while the page draws it anew."""
     return wait_until(element.bounding_box, PATIENCE_S, "a place of the element")
 
 

@@ -48,7 +48,7 @@ def access_control() -> dict[str, object]:
         _rule("everything", "ingress", (*_READ, *_PUBLISH), _EVERYTHING),
         _rule("read", "ingress", _READ, _EVERYTHING),
         # A denial goes before what allows the same. Queries with wildcards are no commands, see `answer_commands`.
-        _rule("no commands", "ingress", ("query",), (keys.reinitialize("*"), keys.RECORD), "deny"),
+        _rule("no commands", "ingress", ("query",), (keys.reinitialize("*"), keys.RECORD, keys.RELOAD), "deny"),
         *(_rule(f"publish {name}", "ingress", _PUBLISH, topics) for name, topics in PUBLISHES.items() if topics),
     ]
     return {

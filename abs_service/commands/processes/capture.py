@@ -10,6 +10,7 @@ import argparse
 import threading
 import time
 from collections.abc import Callable, Mapping
+from functools import partial
 
 from abs_service import config
 from abs_service.bus import clock_offsets, keys
@@ -22,7 +23,7 @@ from abs_service.capture.device_supervisor import DeviceSupervisor
 from abs_service.capture.point_clouds import PointCloudPublisher
 from abs_service.commands.parts import rig_devices, rig_process
 from abs_service.config import plugins
-from abs_service.supervision import gc_tuning
+from abs_service.supervision import gc_tuning, parent_watchdog
 from abs_service.supervision.exit_codes import Exit
 from abs_service.wire.message_header import CALIBRATION, CONFIG, MODEL, TRANSFORMS
 from calib.camera import Camera
@@ -61,7 +62,8 @@ def run(arguments: argparse.Namespace) -> int:
         supervisors = [_supervisor(name, rig, source, metadata, points[name], health) for name in rig.devices]
         for supervisor in supervisors:
             supervisor.start()
-        _watch(stop, supervisors, lambda: tick(metadata, publishers, points, health, clock))
+        follow = partial(_follow, arguments, metadata)
+        _watch(stop, supervisors, follow, lambda: tick(metadata, publishers, points, health, clock))
         for supervisor in supervisors:
             supervisor.close(CLOSE_S)
         for publisher in (*publishers.values(), *points.values()):
@@ -101,9 +103,15 @@ def _supervisor(
     )
 
 
-def _watch(stop: threading.Event, supervisors: list[DeviceSupervisor], tick: Callable[[], None]) -> None:
+def _follow(arguments: argparse.Namespace, metadata: "MetadataPublisher") -> None:
+    if parent_watchdog.was_woken():
+        metadata.configure(rig_process.load_config(arguments))
+
+
+def _watch(stop: threading.Event, supervisors: list[DeviceSupervisor], *ticks: Callable[[], None]) -> None:
     while not stop.wait(0.1):
-        tick()
+        for tick in ticks:
+            tick()
         if any(supervisor.fatal_error for supervisor in supervisors) or all(
             supervisor.finished for supervisor in supervisors
         ):
@@ -154,12 +162,15 @@ class MetadataPublisher:
     def __init__(self, bus: Bus, headers: HeaderFactory, rig: config.ServiceConfig) -> None:
         self._bus = bus
         self._headers = headers
-        self._rig = rig
-        self._toml = config.to_toml(rig)
+        self.configure(rig)
         self._cameras: dict[str, Camera] = {}
         self._publishers: dict[str, Publisher] = {}
         self._seq = 0
         self._lock = threading.Lock()
+
+    def configure(self, rig: config.ServiceConfig) -> None:
+        """Publishes another configuration from now on, with the same devices and cameras."""
+        self._rig, self._toml = rig, config.to_toml(rig)
 
     def add_device(self, name: str, device: Device) -> None:
         """Adds the sensors of an opened device and publishes their metadata.

@@ -46,9 +46,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Records until SIGTERM or SIGINT."""
+    rig_process.load_config(arguments)  # with all modules that it needs, while there is time
+    parent_watchdog.wait_until_needed()
     rig = rig_process.load_config(arguments)
     settings = _settings(rig)
-    parent_watchdog.wait_until_needed()
     stop = rig_process.stop_on_signals()
     clock = WallClock()
     headers = HeaderFactory(rig.name, clock)

@@ -25,6 +25,7 @@ from abs_service import config, wiring
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.commands import run as run_command
 from abs_service.commands.parts import logs, preview_option, progress
+from abs_service.commands.parts.rig_in_memory import in_memory
 from abs_service.pairing.synchroniser import Synchroniser
 from abs_service.supervision.exit_codes import Exit
 from abs_service.tracking.replay import OfflineTracker, free_path, replay
@@ -193,13 +194,13 @@ def _writing(path: Path, toml: str) -> Iterator[McapFile]:
 def _live(settings: config.ServiceConfig, arguments: argparse.Namespace) -> int:
     """Plays the recording as the only device of the rig, through `run`."""
     recording_uri = f"replay://{quote(str(arguments.recording.resolve()))}?speed={arguments.speed:g}&delay={START_S:g}"
-    with run_command.file(_played(settings, recording_uri)) as path:
+    with in_memory(_played(settings, recording_uri)) as file:
         options = ["--json"] if arguments.json else []
         options += ["--out", str(arguments.out)] if arguments.out else ["--no-record"]
         parser = argparse.ArgumentParser()
         run_command.add_arguments(parser)
         logs.add_arguments(parser)
-        return run_command.run(parser.parse_args([str(path), *options, *logs.options(arguments)]))
+        return run_command.run(parser.parse_args([str(file.path), *options, *logs.options(arguments)]))
 
 
 def _played(settings: config.ServiceConfig, uri: str) -> config.ServiceConfig:

@@ -56,7 +56,7 @@ def _moved(frame: Frame) -> Frame:
     """The object has left a part of its place, before a background; in integers, as most devices deliver distances."""
     if frame.kind != Kind.DEPTH:
         return frame
-    z = np.roll(np.nan_to_num(frame.data, nan=2 * np.nanmax(frame.data)), _CAMERA.width // 20, axis=1)
+    z = np.roll(np.nan_to_num(frame.data, nan=2 * float(np.nanmax(frame.data))), _CAMERA.width // 20, axis=1)
     return replace(frame, data=np.round(z / 1e-3).astype("<u2"), encoding="16UC1", scale=1e-3)
 
 

@@ -25,7 +25,7 @@ _sym_db = _symbol_database.Default()
 from absmsg.v1 import common_pb2 as absmsg_dot_v1_dot_common__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x17\x61\x62smsg/v1/command.proto\x12\tabsmsg.v1\x1a\x16\x61\x62smsg/v1/common.proto\"\xc5\x01\n\x0cReinitialize\x12!\n\x06header\x18\x01 \x01(\x0b\x32\x11.absmsg.v1.Header\x12\x0f\n\x07tracker\x18\x02 \x01(\t\x12+\n\x04seed\x18\x03 \x01(\x0b\x32\x1d.absmsg.v1.Reinitialize.Pixel\x12.\n\x07polygon\x18\x04 \x03(\x0b\x32\x1d.absmsg.v1.Reinitialize.Pixel\x1a$\n\x05Pixel\x12\x0e\n\x06\x63olumn\x18\x01 \x01(\r\x12\x0b\n\x03row\x18\x02 \x01(\r\">\n\x06Record\x12!\n\x06header\x18\x01 \x01(\x0b\x32\x11.absmsg.v1.Header\x12\x11\n\trecording\x18\x02 \x01(\x08\"d\n\rCommandAnswer\x12!\n\x06header\x18\x01 \x01(\x0b\x32\x11.absmsg.v1.Header\x12\x10\n\x08\x61\x63\x63\x65pted\x18\x02 \x01(\x08\x12\x0e\n\x06reason\x18\x03 \x01(\t\x12\x0e\n\x06region\x18\x04 \x01(\tb\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x17\x61\x62smsg/v1/command.proto\x12\tabsmsg.v1\x1a\x16\x61\x62smsg/v1/common.proto\"\xc5\x01\n\x0cReinitialize\x12!\n\x06header\x18\x01 \x01(\x0b\x32\x11.absmsg.v1.Header\x12\x0f\n\x07tracker\x18\x02 \x01(\t\x12+\n\x04seed\x18\x03 \x01(\x0b\x32\x1d.absmsg.v1.Reinitialize.Pixel\x12.\n\x07polygon\x18\x04 \x03(\x0b\x32\x1d.absmsg.v1.Reinitialize.Pixel\x1a$\n\x05Pixel\x12\x0e\n\x06\x63olumn\x18\x01 \x01(\r\x12\x0b\n\x03row\x18\x02 \x01(\r\">\n\x06Record\x12!\n\x06header\x18\x01 \x01(\x0b\x32\x11.absmsg.v1.Header\x12\x11\n\trecording\x18\x02 \x01(\x08\"+\n\x06Reload\x12!\n\x06header\x18\x01 \x01(\x0b\x32\x11.absmsg.v1.Header\"v\n\rCommandAnswer\x12!\n\x06header\x18\x01 \x01(\x0b\x32\x11.absmsg.v1.Header\x12\x10\n\x08\x61\x63\x63\x65pted\x18\x02 \x01(\x08\x12\x0e\n\x06reason\x18\x03 \x01(\t\x12\x0e\n\x06region\x18\x04 \x01(\t\x12\x10\n\x08restarts\x18\x05 \x03(\tb\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -38,6 +38,8 @@ if not _descriptor._USE_C_DESCRIPTORS:
   _globals['_REINITIALIZE_PIXEL']._serialized_end=260
   _globals['_RECORD']._serialized_start=262
   _globals['_RECORD']._serialized_end=324
-  _globals['_COMMANDANSWER']._serialized_start=326
-  _globals['_COMMANDANSWER']._serialized_end=426
+  _globals['_RELOAD']._serialized_start=326
+  _globals['_RELOAD']._serialized_end=369
+  _globals['_COMMANDANSWER']._serialized_start=371
+  _globals['_COMMANDANSWER']._serialized_end=489
 # @@protoc_insertion_point(module_scope)

@@ -34,14 +34,22 @@ class Record(_message.Message):
     recording: bool
     def __init__(self, header: _Optional[_Union[_common_pb2.Header, _Mapping]] = ..., recording: _Optional[bool] = ...) -> None: ...
 
+class Reload(_message.Message):
+    __slots__ = ("header",)
+    HEADER_FIELD_NUMBER: _ClassVar[int]
+    header: _common_pb2.Header
+    def __init__(self, header: _Optional[_Union[_common_pb2.Header, _Mapping]] = ...) -> None: ...
+
 class CommandAnswer(_message.Message):
-    __slots__ = ("header", "accepted", "reason", "region")
+    __slots__ = ("header", "accepted", "reason", "region", "restarts")
     HEADER_FIELD_NUMBER: _ClassVar[int]
     ACCEPTED_FIELD_NUMBER: _ClassVar[int]
     REASON_FIELD_NUMBER: _ClassVar[int]
     REGION_FIELD_NUMBER: _ClassVar[int]
+    RESTARTS_FIELD_NUMBER: _ClassVar[int]
     header: _common_pb2.Header
     accepted: bool
     reason: str
     region: str
-    def __init__(self, header: _Optional[_Union[_common_pb2.Header, _Mapping]] = ..., accepted: _Optional[bool] = ..., reason: _Optional[str] = ..., region: _Optional[str] = ...) -> None: ...
+    restarts: _containers.RepeatedScalarFieldContainer[str]
+    def __init__(self, header: _Optional[_Union[_common_pb2.Header, _Mapping]] = ..., accepted: _Optional[bool] = ..., reason: _Optional[str] = ..., region: _Optional[str] = ..., restarts: _Optional[_Iterable[str]] = ...) -> None: ...

@@ -1,7 +1,6 @@
 import argparse
 import io
 import signal
-import tempfile
 import threading
 import time
 from pathlib import Path
@@ -15,14 +14,14 @@ from abs_service import config
 from abs_service.bus import keys
 from abs_service.bus.contract import EVENTS
 from abs_service.bus.keys import KeyNameError
-from abs_service.bus.stamps import WallClock
+from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.commands import run
 from abs_service.display.terminal.lines import PlainDisplay
 from abs_service.supervision.exit_codes import Exit
 from abs_service.supervision.run_session import RunSession
 from abs_service.supervision.supervisor import Child, Limits, State, Supervisor
 from abs_service.tracking.monitors import silence_monitor
-from abs_service.wire import estimate_messages
+from abs_service.wire import commands, estimate_messages
 from abs_service.wire.checked_bus import CheckedBus
 from tests.abs_service.bus.loopback import LoopbackBus
 from tests.abs_service.supervision.idle_process import Idle
@@ -92,17 +91,6 @@ def test_a_rig_has_one_process_per_tracker_and_stops_its_recorder_last(tmp_path)
     ]
     off = rig.model_copy(update={"record": rig.record.model_copy(update={"enabled": False})})
     assert "record" not in [child.component for child in run.children(off, tmp_path / "x.toml")]
-
-
-def test_the_file_of_the_children_says_the_same_and_leaves_nothing_behind(rig_file, tmp_path, monkeypatch):
-    folder = tmp_path / "temporary"
-    folder.mkdir()
-    monkeypatch.setattr(tempfile, "tempdir", str(folder))
-    rig = config.load(rig_file)
-    with run.file(rig) as path:
-        assert config.load(path) == rig
-        assert not list(folder.iterdir()), "which would stay after a kill"
-    assert not path.exists()
 
 
 @pytest.mark.parametrize(("code", "expected"), [(0, Exit.OK), (1, Exit.FAILED), (-9, Exit.FAILED)])
@@ -188,6 +176,22 @@ def test_a_tracker_that_falls_silent_is_an_error_whatever_the_cause(monkeypatch)
     publisher.put(state)
     bench.session.run_until(lambda: last().level == Health.LEVEL_OK or bench.session.elapsed_s > 60)
     assert last().level == Health.LEVEL_OK
+
+
+def test_what_a_new_configuration_concerns_starts_again_and_capture_is_told():
+    bench = Bench(PlainDisplay(io.StringIO(), io.StringIO()))
+    bench.session.answer_reloads(lambda: (Path("other"), ("record",)))
+    bench.supervisor.poll()
+    capture, record = (child.process for child in bench.supervisor.children.values())
+    commands.reload(bench.bus, HeaderFactory("bench", WallClock()), 1.0)
+    # Told once the session looks at its processes; it ends because capture, which has not been heard, is given up.
+    begin = bench.session.elapsed_s
+    bench.session.run_until(lambda: bench.session.elapsed_s > begin + 0.2)
+    assert isinstance(capture, Idle)
+    assert (bench.killed, capture.woken) == (["record"], 1)
+    assert bench.supervisor.children["capture"].process is capture
+    assert bench.supervisor.children["record"].process is not record
+    assert bench.session.view().directory == Path("other")
 
 
 def test_the_processes_are_stopped_also_when_the_output_is_closed():

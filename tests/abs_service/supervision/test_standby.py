@@ -14,10 +14,7 @@ from tests.waiting import eventually
 
 
 class Waiting(Idle):
-    woken = False
-
-    def wake(self):
-        self.woken = True
+    """One that was started to wait."""
 
 
 @pytest.fixture

@@ -2,63 +2,8 @@ import pytest
 
 from abs_service.supervision.child_process import ThreadTimes
 from abs_service.supervision.exit_codes import Exit
-from abs_service.supervision.supervisor import Child, Limits, State, Supervisor
-
-S = 1_000_000_000
-
-
-class FakeProcess:
-    """A process that ends when the test says so; obeys SIGTERM unless it is stubborn."""
-
-    def __init__(self, world, component, pid):
-        self.world, self.component, self.pid = world, component, pid
-        self.code = None
-        self.its_threads = {}
-
-    def threads(self):
-        return self.its_threads
-
-    def poll(self):
-        return self.code
-
-    def terminate(self):
-        self.world.events.append(("terminate", self.component))
-        if self.component not in self.world.stubborn:
-            self.code = 0
-
-    def kill(self):
-        self.world.events.append(("kill", self.component))
-        self.code = -9
-
-    def output_tail(self):
-        return self.world.words
-
-
-class World:
-    """Time, and every process that was ever started."""
-
-    def __init__(self):
-        self.now_ns = 0
-        self.events = []
-        self.started = []
-        self.stubborn = set()
-        self.words = ""
-
-    def spawn(self, component, arguments):
-        self.started.append(FakeProcess(self, component, len(self.started) + 1))
-        return self.started[-1]
-
-    def wait(self, seconds):
-        self.now_ns += int(seconds * 1e9)
-
-    def latest(self, component):
-        return [process for process in self.started if process.component == component][-1]
-
-    def supervisor(self, *components, **limits):
-        children = [Child(component, (component,), stage) for stage, component in enumerate(components)]
-        made = Supervisor(children, self.spawn, lambda: self.now_ns, Limits(**limits))
-        made.poll()
-        return made
+from abs_service.supervision.supervisor import State
+from tests.abs_service.supervision.fake_processes import S, World
 
 
 @pytest.fixture
@@ -261,6 +206,41 @@ def test_processes_that_do_not_end_in_time_are_killed_and_the_recorder_has_the_m
     ]
     assert 4 * S <= world.now_ns < 4.1 * S
     assert supervisor.children["record"].reason == "did not end in time and was killed"
+
+
+def test_a_renewed_process_ends_in_order_and_starts_again_which_counts_as_no_failure(world):
+    supervisor = world.supervisor("capture", "track/a", restarts=0)
+    for _ in range(3):
+        supervisor.renew("track/a")
+        assert supervisor.exit_code() is None
+        supervisor.poll()
+    track = supervisor.children["track/a"]
+    assert (track.state, track.restarts, track.reason) == (State.RUNNING, 0, "")
+    assert world.events == 3 * [("terminate", "track/a")]
+    assert [process.component for process in world.started] == ["capture", *4 * ["track/a"]]
+
+
+def test_a_renewed_process_that_does_not_end_is_killed_and_one_that_was_given_up_begins_again(world):
+    supervisor = world.supervisor("capture", "record", stop_ns=4 * S)
+    ends(world, supervisor, "record", 2)
+    assert supervisor.exit_code() == Exit.USER
+    supervisor.renew("record")
+    supervisor.poll()
+    assert (supervisor.children["record"].state, supervisor.exit_code()) == (State.RUNNING, None)
+    world.stubborn = {"record"}
+    supervisor.renew("record")
+    passes(world, supervisor, 3)
+    assert supervisor.children["record"].state == State.RENEWED
+    passes(world, supervisor, 1)
+    assert world.events[-1] == ("kill", "record")
+    assert supervisor.children["record"].state == State.RUNNING
+
+
+def test_a_rig_that_is_stopped_does_not_start_what_was_to_be_renewed(world):
+    supervisor = world.supervisor("capture")
+    supervisor.renew("capture")
+    supervisor.stop(world.wait)
+    assert (supervisor.children["capture"].state, len(world.started)) == (State.STOPPED, 1)
 
 
 def test_stopping_twice_or_without_children_is_harmless(world):

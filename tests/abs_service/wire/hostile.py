@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from absmsg.v1.command_pb2 import Record, Reinitialize
+from absmsg.v1.command_pb2 import Record, Reinitialize, Reload
 from absmsg.v1.common_pb2 import Header
 from absmsg.v1.deformation_state_pb2 import DeformationState
 from absmsg.v1.deformed_mesh_pb2 import DeformedMesh, MeshTopology
@@ -38,6 +38,7 @@ TOPICS = (
     "sheet/mesh",
     "sheet/topology",
     "sheet/reinitialize",
+    "reload",
     "health/capture",
     "health/record",
     "health/run",
@@ -66,6 +67,7 @@ VALID: Mapping[str, Message] = {
     "sheet/topology": MeshTopology(tracker="sheet", rest_vertices_f32=bytes(24), faces_u32=bytes(12)),
     "sheet/reinitialize": Reinitialize(tracker="sheet", seed=Reinitialize.Pixel(column=111, row=133)),
     "record": Record(recording=True),
+    "reload": Reload(),
     **{f"health/{name}": Health(component=name) for name in ("capture", "record", "run", "track/sheet")},
     "clock/there": Header(host_clock="there", t_host_ns=1),
 }

@@ -39,9 +39,11 @@ warm_up(rig, plan)
 
 exposures = [simulation.expose(k)[0] for k in range(8)]
 
+OURS = "abs_service", "drivers", "calib"
+
 def forms():
     return {f.py_func.__module__ + "." + f.py_func.__qualname__: len(f.signatures) for f in gc.get_objects()
-             if isinstance(f, Dispatcher) and f.py_func.__module__.partition(".")[0] in ("abs_service", "drivers", "calib")}
+             if isinstance(f, Dispatcher) and f.py_func.__module__.partition(".")[0] in OURS}
 
 before = forms()
 tracking = TrackingSession(rig, plan)

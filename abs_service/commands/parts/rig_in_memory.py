@@ -1,0 +1,68 @@
+"""The configuration that the processes of a running rig read: a file in memory, whose content can be exchanged."""
+
+import os
+from collections.abc import Callable, Collection, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO
+
+from abs_service import config
+from abs_service.config import changes
+from abs_service.supervision.exit_codes import is_for_user
+from abs_service.wire.commands import RefusedError
+
+
+class RigInMemory:
+    """A configuration as a file.
+
+    Args:
+        rig: the configuration.
+        stream: of a file in memory; open as long as this is used.
+    """
+
+    def __init__(self, rig: config.ServiceConfig, stream: IO[bytes]) -> None:
+        self._stream = stream
+        self.path = Path(f"/proc/{os.getpid()}/fd/{stream.fileno()}")
+        self.write(rig)
+
+    def write(self, rig: config.ServiceConfig) -> None:
+        """Puts another configuration in place of this one."""
+        content = config.to_toml(rig).encode()
+        os.pwrite(self._stream.fileno(), content, 0)
+        os.truncate(self._stream.fileno(), len(content))
+        self.rig = rig
+
+    def exchange(
+        self, read: Callable[[], config.ServiceConfig], components: Collection[str]
+    ) -> tuple[Path, tuple[str, ...]]:
+        """Takes over a configuration, if it can be used without an end of the rig.
+
+        Args:
+            read: reads it.
+            components: processes that the rig has.
+
+        Returns:
+            Folder of the recordings, and the processes that have to start again.
+
+        Raises:
+            RefusedError: it cannot; everything stays as it was.
+        """
+        try:
+            new = read()
+        except Exception as error:
+            if is_for_user(error):
+                raise RefusedError(str(error)) from None
+            raise
+        found = changes.between(self.rig, new)
+        if found.fixed:
+            keys = ", ".join(found.fixed)
+            raise RefusedError(f"{keys}: can change only when the rig is stopped and started; nothing was taken over")
+        self.write(new)
+        return new.record.directory, tuple(name for name in found.components if name in components)
+
+
+@contextmanager
+def in_memory(rig: config.ServiceConfig) -> Iterator[RigInMemory]:
+    """A configuration as a file of which nothing is left when this process ends, however it ends."""
+    with open(os.memfd_create(rig.name), "wb") as stream:
+        yield RigInMemory(rig, stream)

@@ -1,0 +1,91 @@
+"""`abs-service reload` and the configuration in memory that it exchanges."""
+
+import tempfile
+
+import pytest
+
+from abs_service import config
+from abs_service.bus.health import Health
+from abs_service.bus.stamps import HeaderFactory, WallClock
+from abs_service.commands.parts.rig_in_memory import in_memory
+from abs_service.commands.running import reload
+from abs_service.wire import commands
+from abs_service.wire.commands import RefusedError
+from tests.abs_service.bus.loopback import LoopbackBus
+
+#: The processes of the demo rig.
+ALL = ("capture", "track/sheet", "record")
+
+
+@pytest.fixture
+def rig(tmp_path):
+    """The demo rig, which records to a folder of the test."""
+    demo = config.load_default()
+    return demo.model_copy(update={"record": demo.record.model_copy(update={"directory": tmp_path / "takes"})})
+
+
+def test_the_file_of_the_children_says_the_same_and_leaves_nothing_behind(rig, tmp_path, monkeypatch):
+    folder = tmp_path / "temporary"
+    folder.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    with in_memory(rig) as file:
+        assert config.load(file.path) == rig
+        assert not list(folder.iterdir()), "which would stay after a kill"
+    assert not file.path.exists()
+
+
+def test_another_configuration_takes_its_place_and_a_shorter_one_leaves_no_rest(rig, tmp_path):
+    longer = rig.model_copy(update={"record": rig.record.model_copy(update={"directory": tmp_path / ("x" * 200)})})
+    with in_memory(rig) as file:
+        assert file.exchange(lambda: longer, ALL) == (tmp_path / ("x" * 200), ("record",))
+        assert config.load(file.path) == longer
+        assert file.exchange(lambda: rig, ALL) == (rig.record.directory, ("record",))
+        assert config.load(file.path) == rig
+        assert file.exchange(lambda: rig, ALL) == (rig.record.directory, ())
+
+
+def test_what_cannot_be_used_is_refused_and_changes_nothing(rig):
+
+    def wrong():
+        raise config.ConfigError("rig.toml: trackers.sheet.budget_ms = -1 is wrong")
+
+    with in_memory(rig) as file:
+        with pytest.raises(RefusedError, match="budget_ms = -1 is wrong"):
+            file.exchange(wrong, ALL)
+        with pytest.raises(RefusedError, match="name: can change only when the rig is stopped"):
+            file.exchange(lambda: rig.model_copy(update={"name": "other"}), ALL)
+        assert config.load(file.path) == rig
+
+
+def test_a_mistake_of_ours_is_not_taken_for_one_of_the_file(rig):
+    def wrong():
+        raise ZeroDivisionError
+
+    with in_memory(rig) as file, pytest.raises(ZeroDivisionError):
+        file.exchange(wrong, ALL)
+
+
+@pytest.mark.parametrize(
+    ("restarts", "refusal", "code", "words"),
+    [
+        (("track/sheet", "record"), "", 0, "starts again: track/sheet, record"),
+        ((), "", 0, "nothing has changed"),
+        ((), "name: can change only", 1, "the rig refuses: name: can change only"),
+    ],
+)
+def test_the_answer_is_told(capsys, restarts, refusal, code, words):
+    bus, headers = LoopbackBus(), HeaderFactory("demo", WallClock())
+
+    def act():
+        if refusal:
+            raise RefusedError(refusal)
+        return restarts
+
+    commands.answer_reload(bus, headers, Health(bus, "run", headers), act)
+    assert reload.request(bus, headers) == code
+    assert capsys.readouterr().out == f"{words}\n"
+
+
+def test_a_rig_that_gives_no_answer_is_said(capsys):
+    assert reload.request(LoopbackBus(), HeaderFactory("demo", WallClock())) == 1
+    assert "it gives no answer" in capsys.readouterr().out

@@ -1,0 +1,63 @@
+"""Time and processes of a supervisor, under the control of a test."""
+
+from abs_service.supervision.supervisor import Child, Limits, Supervisor
+
+S = 1_000_000_000
+
+
+class FakeProcess:
+    """A process that ends when the test says so; obeys SIGTERM unless it is stubborn."""
+
+    def __init__(self, world, component, pid):
+        self.world, self.component, self.pid = world, component, pid
+        self.code = None
+        self.its_threads = {}
+
+    def threads(self):
+        return self.its_threads
+
+    def poll(self):
+        return self.code
+
+    def terminate(self):
+        self.world.events.append(("terminate", self.component))
+        if self.component not in self.world.stubborn:
+            self.code = 0
+
+    def kill(self):
+        if self.code is None:
+            self.world.events.append(("kill", self.component))
+            self.code = -9
+
+    def wake(self):
+        pass
+
+    def output_tail(self):
+        return self.world.words
+
+
+class World:
+    """Time, and every process that was ever started."""
+
+    def __init__(self):
+        self.now_ns = 0
+        self.events = []
+        self.started = []
+        self.stubborn = set()
+        self.words = ""
+
+    def spawn(self, component, arguments):
+        self.started.append(FakeProcess(self, component, len(self.started) + 1))
+        return self.started[-1]
+
+    def wait(self, seconds):
+        self.now_ns += int(seconds * 1e9)
+
+    def latest(self, component):
+        return [process for process in self.started if process.component == component][-1]
+
+    def supervisor(self, *components, **limits):
+        children = [Child(component, (component,), stage) for stage, component in enumerate(components)]
+        made = Supervisor(children, self.spawn, lambda: self.now_ns, Limits(**limits))
+        made.poll()
+        return made
