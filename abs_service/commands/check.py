@@ -23,11 +23,18 @@ from abs_service import config, wiring
 from abs_service.bus import keys
 from abs_service.bus.security import roles
 from abs_service.bus.security.mutual_tls import TlsError
-from abs_service.commands.parts import data_rates, device_checks, disk, harmless_devices, preview_option, rig_process
+from abs_service.commands.parts import (
+    data_rates,
+    device_checks,
+    disk,
+    harmless_devices,
+    preview_option,
+    recorded_rig,
+    rig_process,
+)
 from abs_service.commands.parts.device_checks import CheckError
 from abs_service.commands.parts.harmless_devices import HarmlessError
 from abs_service.commands.parts.preview_option import PictureOptionError
-from abs_service.commands.recordings import replay
 from abs_service.config import addresses, plugins
 from abs_service.config.positions import located
 from abs_service.config.problems import Key, Problem
@@ -95,7 +102,7 @@ def describe(rig: config.ServiceConfig, source: str, toml: str = "", recording: 
     if recording and not problems:
         for name in rig.trackers:
             with _noting(("trackers", name, "sensors"), problems):
-                replay.recorded_rig(rig, name, Recording(recording))
+                recorded_rig.recorded_rig(rig, name, Recording(recording))
     try:
         rig.bus.security(*roles.NAMES).check(rig.bus.endpoint, listens=False)
     except TlsError as error:
@@ -171,7 +178,7 @@ def text(found: dict[str, Any]) -> str:
 def _draw_previews(rig: config.ServiceConfig, arguments: argparse.Namespace) -> list[str]:
     """Draws a preview of each tracker; returns a line about each picture."""
     if arguments.replay:
-        return replay.draw_previews(rig, Recording(arguments.replay), arguments.picture)
+        return recorded_rig.draw_previews(rig, Recording(arguments.replay), arguments.picture)
     written: list[str] = []
     for name in rig.trackers:
         with harmless_devices.opened(rig, name) as source:

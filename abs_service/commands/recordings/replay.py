@@ -25,22 +25,16 @@ from abs_service import config, wiring
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.commands import run as run_command
 from abs_service.commands.parts import logs, preview_option, progress
+from abs_service.commands.parts.recorded_rig import ReplayOptionError, draw_previews, recorded_rig
 from abs_service.commands.parts.rig_in_memory import in_memory
-from abs_service.pairing.synchroniser import Synchroniser
 from abs_service.supervision.exit_codes import Exit
 from abs_service.tracking.replay import OfflineTracker, free_path, replay
-from abs_service.tracking.session import TrackingSession, missing_streams
-from calib.rig import Rig
-from drivers.contract.frame import Frame
+from abs_service.tracking.session import TrackingSession
 from drivers.encoding.mcap_file import McapFile
 from drivers.replay import Recording
 
 #: Time that the processes of a live replay have to get ready before its first frame [s].
 START_S = 6.0
-
-
-class ReplayOptionError(Exception):
-    """Options that do not fit the recording."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -107,36 +101,6 @@ def configuration(recording: Recording, path: Path | None) -> config.ServiceConf
     if not settings.trackers:
         raise ReplayOptionError(f"{path or source}: trackers: there is none, so there is nothing to do")
     return settings
-
-
-def recorded_rig(settings: config.ServiceConfig, name: str, recording: Recording) -> tuple[Rig, Synchroniser]:
-    """The rig of one tracker with the cameras of the recording, and its synchroniser of frame sets.
-
-    Raises:
-        ReplayOptionError: the recording lacks images that the tracker needs.
-    """
-    there = sorted({sensor for sensor, _ in recording.counts})
-    unknown = [sensor for sensor in settings.trackers[name].sensors if sensor not in there]
-    if unknown:
-        raise ReplayOptionError(
-            f'{recording.path}: tracker "{name}" needs sensor "{unknown[0]}", which is not there; '
-            f"the recording has: {', '.join(there)}"
-        )
-    rig = wiring.rig(settings, name, wiring.cameras(settings, recording.cameras))
-    there = [f"{sensor}/{stream}" for sensor, stream in recording.counts]
-    if missing := missing_streams(rig.sensors.values(), there):
-        raise ReplayOptionError(f'{recording.path}: tracker "{name}" needs {", ".join(missing)}, which is not there')
-    return rig, wiring.synchroniser(settings, name, rig.sensors.values())
-
-
-def draw_previews(settings: config.ServiceConfig, recording: Recording, path: Path) -> list[str]:
-    """Draws a preview of each tracker; returns a line about each picture."""
-    lines: list[str] = []
-    for name in settings.trackers:
-        rig, synchroniser = recorded_rig(settings, name, recording)
-        frame_sets = synchroniser.group(item for item in recording.frames() if isinstance(item, Frame))
-        lines.append(preview_option.draw(settings, name, path, (rig, frame_sets)))
-    return lines
 
 
 def _tracker(settings: config.ServiceConfig, name: str, recording: Recording, file: McapFile) -> OfflineTracker:

@@ -14,7 +14,7 @@ import sys
 from pathlib import Path
 
 from abs_service import config, wiring
-from abs_service.commands.parts import progress
+from abs_service.commands.parts import progress, recorded_rig
 from abs_service.commands.recordings import replay
 from abs_service.display.pictures.stiffness_plot import draw
 from abs_service.supervision.exit_codes import Exit
@@ -73,7 +73,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _track(recording: Recording, settings: config.ServiceConfig, name: str, as_json: bool) -> HangingStrip:
-    rig, synchroniser = replay.recorded_rig(settings, name, recording)
+    rig, synchroniser = recorded_rig.recorded_rig(settings, name, recording)
     plan = wiring.plan(settings, name)
     with progress.bars(disable=as_json) as bars:
         task = bars.add_task("images", total=sum(recording.counts.values()))

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from abs_service import wiring
 from abs_service.bus import keys
 from abs_service.bus.stamps import HeaderFactory, WallClock
+from abs_service.commands.parts import recorded_rig
 from abs_service.commands.recordings import replay
 from abs_service.tracker.estimate import Estimate, Status
 from abs_service.tracking.session import TrackingSession
@@ -57,7 +58,7 @@ def run_through(take: Path, is_watched: bool) -> Pass:
     """
     recording = Recording(take)
     settings = replay.configuration(recording, None)
-    rig, synchroniser = replay.recorded_rig(settings, TRACKER, recording)
+    rig, synchroniser = recorded_rig.recorded_rig(settings, TRACKER, recording)
     clock = WallClock(lambda: 0, lambda: recording.wall_offset_ns)
     watch, headers = Stopwatch(), HeaderFactory(settings.name, clock)
     process = _Process(TrackingSession(rig, wiring.plan(settings, TRACKER)), headers, watch)
