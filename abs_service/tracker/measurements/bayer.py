@@ -11,7 +11,7 @@ from abs_service.tracker.measurements.base import Comparison, Decoder, FirstImag
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.terms.photometric.channel import ChannelTerm
-from abs_service.tracker.terms.photometric.illumination import Passive
+from abs_service.tracker.terms.photometric.illumination import Exposed
 from abs_service.tracker.terms.photometric.vertex_values import Values, at_vertices, known, mean_of_known
 from calib.camera import Camera
 from calib.noise.images.bayer import GaussianBayer
@@ -37,7 +37,7 @@ class Measurement:
         """The channel of a vertex that the pixel's filter passes."""
         looks, bounds = mesh.appearance_of(sensor.name), comparison.bounds
         return ChannelTerm(
-            sensor.name, synthesizer, looks, self.noise, Passive(), bounds, comparison.registration_noise
+            sensor.name, synthesizer, looks, self.noise, Exposed(), bounds, comparison.registration_noise
         )
 
     def appearance(self, seen: Values, sensor: Sensor, first: FirstImages) -> Values:

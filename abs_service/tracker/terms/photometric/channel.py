@@ -82,6 +82,9 @@ class ChannelTerm:
         copy(self._image, *limits(window, self._image.shape), texture)
         self._texture = texture.reshape(-1, 4)
         self._view.look(predicted)
+        seen = self._view.synthesize(predicted)
+        texels = self._texture[seen.pixel[0]]
+        self._illumination.adapt(texels[:, VALUE], texels[:, CHANNEL].astype(int), seen.attributes[0].T)
         self._widening = NO_WIDENING
         inverse = self._residuals(predicted)[1]
         with np.errstate(divide="ignore"):
@@ -144,9 +147,11 @@ class ChannelTerm:
         """
         seen = self._view.synthesize(surface)
         channel = self._texture[seen.pixel[0], CHANNEL].astype(int)
-        own = self._view.attribute_gradients(surface)[np.arange(len(channel)), channel]
-        shining = self._illumination.shine(replace(seen, attributes=own.T[None]), surface, self._view)
-        gradients, unknown = shining.attributes[0].T.astype(np.float64), np.isnan(own).any(axis=1)
+        own = self._view.attribute_gradients(surface)
+        along = (replace(seen, attributes=own[..., axis].T[None]) for axis in (0, 1))
+        shining = [self._illumination.shine(slope, surface, self._view).attributes[0] for slope in along]
+        gradients = np.stack(shining, axis=-1)[channel, np.arange(len(channel))].astype(np.float64)
+        unknown = np.isnan(gradients).any(axis=1)
         samples = self._view.spread(surface, surface.vertices[0].T.astype(np.float64))[unknown]
         gradients[unknown] = channel_gradients(
             self._image[..., VALUE], self._image[..., CHANNEL], self._view.camera, samples

@@ -1,4 +1,4 @@
-"""Gain of a colour image: exposure and white balance that changed since the appearance was taken in."""
+"""Gain of an image: exposure and white balance that changed since the appearance was taken in."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 #: Values between which a colour is neither noise nor saturated [8-bit levels].
 DARKEST, BRIGHTEST = 16.0, 250.0
 
-#: Fewer samples of a channel do not show its gain.
+#: Fewer samples do not show a gain.
 MIN_SAMPLES = 50
 
 #: Gains beyond these are no exposure: the image shows something else.
@@ -14,7 +14,10 @@ LEAST, MOST = 0.25, 4.0
 
 
 def gains(measured: NDArray[np.floating], expected: NDArray[np.floating]) -> NDArray[np.float32]:
-    """Gain of every channel (channels,): median ratio of measured and expected values; 1 where too few are known.
+    """Gain of every channel (channels,): median ratio of measured and expected values.
+
+    A channel of which too few samples are known has that of all channels together, since exposure is common to them; 1
+    if these are too few as well.
 
     The median is not moved by an occluder on less than half of the surface, nor, in textured surfaces, by a prediction
     that is off: brighter and darker places are exchanged.
@@ -23,11 +26,18 @@ def gains(measured: NDArray[np.floating], expected: NDArray[np.floating]) -> NDA
         measured: values at the predicted samples (m, channels) [8-bit levels]; NaN where unknown.
         expected: appearance of these samples (m, channels) [8-bit levels]; NaN where unknown.
     """
-    result = np.ones(expected.shape[1], np.float32)
-    with np.errstate(invalid="ignore"):
+    with np.errstate(invalid="ignore", divide="ignore"):
         usable = (np.minimum(expected, measured) > DARKEST) & (np.maximum(expected, measured) < BRIGHTEST)
+        ratios = measured / expected
+    common = _gain(ratios[usable]) if np.count_nonzero(usable.any(axis=1)) >= MIN_SAMPLES else 1.0
+    result = np.full(expected.shape[1], common, np.float32)
     for channel, chosen in enumerate(usable.T):
         if np.count_nonzero(chosen) >= MIN_SAMPLES:
-            ratio = np.median(measured[chosen, channel] / expected[chosen, channel])
-            result[channel] = ratio if LEAST <= ratio <= MOST else 1
+            result[channel] = _gain(ratios[chosen, channel])
     return result
+
+
+def _gain(ratios: NDArray[np.floating]) -> float:
+    """Median of ratios; 1 if it is no exposure."""
+    ratio = float(np.median(ratios))
+    return ratio if LEAST <= ratio <= MOST else 1.0

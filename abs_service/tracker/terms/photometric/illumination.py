@@ -8,11 +8,24 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.synthesis.base import Synthesis, View
+from abs_service.tracker.terms.photometric.exposure import gains
 from calib.jit import kernel
 
 
 class Illumination(Protocol):
     """Converts reflectivities into image values."""
+
+    def adapt(
+        self, measured: NDArray[np.floating], channel: NDArray[np.integer], expected: NDArray[np.floating]
+    ) -> None:
+        """Follows the exposure of an image.
+
+        Args:
+            measured: value (m,) at each predicted sample; NaN where unknown.
+            channel: of each sample (m,).
+            expected: what the samples have in each channel (m, channels); NaN where unknown.
+        """
+        ...
 
     def shine(self, seen: Synthesis, surface: Surface, view: View) -> Synthesis:
         """The synthesis of a population with its attributes as they look in this light."""
@@ -22,9 +35,33 @@ class Illumination(Protocol):
 class Passive:
     """The light of the room: a vertex looks the same wherever it is."""
 
+    def adapt(
+        self, measured: NDArray[np.floating], channel: NDArray[np.integer], expected: NDArray[np.floating]
+    ) -> None:
+        """Does nothing."""
+
     def shine(self, seen: Synthesis, surface: Surface, view: View) -> Synthesis:
         """The synthesis itself."""
         return seen
+
+
+class Exposed:
+    """The light of the room, seen by a camera that adapts exposure and white balance: one gain per channel."""
+
+    def __init__(self) -> None:
+        self._gains = np.ones(1, np.float32)
+
+    def adapt(
+        self, measured: NDArray[np.floating], channel: NDArray[np.integer], expected: NDArray[np.floating]
+    ) -> None:
+        """Takes the gains of an image."""
+        each = np.full(expected.shape, np.nan)
+        each[np.arange(len(channel)), channel] = measured
+        self._gains = gains(each, expected)
+
+    def shine(self, seen: Synthesis, surface: Surface, view: View) -> Synthesis:
+        """The synthesis with its attributes as the image is exposed."""
+        return replace(seen, attributes=seen.attributes * self._gains[:, None])
 
 
 class Active:
@@ -36,6 +73,11 @@ class Active:
 
     def __init__(self, center: NDArray[np.float64]):
         self._center = center.astype(np.float32)
+
+    def adapt(
+        self, measured: NDArray[np.floating], channel: NDArray[np.integer], expected: NDArray[np.floating]
+    ) -> None:
+        """Does nothing: the lamp and the sensor's exposure are one, and known."""
 
     def shine(self, seen: Synthesis, surface: Surface, view: View) -> Synthesis:
         """The synthesis with reflectivities as bright as they look on each member of the population."""

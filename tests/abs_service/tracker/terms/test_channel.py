@@ -10,6 +10,7 @@ from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.objectives import euclidean, likelihood
 from abs_service.tracker.terms.photometric.channel import ChannelTerm
 from abs_service.tracker.terms.photometric.channel_cost import copy, fill
+from abs_service.tracker.terms.photometric.exposure import gains
 from abs_service.tracker.terms.photometric.illumination import Active, Passive, lambert
 from abs_service.tracker.terms.photometric.shadow import Shadow
 from calib.noise.images.bayer import GaussianBayer
@@ -100,11 +101,13 @@ def test_the_euclidean_cost_is_the_weighted_squares(seed, name):
     image = ChannelImage(generator.uniform(0, 255, SHAPE).astype(np.float32), pattern)
     surface = as_surface((mesh.vertices, mesh.normals))
     objective = objective.observe(observation(color=image), surface)
-    looks, expected = mesh.appearance_of("color"), 0.0
-    for vertex, normal, look in zip(surface.vertices[0].T.astype(float), surface.normals[0].T, looks):
+    looks, measured = mesh.appearance_of("color"), np.full(mesh.appearance_of("color").shape, np.nan)
+    for v, (vertex, normal) in enumerate(zip(surface.vertices[0].T.astype(float), surface.normals[0].T)):
         pixel = reference.seen_pixel(CAMERA, vertex, normal)
-        off = 90.0 if pixel is None else image.values[pixel] - look[image.channel[pixel]]
-        expected += 0.003 * min(float(off) ** 2, 90.0**2)
+        if pixel is not None:
+            measured[v, image.channel[pixel]] = image.values[pixel]
+    off = np.nanmax(np.abs(measured - looks * gains(measured, looks)), axis=1, initial=-1)
+    expected = 0.003 * np.sum(np.where(off < 0, 90.0, np.minimum(off, 90.0)) ** 2)
     assert objective.cost(surface)[0] == pytest.approx(expected, rel=2e-4)
 
 

@@ -1,9 +1,19 @@
-"""Gains of colour images, and what a term makes of an image that is darker than the appearance."""
+"""Gains of images, and what a term makes of an image that is darker than the appearance."""
 
 import numpy as np
 import pytest
 
+from abs_service.pairing.images import BAYER_ORDERS, ONE_CHANNEL, ChannelImage
+from abs_service.tracker.objectives import likelihood
+from abs_service.tracker.terms.photometric.channel import ChannelTerm
 from abs_service.tracker.terms.photometric.exposure import gains
+from abs_service.tracker.terms.photometric.illumination import Exposed, Passive
+from calib.noise.images.bayer import GaussianBayer
+from calib.noise.images.grey import GaussianGrey
+from calib.rig import Sensor
+from tests import reference
+from tests.abs_service.tracker.random_vertices import decided
+from tests.abs_service.tracker.scenes import CAMERA, as_surface, sparse
 
 GENERATOR_SEED = 5
 
@@ -34,3 +44,32 @@ def test_unknown_saturated_and_black_values_show_no_gain(measured: np.ndarray):
 def test_too_few_samples_show_no_gain():
     expected = _appearance()[:30]
     assert gains(expected * 0.5, expected).tolist() == [1, 1, 1]
+
+
+def test_a_channel_with_too_few_samples_has_the_gain_of_all():
+    expected = _appearance()
+    expected[40:, 0] = 5.0  # hardly any red
+    assert gains(expected * 0.6, expected) == pytest.approx([0.6] * 3)
+
+
+@pytest.mark.parametrize(("light", "remains"), [(Exposed(), False), (Passive(), True)])
+@pytest.mark.parametrize("pattern", [ONE_CHANNEL, BAYER_ORDERS["grbg"]], ids=["grey", "bayer"])
+def test_a_darker_image_of_one_value_per_pixel_costs_no_more_where_exposure_adapts(pattern, light, remains):
+    generator = np.random.default_rng(GENERATOR_SEED)
+    vertices, normals = decided(generator, 600)
+    surface = as_surface((vertices, normals))
+    looks = generator.uniform(60, 200, (len(vertices), int(pattern.max()) + 1)).astype(np.float32)
+    noise = GaussianGrey(6.0) if pattern is ONE_CHANNEL else GaussianBayer(6.0)
+    bounds = likelihood.Settings().bounds(Sensor("color", CAMERA, noise))
+    costs = []
+    for exposure in (1.0, 0.6):
+        term = ChannelTerm("color", sparse(CAMERA), looks, noise, light, bounds)
+        image = ChannelImage(np.full((CAMERA.height, CAMERA.width), np.nan, np.float32), pattern)
+        for vertex, normal, look in zip(vertices.astype(float), normals, looks, strict=True):
+            pixel = reference.seen_pixel(CAMERA, vertex, normal)
+            if pixel is not None:
+                image.values[pixel] = exposure * look[image.channel[pixel]]
+        term.observe(image, surface)
+        costs.append(float(term.cost(surface)[0]))
+    assert (costs[1] > costs[0] + 100) == remains
+    assert remains or costs[1] == pytest.approx(costs[0], abs=1.0)
