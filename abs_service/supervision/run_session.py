@@ -150,7 +150,7 @@ class RunSession:
     def _renew(self, directory: Path, components: Sequence[str]) -> None:
         """Starts some processes again with another configuration; the others go on, capture with what it publishes."""
         self._directory = directory
-        if components and "capture" not in components:
+        if "capture" not in components:
             self._supervisor.children["capture"].process.wake()
         for component in components:
             self._supervisor.renew(component)

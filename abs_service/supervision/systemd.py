@@ -42,7 +42,7 @@ class Notifier:
             self._ready = True
             self._send("READY=1")
         if self._ready:
-            self._feed(counts, view.now_ns)
+            self._feed(counts, view)
         elif view.now_ns - self._extended_ns >= EXTENSION_NS // 4:
             self._extended_ns = view.now_ns
             self._send(f"EXTEND_TIMEOUT_USEC={EXTENSION_NS // 1000}")
@@ -51,11 +51,12 @@ class Notifier:
         """Says that the service ends in order."""
         self._send("STOPPING=1")
 
-    def _feed(self, counts: Mapping[str, int], now_ns: int) -> None:
-        due = self._watchdog_ns and now_ns - self._proven_ns >= self._watchdog_ns // 4
-        # Each tracker by itself: one that works does not hide another one that does not.
-        if due and all(count != self._proven.get(name) for name, count in counts.items()):
-            self._proven, self._proven_ns = counts, now_ns
+    def _feed(self, counts: Mapping[str, int], view: RigView) -> None:
+        due = self._watchdog_ns and view.now_ns - self._proven_ns >= self._watchdog_ns // 4
+        # Each tracker by itself: one that works does not hide another one that does not. One that was started again for
+        # another configuration may compile kernels for longer than systemd waits; the supervisor limits that.
+        if due and all(view.live.prepares(name) or count != self._proven.get(name) for name, count in counts.items()):
+            self._proven, self._proven_ns = counts, view.now_ns
             self._send("WATCHDOG=1")
 
     def _tell(self, view: RigView) -> None:

@@ -112,6 +112,19 @@ def test_one_silent_tracker_is_not_hidden_by_another(start):
         assert manager.after(1) == []
 
 
+def test_a_tracker_that_compiles_kernels_again_is_alive(start):
+    manager = start("a", "b")
+    manager.estimates("a")
+    manager.estimates("b")
+    assert manager.after(0) == ["READY=1", "WATCHDOG=1"]
+    manager.says("track/b", labels={"phase": "preparing", "kernels": "3 of 31"})
+    fed = []
+    for second in range(1, 91):
+        manager.estimates("a")
+        fed += [second for message in manager.after(1) if message == "WATCHDOG=1"]
+    assert fed == list(range(10, 91, 10))
+
+
 def test_a_rig_without_trackers_lives_by_its_images(start):
     manager = start()
     assert "READY=1" not in manager.after(0)
