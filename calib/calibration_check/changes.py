@@ -1,6 +1,7 @@
 """Relative motion of pairs of sensors since the calibration, with its significance."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -100,20 +101,34 @@ def _change(stored: Stored, views: Views, pair: tuple[str, str]) -> PairChange:
 
 def _consistent(stored: Stored, views: Views, pair: tuple[str, str]) -> tuple[Solution, list[Contradiction]]:
     """Solution of the shots that agree with each other, and the others; these may be what keeps all from a minimum."""
-    unsolved: NotSolvedError | None = None
     try:
         solution = solve(stored, views, pair[1:])
     except NotSolvedError as error:
-        if error.unfinished is None:
-            raise
-        unsolved, solution = error, Solution(formulation(stored, views, pair[1:]).task, error.unfinished)
+        for doubtful in _without_minimum(stored, views, pair, error):
+            if found := _of_the_rest(stored, views, pair, contradictions(doubtful)):
+                return found
+        raise
     contradicting = contradictions(solution)
-    rest = {*solution.task.shots} - {one.shot for one in contradicting}
-    if contradicting and len(rest) >= MIN_SHOTS:
-        return solve(stored, views.of(pair, rest), pair[1:]), contradicting
-    if unsolved is not None:
-        raise unsolved
-    return solution, contradicting
+    return _of_the_rest(stored, views, pair, contradicting) or (solution, contradicting)
+
+
+def _of_the_rest(
+    stored: Stored, views: Views, pair: tuple[str, str], contradicting: list[Contradiction]
+) -> tuple[Solution, list[Contradiction]] | None:
+    """Solution of all but contradicting shots; None if none contradict, or too few are left."""
+    shots = views.shots
+    rest = (shots[pair[0]] & shots[pair[1]]) - {one.shot for one in contradicting}
+    if not contradicting or len(rest) < MIN_SHOTS:
+        return None
+    return solve(stored, views.of(pair, rest), pair[1:]), contradicting
+
+
+def _without_minimum(stored: Stored, views: Views, pair: tuple[str, str], error: NotSolvedError) -> Iterator[Solution]:
+    """Solutions that tell contradicting shots where all together have no minimum: unfinished, then of fixed sensors."""
+    if error.unfinished is not None:
+        yield Solution(formulation(stored, views, pair[1:]).task, error.unfinished)
+    with suppress(NotSolvedError):
+        yield solve(stored, views, ())
 
 
 def _relative_covariance(stored: Stored, first: str, second: str) -> NDArray[np.float64]:
