@@ -31,7 +31,8 @@ def tracks(listener, name, boot_id, count=10):
 def test_one_tracker_starts_anew_and_the_other_one_keeps_its_object(endpoint, launch, tmp_path):
     rig_file = tmp_path / "pair.toml"
     example = EXAMPLE.read_text("utf-8").replace('"../../recordings"', '"takes"\nminimum_free_bytes = 0')
-    text = f'{example}\n[bus]\nendpoint = "{endpoint}"\n'
+    # A machine that does much else needs longer to take the end of a recording to disk.
+    text = f'{example}\n[bus]\nendpoint = "{endpoint}"\n\n[run]\nstop_timeout_s = 20.0\n'
     rig_file.write_text(text, encoding="utf-8")
     process = launch("run", rig_file, "--json")
     with RigListener(endpoint, rig="pair") as listener:
@@ -54,7 +55,7 @@ def test_one_tracker_starts_anew_and_the_other_one_keeps_its_object(endpoint, la
         wait_until(lambda: len(states(listener, "right")) > len(after) + 30, PATIENCE_S, "estimates of the other one")
         configs = [one.sample.payload for one in listener.received if one.sample.topic == keys.CONFIG]
     process.send_signal(signal.SIGTERM)
-    assert process.wait(10) == 0
+    assert process.wait(30) == 0
     assert {state.budget_ms for state in states(listener, "left")} == {left.budget_ms, 29.0}
     kept = [state for state in states(listener, "right") if state.header.seq > right.header.seq]
     assert {(state.mesh_version, state.header.boot_id) for state in kept} == {

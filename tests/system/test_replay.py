@@ -66,10 +66,12 @@ def test_at_speed_1_the_estimates_come_at_the_pace_of_the_recording_until_it_end
         out, complaints = process.communicate(timeout=60)
         assert process.returncode == 0, complaints
         print(f"replay at speed 1 took {time.monotonic() - begin_s:.1f} s, start included")
-        stamps_ns = np.array([state.header.t_host_ns for _, state in listener.states()])
+        arrivals_ns, states = zip(*listener.states(), strict=True)
     estimates = estimates_of(out)
-    rate_hz = (len(stamps_ns) - 1) / np.ptp(stamps_ns) * 1e9
-    print(f"{len(estimates)} estimates at {rate_hz:.1f} Hz, error {mean_error_mm(estimates):.2f} mm")
-    assert 24 < rate_hz < 31
+    # Not their rate: a machine that does much else may skip some.
+    pace = np.ptp([state.header.t_host_ns for state in states]) / np.ptp(arrivals_ns)
+    print(f"{len(estimates)} estimates at {pace:.2f} of the recording's pace, error {mean_error_mm(estimates):.2f} mm")
+    assert 0.8 < pace < 1.25
+    assert len(states) > 30
     assert mean_error_mm(estimates) < 1.5 * mean_error_mm(live)
     assert "Traceback" not in complaints
