@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from abs_service.pairing.images import ChannelImage, Image
 from abs_service.tracker.models.base import SparseJacobian, Surface
-from abs_service.tracker.synthesis.base import Synthesizer
+from abs_service.tracker.synthesis.base import Synthesis, Synthesizer
 from abs_service.tracker.synthesis.window import NOTHING_HAS, Bordered, corner, limits
 from abs_service.tracker.terms.base import Bounds, SensorFit, facing, summarize
 from abs_service.tracker.terms.gradients import channel_gradients
@@ -83,10 +83,9 @@ class ChannelTerm:
         self._texture = texture.reshape(-1, 4)
         self._view.look(predicted)
         seen = self._view.synthesize(predicted)
-        texels = self._texture[seen.pixel[0]]
-        self._illumination.adapt(texels[:, VALUE], texels[:, CHANNEL].astype(int), seen.attributes[0].T)
+        self._illumination.adapt(self._by_channel(seen), seen.attributes[0].T)
         self._widening = NO_WIDENING
-        inverse = self._residuals(predicted)[1]
+        inverse = self._residuals(seen, predicted)[1]
         with np.errstate(divide="ignore"):
             deviation = (1 / inverse)[:, None]
         self._widening = self._registration_noise.widening(self._view, predicted, deviation)
@@ -117,18 +116,19 @@ class ChannelTerm:
 
         The derivative of the shading is neglected: it is small compared with that of the texture.
         """
-        residual, inverse, normalizer = self._residuals(surface)
+        seen = self._view.synthesize(surface)
+        residual, inverse, normalizer = self._residuals(seen, surface)
         use = 0.5 * residual**2 + normalizer < self._bounds.outlier
         vertices = self._view.spread(surface, surface.vertices[0].T)
-        gradients = self._gradients(surface)[use] * inverse[use, None]
+        gradients = self._gradients(seen, surface)[use] * inverse[use, None]
         rows = (gradients[:, None] @ self._view.camera.projection_jacobian(vertices[use]))[:, 0]
         samples = self._view.follow(surface, sparse_jacobian)
         return PointLinearization(residual[use], rows, np.flatnonzero(use), samples, vertices)
 
     def fit(self, surface: Surface) -> SensorFit:
         """Agreement of the sensor with a population of one."""
-        residual = self._residuals(surface)[0]
         seen = self._view.synthesize(surface)
+        residual = self._residuals(seen, surface)[0]
         pixel, known = seen.pixel[0], np.isfinite(seen.attributes[0]).all(axis=0)
         hidden = np.isinf(self._texture[pixel, VALUE])
         sight = Sight.of(pixel, facing(self._view, surface), np.zeros_like(hidden), hidden, ~known)
@@ -139,18 +139,23 @@ class ChannelTerm:
         """Zero: brightness carries no distance."""
         return np.zeros((2, 1))
 
-    def _gradients(self, surface: Surface) -> NDArray[np.float64]:
+    def _by_channel(self, seen: Synthesis) -> NDArray[np.float64]:
+        """What is measured at each sample (m, channels), NaN in the channels that its pixel does not show."""
+        texels = self._texture[seen.pixel[0]]
+        values = np.full(seen.attributes[0].T.shape, np.nan)
+        values[np.arange(len(texels)), texels[:, CHANNEL].astype(int)] = texels[:, VALUE]
+        return values
+
+    def _gradients(self, seen: Synthesis, surface: Surface) -> NDArray[np.float64]:
         """Image gradient of each sample in its pixel's channel, to the right and down (m, 2) [1/px].
 
         A mosaic shows each channel in every other pixel, too far apart to measure the slope of a fine texture. So it is
         the surface's own where that is known, which is also exactly how a residual changes within a pixel.
         """
-        seen = self._view.synthesize(surface)
         channel = self._texture[seen.pixel[0], CHANNEL].astype(int)
-        own = self._view.attribute_gradients(surface)
-        along = (replace(seen, attributes=own[..., axis].T[None]) for axis in (0, 1))
-        shining = [self._illumination.shine(slope, surface, self._view).attributes[0] for slope in along]
-        gradients = np.stack(shining, axis=-1)[channel, np.arange(len(channel))].astype(np.float64)
+        own = replace(seen, attributes=self._view.attribute_gradients(surface).T)  # along both axes, as two members
+        shining = self._illumination.shine(own, surface, self._view).attributes
+        gradients = shining[:, channel, np.arange(len(channel))].T.astype(np.float64)
         unknown = np.isnan(gradients).any(axis=1)
         samples = self._view.spread(surface, surface.vertices[0].T.astype(np.float64))[unknown]
         gradients[unknown] = channel_gradients(
@@ -158,15 +163,17 @@ class ChannelTerm:
         )
         return gradients
 
-    def _residuals(self, surface: Surface) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    def _residuals(
+        self, seen: Synthesis, surface: Surface
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Normalised residual, infinite without a measurement, inverse deviation, log of the normaliser, each (n,)."""
-        seen = self._illumination.shine(self._view.synthesize(surface), surface, self._view)
+        shining = self._illumination.shine(seen, surface, self._view)
         texels = self._texture[seen.pixel[0]].astype(np.float64)
         each, channel = np.arange(len(texels)), texels[:, CHANNEL].astype(int)
         widening = self._widening
         # One widening may stand for all samples, or for all channels.
         of = each % len(widening.factor), channel % widening.factor.shape[1]
         inverse = texels[:, INVERSE] / widening.factor[of]
-        residual = (texels[:, VALUE] - seen.attributes[0][channel, each]) * inverse
+        residual = (texels[:, VALUE] - shining.attributes[0][channel, each]) * inverse
         measured = (seen.pixel[0] > 0) & np.isfinite(residual)
         return np.where(measured, residual, np.inf), inverse, texels[:, NORMALIZER] + widening.log[of]

@@ -1,7 +1,5 @@
 """Term of a colour sensor: measured colours compared with those of the vertices."""
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,7 +10,7 @@ from abs_service.tracker.synthesis.window import NOTHING_HAS, Bordered, Window
 from abs_service.tracker.terms.base import Bounds, SensorFit, facing, summarize
 from abs_service.tracker.terms.gradients import color_rows
 from abs_service.tracker.terms.linearization import PointLinearization
-from abs_service.tracker.terms.photometric.exposure import gains
+from abs_service.tracker.terms.photometric.illumination import Exposed
 from abs_service.tracker.terms.photometric.shadow import Shadow
 from abs_service.tracker.terms.photometric.texture_registration_noise import (
     NO_REGISTRATION_NOISE,
@@ -50,7 +48,7 @@ class ColorTerm:
         self._registration_noise = registration_noise
         self._inverse = np.zeros((0, 3), np.float32)
         self._normalizer = np.zeros(0, np.float32)
-        self._gains = np.ones((3, 1), np.float32)
+        self._illumination = Exposed()
         self._texture = np.zeros((0, 3), np.float32)
         self._image: NDArray[np.float32] | NDArray[np.uint8] = np.zeros((1, 1, 3), np.float32)
         self._levels = np.zeros((0, 0, 3), np.uint8)
@@ -67,7 +65,7 @@ class ColorTerm:
         self._texture = texture.reshape(-1, 3)
         self._view.look(predicted)
         seen = self._view.synthesize(predicted)
-        self._gains = gains(self._texture[seen.pixel[0]], seen.attributes[0].T)[:, None]
+        self._illumination.adapt(self._texture[seen.pixel[0]], seen.attributes[0].T)
         widening = self._registration_noise.widening(self._view, predicted, self._sigma)
         self._inverse = np.repeat(
             np.float32(1) / (self._sigma * widening.factor), 3 // widening.factor.shape[1], axis=1
@@ -104,8 +102,7 @@ class ColorTerm:
 
     def _synthesize(self, surface: Surface) -> Synthesis:
         """The colours of a population as this frame's exposure shows them."""
-        seen = self._view.synthesize(surface)
-        return replace(seen, attributes=seen.attributes * self._gains)
+        return self._illumination.shine(self._view.synthesize(surface), surface, self._view)
 
     def _cost_of(self, seen: Synthesis, surface: Surface) -> NDArray[np.float64]:
         """Cost (population,) of what is synthesised."""

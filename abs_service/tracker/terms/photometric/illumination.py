@@ -15,16 +15,8 @@ from calib.jit import kernel
 class Illumination(Protocol):
     """Converts reflectivities into image values."""
 
-    def adapt(
-        self, measured: NDArray[np.floating], channel: NDArray[np.integer], expected: NDArray[np.floating]
-    ) -> None:
-        """Follows the exposure of an image.
-
-        Args:
-            measured: value (m,) at each predicted sample; NaN where unknown.
-            channel: of each sample (m,).
-            expected: what the samples have in each channel (m, channels); NaN where unknown.
-        """
+    def adapt(self, measured: NDArray[np.floating], expected: NDArray[np.floating]) -> None:
+        """Follows the exposure of an image; see `gains` for what is measured and expected."""
         ...
 
     def shine(self, seen: Synthesis, surface: Surface, view: View) -> Synthesis:
@@ -35,9 +27,7 @@ class Illumination(Protocol):
 class Passive:
     """The light of the room: a vertex looks the same wherever it is."""
 
-    def adapt(
-        self, measured: NDArray[np.floating], channel: NDArray[np.integer], expected: NDArray[np.floating]
-    ) -> None:
+    def adapt(self, measured: NDArray[np.floating], expected: NDArray[np.floating]) -> None:
         """Does nothing."""
 
     def shine(self, seen: Synthesis, surface: Surface, view: View) -> Synthesis:
@@ -51,13 +41,9 @@ class Exposed:
     def __init__(self) -> None:
         self._gains = np.ones(1, np.float32)
 
-    def adapt(
-        self, measured: NDArray[np.floating], channel: NDArray[np.integer], expected: NDArray[np.floating]
-    ) -> None:
+    def adapt(self, measured: NDArray[np.floating], expected: NDArray[np.floating]) -> None:
         """Takes the gains of an image."""
-        each = np.full(expected.shape, np.nan)
-        each[np.arange(len(channel)), channel] = measured
-        self._gains = gains(each, expected)
+        self._gains = gains(measured, expected)
 
     def shine(self, seen: Synthesis, surface: Surface, view: View) -> Synthesis:
         """The synthesis with its attributes as the image is exposed."""
@@ -74,9 +60,7 @@ class Active:
     def __init__(self, center: NDArray[np.float64]):
         self._center = center.astype(np.float32)
 
-    def adapt(
-        self, measured: NDArray[np.floating], channel: NDArray[np.integer], expected: NDArray[np.floating]
-    ) -> None:
+    def adapt(self, measured: NDArray[np.floating], expected: NDArray[np.floating]) -> None:
         """Does nothing: the lamp and the sensor's exposure are one, and known."""
 
     def shine(self, seen: Synthesis, surface: Surface, view: View) -> Synthesis:
