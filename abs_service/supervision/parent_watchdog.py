@@ -47,11 +47,13 @@ def _load(module: str) -> None:
     import_module(module)
 
 
-def wait_until_needed() -> None:
-    """Returns when the supervisor needs this process: at once, unless it was started as one that waits."""
-    if os.environ.pop(STANDBY, ""):
-        _needed.wait()
-        _needed.clear()
+def wait_until_needed() -> bool:
+    """True when the supervisor needs this process that was started to wait; False, at once, if it was not."""
+    if not os.environ.pop(STANDBY, ""):
+        return False
+    _needed.wait()
+    _needed.clear()
+    return True
 
 
 def was_woken() -> bool:

@@ -20,7 +20,8 @@ _log = logging.getLogger(__name__)
 REINITIALIZE = Reinitialize.DESCRIPTOR.full_name
 RECORD = Record.DESCRIPTOR.full_name
 RELOAD = Reload.DESCRIPTOR.full_name
-_SCHEMAS: Mapping[str, type[Reinitialize | Record | Reload]] = {
+Command = Reinitialize | Record | Reload
+_SCHEMAS: Mapping[str, type[Command]] = {
     REINITIALIZE: Reinitialize,
     RECORD: Record,
     RELOAD: Reload,
@@ -141,20 +142,21 @@ def reinitialize(
         command.seed.SetInParent()  # a pixel (0, 0) is one, too
     for column, row in choice.polygon:
         command.polygon.add(column=column, row=row)
-    answers = bus.command(keys.reinitialize(tracker), REINITIALIZE, command.SerializeToString(), timeout_s)
-    return CommandAnswer.FromString(answers[0].payload) if answers else None
+    return _ask(bus, keys.reinitialize(tracker), command, timeout_s)
 
 
 def record(bus: Bus, headers: HeaderFactory, recording: bool, timeout_s: float) -> CommandAnswer | None:
     """Asks the recorder to record, or to wait; returns its answer, None if there is none."""
-    command = Record(header=headers.now(0), recording=recording).SerializeToString()
-    answers = bus.command(keys.RECORD, RECORD, command, timeout_s)
-    return CommandAnswer.FromString(answers[0].payload) if answers else None
+    return _ask(bus, keys.RECORD, Record(header=headers.now(0), recording=recording), timeout_s)
 
 
 def reload(bus: Bus, headers: HeaderFactory, timeout_s: float) -> CommandAnswer | None:
     """Asks a rig to read its file again; returns its answer, None if there is none."""
-    answers = bus.command(keys.RELOAD, RELOAD, Reload(header=headers.now(0)).SerializeToString(), timeout_s)
+    return _ask(bus, keys.RELOAD, Reload(header=headers.now(0)), timeout_s)
+
+
+def _ask(bus: Bus, topic: str, command: Command, timeout_s: float) -> CommandAnswer | None:
+    answers = bus.command(topic, command.DESCRIPTOR.full_name, command.SerializeToString(), timeout_s)
     return CommandAnswer.FromString(answers[0].payload) if answers else None
 
 

@@ -66,9 +66,9 @@ class RigListener:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def states(self) -> list[tuple[int, DeformationState]]:
-        """Every estimate so far and when it arrived [ns]."""
-        return [(one.t_ns, DeformationState.FromString(one.sample.payload)) for one in self._of("sheet/state")]
+    def states(self, tracker: str = "sheet") -> list[tuple[int, DeformationState]]:
+        """Every estimate of a tracker so far and when it arrived [ns]."""
+        return [(one.t_ns, DeformationState.FromString(one.sample.payload)) for one in self._of(f"{tracker}/state")]
 
     def frames(self, topic: str) -> list[FrameInfo]:
         """The descriptions of all images of a topic."""

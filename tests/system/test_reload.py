@@ -3,22 +3,16 @@
 import signal
 
 import pytest
-from absmsg.v1.deformation_state_pb2 import DeformationState
 from absmsg.v1.sensor_model_pb2 import Config
 
 from abs_service.bus import keys
 from tests.system.running import START_S, TRACKING, RigListener, abs_service, wait_until
-from tests.system.test_two_trackers import EXAMPLE
+from tests.system.test_two_trackers import EXAMPLE, states
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
 
 #: Time that the trackers have for what is asked of them [s].
 PATIENCE_S = 60.0
-
-
-def states(listener, name):
-    topic = keys.state(name)
-    return [DeformationState.FromString(one.sample.payload) for one in listener.received if one.sample.topic == topic]
 
 
 def tracks(listener, name, boot_id, count=10):

@@ -8,9 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from absmsg.v1.deformation_state_pb2 import DeformationState
 
-from abs_service.bus import keys
 from tests.system.running import START_S, TRACKING, RigListener, wait_until
 
 pytestmark = pytest.mark.slow
@@ -23,8 +21,7 @@ WATCHED_S = 15.0
 
 def states(listener, name):
     """Every estimate of one tracker so far."""
-    topic = keys.state(name)
-    return [DeformationState.FromString(one.sample.payload) for one in listener.received if one.sample.topic == topic]
+    return [state for _, state in listener.states(name)]
 
 
 def both_track(listener):

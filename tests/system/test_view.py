@@ -83,11 +83,6 @@ def _box(element) -> dict[str, float]:
     return wait_until(element.bounding_box, PATIENCE_S, "a place of the element")
 
 
-def _press(element) -> None:
-    """Presses a control once it stands still: controls move while the answers above them come and go."""
-    element.click()
-
-
 def _picture(page) -> bytes:
     return page.locator("canvas").first.screenshot()
 
@@ -100,7 +95,7 @@ def _chosen_by_a_click(page, listener) -> int:
 def _chosen(page, listener, button, hint, gesture) -> int:
     """Version of the mesh that is made after a gesture in the scene."""
     version = listener.states()[-1][1].mesh_version
-    _press(page.get_by_role("button", name=button))
+    page.get_by_role("button", name=button).click()
     _says(page, hint)
     gesture()
     wait_until(lambda: listener.states()[-1][1].mesh_version > version, PATIENCE_S, "a mesh of what was chosen")
@@ -147,13 +142,13 @@ def test_the_page_shows_a_mesh_that_moves_acts_and_connects_again(run, rig_file,
     page, opened_s = _opened(browser, port)
     print(f"the page opened after {opened_s:.1f} s")
     _says(page, "Tracking")
-    _press(page.get_by_role("checkbox").nth(1))  # without the measured points, only the mesh moves
+    page.get_by_role("checkbox").nth(1).click()  # without the measured points, only the mesh moves
     time.sleep(1.0)
     before = _picture(page)
     wait_until(lambda: _picture(page) != before, PATIENCE_S, "motion of the mesh")
 
     version = listener.states()[-1][1].mesh_version
-    _press(page.get_by_role("button", name="Reinitialise"))
+    page.get_by_role("button", name="Reinitialise").click()
     wait_until(lambda: listener.states()[-1][1].mesh_version > version, PATIENCE_S, "a new mesh")
     _says(page, "New mesh, version")
     version = _chosen_by_a_click(page, listener)
@@ -162,13 +157,13 @@ def test_the_page_shows_a_mesh_that_moves_acts_and_connects_again(run, rig_file,
     assert f'type = "seed"\npixel = [{column}, {row}]\n' in done.stdout
     wait_until(lambda: listener.states()[-1][1].mesh_version > version, PATIENCE_S, "a new mesh from the command line")
 
-    _press(page.get_by_role("button", name="Start recording"))
+    page.get_by_role("button", name="Start recording").click()
     _says(page, "it records as long as it runs")
-    _press(page.get_by_role("tab", name="Images"))
+    page.get_by_role("tab", name="Images").click()
     page.get_by_text("Residual", exact=True).wait_for()
-    _press(page.locator("input[type=checkbox]:visible").first)
+    page.locator("input[type=checkbox]:visible").first.click()
     _says(page, "residual up to")
-    _press(page.get_by_role("tab", name="Plots"))
+    page.get_by_role("tab", name="Plots").click()
     _says(page, "components that move most")
 
     assert not page.get_by_text("lost its connection").first.is_visible()
@@ -214,11 +209,11 @@ def test_a_recording_is_played_to_its_end_stepped_back_and_played_again(tmp_path
     _says(page, "Tracking")
     page.get_by_role("button", name="Play", exact=True).wait_for()  # it is over, and says so
     for status in ("Object lost", "Tracking with doubts"):
-        _press(page.get_by_role("button", name="Back"))
+        page.get_by_role("button", name="Back").click()
         _says(page, status)
-    _press(page.get_by_role("tab", name="Images"))
+    page.get_by_role("tab", name="Images").click()
     _says(page, "tof/depth")
-    _press(page.get_by_role("button", name="Play", exact=True))
+    page.get_by_role("button", name="Play", exact=True).click()
     page.get_by_text("Tracking with doubts").first.wait_for(state="hidden")
     assert page.get_by_role("button", name="Reinitialise").count() == 0
     server.send_signal(signal.SIGTERM)
@@ -235,7 +230,7 @@ def test_on_a_phone_the_panel_leaves_half_of_the_scene_and_its_controls_are_in_r
     for box in (_box(page.locator(".abs-status").first), _box(play)):
         assert 0 <= box["x"] <= 390 - box["width"]
         assert 844 / 3 <= box["y"] <= 844 - box["height"]
-    _press(page.get_by_role("button", name="Back"))
+    page.get_by_role("button", name="Back").tap()
     _says(page, "Object lost")
-    _press(page.get_by_role("tab", name="Images"))
+    page.get_by_role("tab", name="Images").tap()
     _says(page, "tof/depth")

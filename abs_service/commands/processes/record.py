@@ -46,9 +46,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Records until SIGTERM or SIGINT."""
-    rig_process.load_config(arguments)  # with all modules that it needs, while there is time
-    parent_watchdog.wait_until_needed()
     rig = rig_process.load_config(arguments)
+    if parent_watchdog.wait_until_needed():
+        rig = rig_process.load_config(arguments)  # it may have changed in the meantime
     settings = _settings(rig)
     stop = rig_process.stop_on_signals()
     clock = WallClock()

@@ -140,7 +140,7 @@ class ChannelTerm:
         return np.zeros((2, 1))
 
     def _by_channel(self, seen: Synthesis) -> NDArray[np.float64]:
-        """What is measured at each sample (m, channels), NaN in the channels that its pixel does not show."""
+        """Measured values at each sample (m, channels), NaN in the channels that its pixel does not show."""
         texels = self._texture[seen.pixel[0]]
         values = np.full(seen.attributes[0].T.shape, np.nan)
         values[np.arange(len(texels)), texels[:, CHANNEL].astype(int)] = texels[:, VALUE]
