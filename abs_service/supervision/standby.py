@@ -32,12 +32,15 @@ class Standby:
         self._timer = threading.Timer(0.0, str)
 
     def __call__(self, component: str, arguments: Sequence[str]) -> Process:
-        """Starts a process of the component, or wakes the one that waits."""
+        """Starts a process of the component, or wakes the one that waits, if it is loaded."""
         if component != self._component:
             return self._spawn(component, arguments)
         with self._lock:
             self._timer.cancel()
-            ready = [process for process in self._waiting if process.poll() is None]
+            ready = [process for process in self._waiting if _is_loaded(process)]
+            for process in self._waiting:
+                if process not in ready:
+                    process.kill()
             self._waiting = []
             self._timer = threading.Timer(self._delay_s, self._prepare_one, (component, arguments))
             self._timer.daemon = True
@@ -59,3 +62,8 @@ class Standby:
         with self._lock:
             if component == self._component and not self._waiting:
                 self._waiting.append(self._prepare(component, arguments))
+
+
+def _is_loaded(process: Process) -> bool:
+    """True for one that runs and waits; one that still loads, at the lowest priority, may take very long."""
+    return process.poll() is None and not any(times.runnable for times in process.threads().values())

@@ -1,6 +1,7 @@
 """A rig reads its file again while it runs: one tracker starts anew, the other one keeps its object."""
 
 import signal
+import subprocess
 
 import pytest
 from absmsg.v1.sensor_model_pb2 import Config
@@ -28,7 +29,7 @@ def test_one_tracker_starts_anew_and_the_other_one_keeps_its_object(endpoint, la
     # A machine that does much else needs longer to take the end of a recording to disk.
     text = f'{example}\n[bus]\nendpoint = "{endpoint}"\n\n[run]\nstop_timeout_s = 20.0\n'
     rig_file.write_text(text, encoding="utf-8")
-    process = launch("run", rig_file, "--json")
+    process = launch("run", rig_file, "--json", stdout=subprocess.DEVNULL)
     with RigListener(endpoint, rig="pair") as listener:
         wait_until(lambda: all(tracks(listener, name, "") for name in ("left", "right")), START_S, "TRACKING of both")
         left, right = (states(listener, name)[-1] for name in ("left", "right"))
@@ -49,7 +50,8 @@ def test_one_tracker_starts_anew_and_the_other_one_keeps_its_object(endpoint, la
         wait_until(lambda: len(states(listener, "right")) > len(after) + 30, PATIENCE_S, "estimates of the other one")
         configs = [one.sample.payload for one in listener.received if one.sample.topic == keys.CONFIG]
     process.send_signal(signal.SIGTERM)
-    assert process.wait(30) == 0
+    _, said = process.communicate(timeout=30)
+    assert process.returncode == 0, said
     assert {state.budget_ms for state in states(listener, "left")} == {left.budget_ms, 29.0}
     kept = [state for state in states(listener, "right") if state.header.seq > right.header.seq]
     assert {(state.mesh_version, state.header.boot_id) for state in kept} == {

@@ -7,7 +7,7 @@ import threading
 import pytest
 
 from abs_service.supervision import parent_watchdog
-from abs_service.supervision.child_process import ChildProcess
+from abs_service.supervision.child_process import ChildProcess, ThreadTimes
 from abs_service.supervision.standby import Standby
 from tests.abs_service.supervision.idle_process import Idle
 from tests.waiting import eventually
@@ -48,6 +48,15 @@ def test_other_components_start_as_ever(standby, started):
     assert type(standby("capture", ())) is Idle
     assert type(standby("capture", ())) is Idle
     assert len(started) == 2
+
+
+def test_a_process_that_still_loads_is_replaced_by_one_that_loads_faster(standby, started, monkeypatch):
+    standby("record", ())
+    assert eventually(lambda: len(started) == 2)
+    monkeypatch.setattr(started[1], "threads", lambda: {1: ThreadTimes(), 2: ThreadTimes(runnable=True)})
+    assert type(standby("record", ())) is Idle
+    assert not started[1].woken
+    assert started[1].poll() is not None
 
 
 def test_a_waiting_process_that_has_ended_is_not_woken(standby, started):
