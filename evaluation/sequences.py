@@ -15,11 +15,11 @@ from abs_service.tracker.estimate import Estimate, Status
 from abs_service.tracker.models import nurbs
 from abs_service.tracker.models.base import DeformationModel
 from abs_service.tracker.objectives import euclidean, likelihood
+from abs_service.tracking.log.truth import Errors, TruthComparison
 from abs_service.tracking.observer import Observer
 from abs_service.tracking.plan import ModelSettings, Plan
 from abs_service.tracking.session import TrackingSession
 from abs_service.tracking.tracked_sets import track_sets
-from abs_service.tracking.truth import Errors, TruthComparison
 from calib.noise.base import DepthNoise, pixels_where
 from calib.rig import Noise, Rig
 from drivers.contract.frame import FrameSet

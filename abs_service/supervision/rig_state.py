@@ -11,7 +11,7 @@ from google.protobuf.message import DecodeError
 
 from abs_service.bus import keys
 from abs_service.bus.contract import Sample
-from abs_service.tracking.tracker_log import EstimateReport, TrackerLog, points
+from abs_service.tracking.log.tracker_log import EstimateReport, TrackerLog, points
 
 #: The topics that `RigState.take` understands.
 PATTERNS = ("health/**", keys.state("*"), keys.mesh("*"), keys.topology("*"), keys.truth("*"))

@@ -22,6 +22,8 @@ from abs_client.wake import Wake
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 #: By when a rig must answer that is connected to, and a query [s].
 CONNECT_S, QUERY_S = 3.0, 2.0
+#: Time between the tries to connect again to a rig that is gone: at first, and at most [ms].
+RETRY_MS = 250, 1000
 #: Messages of one topic that may wait for their thread; the oldest goes first.
 WAITING = 4
 #: By when receiving threads have ended after their session has [s].
@@ -197,7 +199,12 @@ def _settings(endpoint: str, tls: Tls | None) -> dict[str, object]:
     link = {"tls": {"root_ca_certificate": str(tls.authority), "enable_mtls": True, **own}} if tls else {}
     return {
         "mode": "client",
-        "connect": {"endpoints": [endpoint], "timeout_ms": round(CONNECT_S * 1000), "exit_on_failure": True},
+        "connect": {
+            "endpoints": [endpoint],
+            "timeout_ms": round(CONNECT_S * 1000),
+            "exit_on_failure": True,
+            "retry": {"period_init_ms": RETRY_MS[0], "period_max_ms": RETRY_MS[1]},
+        },
         "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}, "delay": 0},
         "transport": {"link": link, "shared_memory": {"enabled": True}},
     }

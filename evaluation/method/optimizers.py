@@ -20,9 +20,9 @@ import numpy as np
 from abs_service.report.content import Cell, Column, Section, Table
 from abs_service.tracker.estimate import Estimate
 from abs_service.tracker.optimizers import cma, cma_es, hybrid
+from abs_service.tracking.log.truth import Errors
 from abs_service.tracking.plan import OptimizerSettings
 from abs_service.tracking.session import TrackingSession
-from abs_service.tracking.truth import Errors
 from drivers.simulated.simulation import Simulation
 from evaluation.experiment import Context, Findings, Goal, at_most
 from evaluation.sequences import TruthEvaluator, demo_plan, demo_rig, expose, simulate

@@ -10,7 +10,7 @@ from abs_client import Rig, Status, subscribe
 from evaluation.service.live.proc import children
 from tests.system.running import START_S, kill, wait_until
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.realtime]
 
 
 def until(states, wanted, timeout_s=START_S):

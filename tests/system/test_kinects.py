@@ -17,6 +17,7 @@ CORES = 4
 
 pytestmark = [
     pytest.mark.slow,
+    pytest.mark.realtime,
     pytest.mark.skipif((os.cpu_count() or 1) < CORES, reason=f"three cameras in real time need {CORES} cores"),
     pytest.mark.skipif(bool(testbed.why_not()), reason=testbed.why_not() or "never"),
 ]

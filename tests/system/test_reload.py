@@ -10,7 +10,7 @@ from abs_service.bus import keys
 from tests.system.running import START_S, TRACKING, RigListener, abs_service, wait_until
 from tests.system.test_two_trackers import EXAMPLE, states
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
+pytestmark = [pytest.mark.slow, pytest.mark.realtime, pytest.mark.timeout(600)]
 
 #: Time that the trackers have for what is asked of them [s].
 PATIENCE_S = 60.0

@@ -10,7 +10,7 @@ from mcap.reader import make_reader
 
 from tests.system.running import RigListener, abs_service, wait_until
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.realtime]
 
 
 @pytest.fixture

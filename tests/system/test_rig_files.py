@@ -12,10 +12,10 @@ import pytest
 from abs_service import config
 from drivers.replay import Recording
 from drivers.simulated.address import parse
-from tests.abs_service.commands.simulated_recording import write_take
+from tests.abs_service.commands.recordings.simulated_recording import write_take
 from tests.system.running import START_S, abs_service, wait_until
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.realtime]
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "rigs"
 #: Those that need recordings or images which are not in the repository.

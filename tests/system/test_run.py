@@ -14,7 +14,7 @@ from abs_service import config
 from evaluation.service.live.proc import children, is_running
 from tests.system.running import TRACKING, abs_service, wait_until
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.realtime]
 
 TOPICS = {
     *(f"/tof/{stream}/{part}" for stream in ("depth", "amplitude") for part in ("image", "info")),

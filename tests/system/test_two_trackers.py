@@ -11,7 +11,7 @@ import pytest
 
 from tests.system.running import START_S, TRACKING, RigListener, wait_until
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.realtime]
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "rigs" / "two_trackers.toml"
 NAMES = ("left", "right")

@@ -27,11 +27,11 @@ from abs_service.pairing.common_clock import CommonClock
 from abs_service.pairing.frame_set_queue import FrameSetQueue
 from abs_service.supervision import gc_tuning
 from abs_service.supervision.exit_codes import Exit
-from abs_service.tracking.estimate_publisher import EstimatePublisher
-from abs_service.tracking.live_tracker import LiveTracker
+from abs_service.tracking.live.estimate_publisher import EstimatePublisher
+from abs_service.tracking.live.live_tracker import LiveTracker
+from abs_service.tracking.live.tracker_health import TrackerHealth
 from abs_service.tracking.plan import Plan
 from abs_service.tracking.session import TrackingSession, streams
-from abs_service.tracking.tracker_health import TrackerHealth
 from abs_service.tracking.warmup.board import warm_up
 from abs_service.wire import commands
 from abs_service.wire.checked_bus import CheckedBus

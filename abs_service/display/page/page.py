@@ -16,13 +16,14 @@ from abs_service.display.page.choosing import Choosing, Measured
 from abs_service.display.page.commands import Commands
 from abs_service.display.page.feed import Feed
 from abs_service.display.page.fields import FIELDS, ColorScale, Drawn, MeshView, joined, residual
-from abs_service.display.page.gestures import Gestures
+from abs_service.display.page.gestures import Gestures, Ray
 from abs_service.display.page.panel import Button, Panel
 from abs_service.display.page.plots import plots
 from abs_service.display.page.recording import ask
 from abs_service.display.page.reinitialization import Reinitialization
 from abs_service.display.page.scene import Scene
-from abs_service.tracking.tracker_log import points
+from abs_service.display.page.trails import Trails
+from abs_service.tracking.log.tracker_log import points
 from calib.camera import Camera
 from drivers.contract.frame import Frame, Kind
 
@@ -55,10 +56,10 @@ class Page:
         with _quiet():
             self._server = viser.ViserServer(HOST, port, label="abs-service", verbose=False)
         self._scene = Scene(self._server)
-        self._panel = Panel(self._server, {} if view_only else self._buttons())
+        self._gestures, self._trails = Gestures(self._server.scene), Trails()
+        self._panel = Panel(self._server, self._trail_buttons() | ({} if view_only else self._buttons()))
         self._reinitialization = Reinitialization(feed, commands.reinitialize, self._panel.answer)
-        gestures = Gestures(self._server.scene)
-        self._choosing = Choosing(gestures, self._look, self._panel.answer, self._reinitialization.ask)
+        self._choosing = Choosing(self._gestures, self._look, self._panel.answer, self._reinitialization.ask)
         self._record = commands.record
         self._scales = {name: ColorScale(field) for name, field in FIELDS.items()}
         self._drawn: dict[str, Drawn] = {}  # by tracker
@@ -110,6 +111,8 @@ class Page:
         colors = self._scales[name].colors(FIELDS[name].values(view))
         self._scene.show_mesh(tracker, view, colors, stale)
         self._scene.show_first(tracker, view, self._panel.shows[0])
+        self._trails.extend(tracker, (mesh.header.boot_id, mesh.mesh_version), view.vertices, mesh.header.t_host_ns)
+        self._scene.show_trails(tracker, self._trails.lines(tracker))
 
     def _mesh_view(self, mesh: DeformedMesh, with_image: bool) -> MeshView | None:
         """View of a mesh to draw; None as long as its faces are unknown."""
@@ -180,6 +183,20 @@ class Page:
         self._panel.show_table(table.rows(self._feed, tracker))
         self._panel.show_plots(plots(numbers, self._feed.now_s))
         self._reinitialization.look()
+
+    def _trail_buttons(self) -> dict[str, Button]:
+        def follow() -> None:
+            self._panel.answer("Click a vertex of a mesh.")
+            self._gestures.click(pick)
+
+        def pick(ray: Ray) -> None:
+            met = self._trails.follow({tracker: drawn.view for tracker, drawn in self._drawn.copy().items()}, ray)
+            self._panel.answer("" if met else "There is no mesh where you clicked.")
+
+        return {
+            "Follow a vertex": Button("Draw the trail of the vertex that you click next, over ten seconds", follow),
+            "Remove the trails": Button("Follow no vertex any more", self._trails.forget),
+        }
 
     def _buttons(self) -> dict[str, Button]:
         def record(recording: bool) -> None:

@@ -1,4 +1,4 @@
-"""The controls of the page: status in words, colours, images, plots, and buttons that act."""
+"""The controls of the page: status in words, colours, images, plots, buttons."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -42,7 +42,7 @@ class Panel:
 
     Args:
         server: that serves it.
-        buttons: what acts on the rig, by label.
+        buttons: by label.
     """
 
     def __init__(self, server: viser.ViserServer, buttons: Mapping[str, Button]) -> None:

@@ -1,4 +1,4 @@
-"""The 3-D part of the page: mesh, its first pose, points of the depth sensors, cameras."""
+"""The 3-D part of the page: mesh, its first pose, trails, points of the depth sensors, cameras."""
 
 import numpy as np
 import viser
@@ -11,6 +11,9 @@ from calib.camera import Camera
 
 #: Colour of first pose, cameras and points, and size of a camera [m].
 GHOST, CAMERA, POINT, CAMERA_M = (150, 160, 175), (80, 160, 220), (150, 175, 205), 0.06
+
+#: Colour of trails, which no palette has, and the width of their lines [px].
+TRAIL, TRAIL_PX = (255, 80, 190), 3.0
 
 #: Colour of everything that is stale.
 STALE = (70, 70, 70)
@@ -35,6 +38,7 @@ class Scene:
         self._ghosts: dict[str, viser.MeshHandle] = {}
         self._clouds: dict[str, viser.PointCloudHandle] = {}
         self._cameras: dict[str, str] = {}
+        self._trails: dict[str, viser.LineSegmentsHandle] = {}
         server.on_client_connect(self._aim)
         server.scene.set_up_direction("-y")
         server.scene.configure_default_lights(enabled=True, cast_shadow=False)
@@ -70,6 +74,14 @@ class Scene:
             ghost.vertices, ghost.faces = view.first.astype(np.float32), view.faces.astype(np.uint32)
         if ghost.visible != visible:
             ghost.visible = visible
+
+    def show_trails(self, tracker: str, lines: NDArray[np.float32]) -> None:
+        """Shows lines (n, 2, 3) [m] along which vertices of a tracker have moved."""
+        if len(lines):
+            add, width = self._server.scene.add_line_segments, {"thickness": TRAIL_PX, "thickness_units": "screen"}
+            self._trails[tracker] = add(f"/trails/{tracker}", lines, TRAIL, **width)
+        elif (shown := self._trails.pop(tracker, None)) is not None:
+            shown.remove()
 
     def show_points(
         self, sensor: str, points: NDArray[np.float32], spacing_m: float, stale: bool, visible: bool

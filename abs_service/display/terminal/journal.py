@@ -15,7 +15,7 @@ from absmsg.v1.health_pb2 import Health
 
 from abs_service.supervision import log_lines
 from abs_service.supervision.rig_view import RigView
-from abs_service.tracking.tracker_log import EstimateReport
+from abs_service.tracking.log.tracker_log import EstimateReport
 
 SOCKET = "/run/systemd/journal/socket"
 PERIOD_NS = 1_000_000_000

@@ -4,7 +4,7 @@ import json
 from typing import Self, TextIO
 
 from abs_service.supervision.rig_view import RigView, size
-from abs_service.tracking.tracker_log import EstimateReport
+from abs_service.tracking.log.tracker_log import EstimateReport
 
 PERIOD_NS = 1_000_000_000
 

@@ -12,7 +12,7 @@ from rich.text import Text
 
 from abs_service.supervision.rig_view import RigView, size
 from abs_service.supervision.supervisor import State
-from abs_service.tracking.tracker_log import EstimateReport, TrackerLog
+from abs_service.tracking.log.tracker_log import EstimateReport, TrackerLog
 
 REFRESH_HZ = 6
 

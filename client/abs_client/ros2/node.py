@@ -10,7 +10,7 @@ from typing import Any, Self
 import zenoh
 from zenoh import ext
 
-from abs_client.link import UnreachableError
+from abs_client.link import RETRY_MS, UnreachableError
 from abs_client.ros2 import cdr, layout
 from abs_client.ros2.layout import Qos
 
@@ -124,7 +124,12 @@ class _Publisher:
 def _settings(router: str) -> dict[str, object]:
     return {
         "mode": "client",
-        "connect": {"endpoints": [router], "timeout_ms": round(CONNECT_S * 1000), "exit_on_failure": True},
+        "connect": {
+            "endpoints": [router],
+            "timeout_ms": round(CONNECT_S * 1000),
+            "exit_on_failure": True,
+            "retry": {"period_init_ms": RETRY_MS[0], "period_max_ms": RETRY_MS[1]},
+        },
         "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}, "delay": 0},
         "transport": {"shared_memory": {"enabled": True}},
     }

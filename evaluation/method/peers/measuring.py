@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracking.truth import closest_points
+from abs_service.tracking.log.truth import closest_points
 from evaluation.method.peers.competitors import SheetTracker
 from evaluation.scenes.bent_sheet import SIDE, SheetFrame, SheetState, places
 

@@ -18,6 +18,6 @@ FAULTS: tuple[Fault | Elsewhere, ...] = (
     Elsewhere(
         "a process is starved of processor time",
         "it is not restarted; health says why",
-        "tests/system/test_stops.py",
+        "tests/system/faults/test_stops.py",
     ),
 )

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from abs_service.bus import keys
 from abs_service.recording.recording_file import ESTIMATES
-from abs_service.tracking.truth import TruthComparison
+from abs_service.tracking.log.truth import TruthComparison
 from evaluation.service.frame_budget.rig import TRACKER
 
 #: Positions (rows, columns, 3) [m] of the true surface at an exposure.

@@ -14,7 +14,7 @@ from abs_service.bus.session import Role
 from abs_service.bus.zenoh_bus import ZenohBus
 from drivers.contract.host_clock import host_clock
 
-pytestmark = pytest.mark.slow  # starts an interpreter that imports and compiles everything
+pytestmark = [pytest.mark.slow, pytest.mark.realtime]  # starts an interpreter that imports and compiles everything
 
 
 @pytest.fixture

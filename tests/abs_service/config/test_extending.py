@@ -228,7 +228,7 @@ def test_a_device_of_another_distribution_delivers(installed) -> None:
     assert count >= 10
     assert late == 0  # nothing comes after the device is closed
     assert numbers == list(range(10))
-    assert 0.58 <= depth <= 0.62
+    assert depth == pytest.approx(0.6, abs=0.021)  # it swings by 20 mm; what is 620 mm rounds to more
     assert states == ["opening", "streaming", "closed"]
 
 

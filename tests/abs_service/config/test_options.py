@@ -25,7 +25,7 @@ from drivers.simulated.address import parse
 from drivers.simulated.sensors.exposure import Head
 from drivers.simulated.sensors.time_of_flight import SIGMA_POLYNOMIAL
 from drivers.simulated.simulation import Simulation
-from tests.abs_service.commands.simulated_recording import write_take
+from tests.abs_service.commands.recordings.simulated_recording import write_take
 from tests.abs_service.config.options import OPTIONS, PACKAGES, SPECIAL
 
 #: From the last moment of rest until everything moves.

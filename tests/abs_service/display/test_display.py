@@ -13,8 +13,8 @@ from abs_service.display.terminal.table import TableDisplay, draw
 from abs_service.supervision.rig_state import RigState
 from abs_service.supervision.rig_view import RigView, size
 from abs_service.supervision.supervisor import Child, State
-from abs_service.tracking.sensor_shares import SensorShares
-from abs_service.tracking.tracker_log import EstimateReport
+from abs_service.tracking.log.sensor_shares import SensorShares
+from abs_service.tracking.log.tracker_log import EstimateReport
 from tests.abs_service.supervision.idle_process import Idle
 
 S = 1_000_000_000

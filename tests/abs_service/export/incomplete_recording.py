@@ -5,7 +5,7 @@ from pathlib import Path
 from mcap.reader import make_reader
 
 from drivers.encoding.mcap_file import McapFile
-from tests.abs_service.commands.estimated_recording import write_estimated
+from tests.abs_service.commands.recordings.estimated_recording import write_estimated
 
 
 def write_without(folder: Path, part: str) -> Path:

@@ -8,7 +8,13 @@ import pytest
 from abs_service import cli
 from abs_service.export import animation
 from abs_service.supervision.exit_codes import Exit
-from tests.abs_service.commands.estimated_recording import FACES, SIMULATION, version, vertices, write_estimated
+from tests.abs_service.commands.recordings.estimated_recording import (
+    FACES,
+    SIMULATION,
+    version,
+    vertices,
+    write_estimated,
+)
 
 #: Estimates of the recording's meshes.
 POSES = {0: (1, 2, 3, 4), 1: (5,)}

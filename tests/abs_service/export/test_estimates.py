@@ -8,7 +8,7 @@ import pytest
 from abs_service import cli
 from abs_service.supervision.exit_codes import Exit
 from drivers.simulated.address import parse
-from tests.abs_service.commands.estimated_recording import (
+from tests.abs_service.commands.recordings.estimated_recording import (
     FACES,
     SIMULATION,
     STATUSES,
@@ -17,7 +17,7 @@ from tests.abs_service.commands.estimated_recording import (
     vertices,
     write_estimated,
 )
-from tests.abs_service.commands.simulated_recording import write_take
+from tests.abs_service.commands.recordings.simulated_recording import write_take
 
 
 @pytest.fixture

@@ -6,7 +6,13 @@ import pytest
 from abs_service import cli
 from abs_service.display.page.pictures import picture, with_mesh
 from abs_service.supervision.exit_codes import Exit
-from tests.abs_service.commands.estimated_recording import FACES, SIMULATION, version, vertices, write_estimated
+from tests.abs_service.commands.recordings.estimated_recording import (
+    FACES,
+    SIMULATION,
+    version,
+    vertices,
+    write_estimated,
+)
 from tests.abs_service.export.incomplete_recording import write_without
 
 av = pytest.importorskip("av")

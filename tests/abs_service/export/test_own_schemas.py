@@ -8,7 +8,13 @@ import numpy as np
 
 from abs_service import cli
 from abs_service.supervision.exit_codes import Exit
-from tests.abs_service.commands.estimated_recording import FACES, SIMULATION, version, vertices, write_estimated
+from tests.abs_service.commands.recordings.estimated_recording import (
+    FACES,
+    SIMULATION,
+    version,
+    vertices,
+    write_estimated,
+)
 
 READER = """
 import json, sys

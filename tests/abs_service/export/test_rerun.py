@@ -9,7 +9,7 @@ from PIL import Image
 
 from abs_service import cli
 from abs_service.supervision.exit_codes import Exit
-from tests.abs_service.commands.estimated_recording import (
+from tests.abs_service.commands.recordings.estimated_recording import (
     FACES,
     SIMULATION,
     STATUSES,

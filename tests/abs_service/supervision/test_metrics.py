@@ -15,7 +15,7 @@ from abs_service.supervision import metrics
 from abs_service.supervision.rig_state import RigState
 from abs_service.supervision.rig_view import RigView
 from abs_service.supervision.supervisor import Child
-from abs_service.tracking.tracker_log import EstimateReport
+from abs_service.tracking.log.tracker_log import EstimateReport
 
 S = 1_000_000_000
 NOW_NS = 100 * S

@@ -9,7 +9,7 @@ from absmsg.v1.surface_truth_pb2 import SurfaceTruth
 
 from abs_service.bus.contract import Sample
 from abs_service.supervision.rig_state import RigState
-from abs_service.tracking.tracker_log import RunningStats
+from abs_service.tracking.log.tracker_log import RunningStats
 
 
 def sample(topic, message):

@@ -15,7 +15,7 @@ from abs_service.bus.contract import Sample
 from abs_service.supervision import systemd
 from abs_service.supervision.rig_state import RigState
 from abs_service.supervision.rig_view import RigView
-from abs_service.tracking.tracker_log import EstimateReport
+from abs_service.tracking.log.tracker_log import EstimateReport
 
 S = 1_000_000_000
 UNIT = Path(__file__).parents[3] / "docker" / "abs-service@.service"

@@ -10,10 +10,10 @@ from abs_service import config, wiring
 from abs_service.tracker.estimate import Estimate
 from abs_service.tracker.models.base import DeformationModel
 from abs_service.tracker.posterior.posterior import Posterior
+from abs_service.tracking.log.truth import Errors
 from abs_service.tracking.observer import Observer
 from abs_service.tracking.plan import Plan, make_posterior
 from abs_service.tracking.session import TrackingSession
-from abs_service.tracking.truth import Errors
 from calib.rig import Rig
 from drivers.contract.frame import Frame, FrameSet
 from drivers.simulated import address

@@ -11,7 +11,13 @@ from drivers.encoding import codec
 from drivers.encoding.encoded_image import ImageCodec, encoder
 from drivers.encoding.mcap_file import McapFile
 from drivers.replay.contents import RecordingError
-from tests.abs_service.commands.estimated_recording import FACES, SIMULATION, STATUSES, vertices, write_estimated
+from tests.abs_service.commands.recordings.estimated_recording import (
+    FACES,
+    SIMULATION,
+    STATUSES,
+    vertices,
+    write_estimated,
+)
 
 PERIOD_S = (SIMULATION.time_ns(1) - SIMULATION.time_ns(0)) * 1e-9
 

@@ -1,0 +1,87 @@
+"""`abs-service info` shows of a recording what was written into it."""
+
+import json
+
+import pytest
+
+from abs_service import config
+from abs_service.cli import main
+from tests.abs_service.commands.recordings.estimated_recording import NAMES, SIMULATION, TOML, write_estimated
+from tests.abs_service.commands.recordings.simulated_recording import write_take
+
+
+def info(capsys, *paths):
+    code = main(["info", *map(str, paths), "--json"])
+    return code, [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+
+
+def test_it_counts_images_estimates_and_statuses(tmp_path, capsys):
+    code, (found,) = info(capsys, write_estimated(tmp_path / "x.mcap"))
+    assert (code, found["finished"], found["damaged"]) == (0, True, 0)
+    assert found["attachments"] == ["rig.toml"]
+    assert found["sensors"] == {"color": [32, 24], "tof": [32, 24]}
+    assert found["topics"]["/tof/depth/image"]["messages"] == 6
+    assert found["topics"]["/tof/depth/image"]["rate_hz"] == pytest.approx(30.0, rel=1e-3)
+    sheet = found["trackers"]["sheet"]
+    assert (sheet["estimates"], sheet["meshes"]) == (6, 2)
+    assert sheet["shares"] == pytest.approx(
+        {"TRACKING": 1 / 2, "INITIALIZING": 1 / 6, "DEGRADED": 1 / 6, "LOST": 1 / 6}
+    )
+    assert sheet["longest_untracked_s"] == pytest.approx(2 / 30, rel=1e-3)  # between the third estimate and the fifth
+    assert sheet["deviation_m"]["median"] == pytest.approx(0.003)
+
+
+def test_the_configuration_is_told_in_short_as_values_and_as_it_is(tmp_path, capsys):
+    toml = config.to_toml(config.load_default())
+    path = write_take(tmp_path / "x.mcap", SIMULATION, [0], NAMES, toml)
+    assert main(["info", str(path)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert "device sim: simulated://sheet?seed=1" in lines
+    assert any(line.startswith("tracker sheet of tof, color: model nurbs, region nearest") for line in lines)
+    _, (found,) = info(capsys, path)
+    assert found["configuration"]["trackers"]["sheet"]["region"]["type"] == "nearest"
+    assert main(["info", str(path), "--config"]) == 0
+    assert capsys.readouterr().out == toml
+
+
+@pytest.mark.parametrize("toml", ["", "= no TOML", "devices = 1\n[trackers]\nsheet = 2\n"])
+def test_a_configuration_that_says_nothing_is_left_out(tmp_path, capsys, toml):
+    path = write_take(tmp_path / "x.mcap", SIMULATION, [0], NAMES, toml)
+    assert main(["info", str(path)]) == 0
+    assert not any(line.startswith(("device ", "tracker ")) for line in capsys.readouterr().out.splitlines()[1:4])
+    assert main(["info", str(path), "--config"]) == (0 if toml else 2)
+    assert ("no configuration is in this recording" in capsys.readouterr().err) == (not toml)
+
+
+def test_exposures_that_are_missing_are_lost_and_leave_a_gap(tmp_path, capsys):
+    path = write_take(tmp_path / "x.mcap", SIMULATION, [0, 1, 2, 3, 8, 9], NAMES, TOML)
+    _, (found,) = info(capsys, path)
+    topic = found["topics"]["/tof/depth/info"]
+    assert (topic["lost"], topic["gaps"], topic["reconnects"]) == (4, 1, 0)
+    assert topic["longest_gap_s"] == pytest.approx(5 / 30, rel=1e-3)
+
+
+def test_a_recording_that_was_cut_short_is_described_up_to_there(tmp_path, capsys):
+    _, (found,) = info(capsys, write_estimated(tmp_path / "x.mcap", finish=False))
+    assert not found["finished"]
+    assert main(["info", str(tmp_path / "x.mcap")]) == 0
+    assert "not finished (`abs-service recover`" in capsys.readouterr().out
+
+
+def test_people_get_one_line_per_topic(tmp_path, capsys):
+    assert main(["info", str(write_estimated(tmp_path / "x.mcap"))]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert "sensors: color 32 × 24 px, tof 32 × 24 px" in lines
+    (depth,) = (line for line in lines if line.startswith("/tof/depth/image"))
+    assert "30.0 Hz" in depth
+    assert not any("/info" in line for line in lines)
+
+
+def test_what_cannot_be_read_is_named_and_the_others_are_described(tmp_path, capsys):
+    (tmp_path / "text.mcap").write_text("no recording")
+    good = write_estimated(tmp_path / "x.mcap")
+    assert main(["info", str(tmp_path / "nothing.mcap"), str(tmp_path / "text.mcap"), str(good), "--json"]) == 2
+    output = capsys.readouterr()
+    assert "nothing.mcap: No such file" in output.err
+    assert "text.mcap: this is no MCAP file" in output.err
+    assert json.loads(output.out)["file"] == str(good)

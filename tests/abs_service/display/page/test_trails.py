@@ -1,0 +1,88 @@
+"""Trails of vertices: which one a click follows, how long it is kept, and when it ends."""
+
+import numpy as np
+import pytest
+
+from abs_service.display.page.fields import MeshView
+from abs_service.display.page.trails import GAP_NS, TRAIL_NS, Trails
+
+FRAME_NS = 33_000_000
+SQUARE = np.array([[0.0, 0, 1], [0.1, 0, 1], [0, 0.1, 1], [0.1, 0.1, 1]])
+FACES = np.array([[0, 1, 2], [1, 3, 2]], np.int32)
+
+
+def view(vertices):
+    return MeshView(vertices, vertices, FACES, np.empty((0, 6)), np.empty((0, 0)), None)
+
+
+MESHES = {"left": view(SQUARE), "right": view(np.add(SQUARE, (1.0, 0, 0)))}
+
+
+def ray_at(target):
+    """From the camera."""
+    return np.zeros(3), target / np.linalg.norm(target)
+
+
+@pytest.fixture
+def trails():
+    """The last vertex of the right mesh is followed."""
+    made = Trails()
+    assert made.follow(MESHES, ray_at(np.array([1.1, 0.1, 1.0])))
+    return made
+
+
+def extend(trails, times_ns, mesh="first"):
+    for time_ns in times_ns:
+        trails.extend("right", mesh, np.add(SQUARE, (0, 0, 1e-9 * time_ns)), time_ns)
+
+
+def test_the_vertex_under_the_click_is_followed(trails):
+    extend(trails, [0, FRAME_NS, 2 * FRAME_NS])
+    trails.extend("left", "first", SQUARE, 0)
+    lines = trails.lines("right")
+    np.testing.assert_allclose(lines[:, :, :2], np.full((2, 2, 2), 0.1))
+    np.testing.assert_allclose(lines[:, :, 2] - 1, np.array([[0, 0.033], [0.033, 0.066]]), atol=1e-6)
+    assert len(trails.lines("left")) == 0
+
+
+@pytest.mark.parametrize("target", [(-2.0, 0, 1), (0.0, 0, -1)])
+def test_a_click_beside_every_mesh_follows_nothing(target):
+    trails = Trails()
+    assert not trails.follow(MESHES, ray_at(np.array(target)))
+    assert not trails.follow({}, ray_at(SQUARE[0]))
+    extend(trails, [0, FRAME_NS])
+    assert len(trails.lines("right")) == 0
+
+
+def test_a_trail_is_ten_seconds_long(trails):
+    extend(trails, range(0, 2 * TRAIL_NS, FRAME_NS))
+    lines = trails.lines("right")
+    assert 1e-9 * TRAIL_NS - 0.1 < lines[-1, 1, 2] - lines[0, 0, 2] <= 1e-9 * TRAIL_NS
+
+
+def test_nothing_is_drawn_across_a_gap(trails):
+    extend(trails, [0, FRAME_NS, 2 * FRAME_NS + GAP_NS, 3 * FRAME_NS + GAP_NS])
+    assert len(trails.lines("right")) == 2
+
+
+def test_an_estimate_that_is_drawn_again_adds_nothing(trails):
+    extend(trails, [0, FRAME_NS, FRAME_NS])
+    assert len(trails.lines("right")) == 1
+
+
+def test_a_jump_back_in_a_recording_begins_anew(trails):
+    extend(trails, [5 * FRAME_NS, 6 * FRAME_NS, 0])
+    assert len(trails.lines("right")) == 0
+    extend(trails, [FRAME_NS])
+    assert len(trails.lines("right")) == 1
+
+
+def test_trails_end_with_their_mesh_and_when_they_are_removed(trails):
+    extend(trails, [0, FRAME_NS])
+    extend(trails, [2 * FRAME_NS, 3 * FRAME_NS], mesh="remade")
+    assert len(trails.lines("right")) == 0
+    assert trails.follow(MESHES, ray_at(np.array([1.0, 0.0, 1.0])))
+    extend(trails, [4 * FRAME_NS, 5 * FRAME_NS], mesh="remade")
+    assert len(trails.lines("right")) == 1
+    trails.forget()
+    assert len(trails.lines("right")) == 0

@@ -1,0 +1,106 @@
+"""Classes of a mesh's rim, and the agreement of its edges with the outline."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from abs_service.tracker.mesh import Mesh
+from abs_service.tracker.terms.depth.rim import Rim
+from abs_service.tracker.terms.depth.rim_classes import RimClass
+from abs_service.tracker.terms.depth.rim_cost import FARTHEST
+from abs_service.tracker.terms.depth.visibility import classify
+from tests.abs_service.tracker.scenes import flat, sheet, sparse
+from tests.abs_service.tracker.terms.depth.outline_scene import CAMERA, MESH, look, moved, outline, picture
+
+
+def classes(distance: np.ndarray, mesh: Mesh = MESH) -> dict[RimClass, int]:
+    found = outline(distance, mesh).classes
+    return {one: int(np.count_nonzero(found == one)) for one in RimClass}
+
+
+def test_the_rim_is_free_before_a_wall_and_before_no_return():
+    empty = picture()
+    empty[empty > 1.3] = np.nan
+    for distance in (picture(), empty):
+        found = classes(distance)
+        assert found[RimClass.FREE] == sum(found.values())
+
+
+def test_an_edge_on_a_table_or_cut_by_a_mask_is_in_contact():
+    """The measured surface goes on to the right, where the mesh ends."""
+    table = picture()
+    rays = CAMERA.unproject(np.ones_like(table))
+    right = (rays[..., 0] / rays[..., 2] > 0.1) & (np.abs(rays[..., 1] / rays[..., 2]) < 0.12)
+    table[right] = (1.0 / rays[..., 2])[right]
+    found = outline(table)
+    x = MESH.vertices[Rim.of(MESH).outer, 0]
+    assert np.mean(found.classes[x > 0.14] == RimClass.CONTACT) > 0.9  # but for a corner
+    assert np.all(found.classes[x < 0.0] == RimClass.FREE)
+    here = found.fit(moved(MESH, 0.0))
+    assert here.visible == np.count_nonzero(found.classes == RimClass.FREE)
+
+
+@pytest.mark.parametrize("beyond", [0.002, 0.012, 0.025])
+def test_an_edge_up_to_two_cells_before_an_occluder_is_occluded_until_that_leaves(beyond: float):
+    """The sheet goes on to the right, where something is in front of it; the mesh ends a little before that."""
+    larger = Mesh(MESH.vertices * (1.3, 1, 1), MESH.faces, MESH.colors, MESH.chart)
+    rays = CAMERA.unproject(np.ones((CAMERA.height, CAMERA.width)))
+    covered = picture(larger)
+    covered[rays[..., 0] / rays[..., 2] > 0.15 + beyond] = 0.8
+    found = outline(covered)
+    right = MESH.vertices[Rim.of(MESH).outer, 0] > 0.14
+    assert np.mean(found.classes[right] == RimClass.OCCLUDED) > 0.8  # but for the corners
+    assert not np.any(found.classes[~right] == RimClass.OCCLUDED)
+    hidden = found.fit(moved(MESH, 0.0))
+    look(found, picture(larger))
+    seen = found.fit(moved(MESH, 0.0))
+    assert seen.covered == hidden.covered > 8
+    assert hidden.uncovered == 0
+    assert seen.uncovered >= 0.9 * hidden.covered  # a corner's own continuation is beside the sheet
+
+
+def test_an_edge_at_the_border_of_the_image_may_continue_beyond_it():
+    wide = sheet(13, 19, flat, (0.62, 0.2))
+    found = classes(picture(wide), wide)
+    assert found[RimClass.BORDER] >= 2 * 11
+    assert found[RimClass.FREE] >= 2 * 15
+
+
+def test_the_edge_of_a_body_that_turns_away_is_a_silhouette():
+    """A roll: its mesh ends where its surface is seen at a grazing angle."""
+    roll = sheet(13, 19, lambda x, y: 1.15 - np.sqrt(0.15**2 - np.clip(x, -0.1495, 0.1495) ** 2) + 0 * y)
+    found = outline(picture(), roll).classes
+    x = np.abs(roll.vertices[Rim.of(roll).outer, 0])
+    assert np.mean(found[x > 0.14] == RimClass.SILHOUETTE) > 0.9
+
+
+def test_a_sheet_that_hangs_over_the_outline_or_ends_inside_it_is_told():
+    found = outline(picture())
+    assert (found.fit(moved(MESH, 0.0)).outside, found.fit(moved(MESH, 0.0)).inside) == (0, 0)
+    off = found.fit(moved(MESH, 0.03))
+    assert off.outside >= 9
+    assert off.inside >= 9
+    assert off.visible > off.outside + off.inside
+
+
+def test_the_distance_of_the_edges_from_the_outline_is_told_in_metres():
+    """The sheet is 40 mm longer to the right than when the mesh was made; above and below, the edges are on it."""
+    found = outline(picture())
+    look(found, np.minimum(picture(), picture(by=0.04)))
+    here, y = found.fit(moved(MESH, 0.0)), np.linspace(-0.1, 0.1, 13)[1:-1]
+    nearest = np.minimum(0.04, 0.1 - np.abs(y))
+    off = nearest > FARTHEST * 0.5 / CAMERA.fx  # beyond the bound of the cost
+    assert (here.outside, here.inside) == (0, np.count_nonzero(off))
+    assert here.off_m == pytest.approx(nearest[off].sum() / here.visible, rel=0.1)
+
+
+def test_the_surface_hides_its_own_edge():
+    """A sheet that is rolled up: the vertices of the far end lie behind the near one."""
+    rolled = replace(MESH, vertices=MESH.vertices * (1.0, 1.0, 1.0) + (MESH.vertices[:, :1] > 0.1) * (0.0, 0.0, 0.05))
+    result = outline(picture())
+    view = sparse(CAMERA, MESH).view("tof", np.zeros((len(MESH.vertices), 0), np.float32))
+    expected = view.render(moved(MESH, 0.0))
+    distance = picture()
+    result.observe(distance, classify(distance, expected, CAMERA.fx), expected, moved(rolled, 0.0))
+    assert result.fit(moved(rolled, 0.0)).occluded >= 11

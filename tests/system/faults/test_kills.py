@@ -1,0 +1,138 @@
+"""`kill -9` on a running rig: the process is restarted, the others go on, and no recording is lost."""
+
+import itertools
+import signal
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+from absmsg.v1.frame_info_pb2 import FrameInfo
+from absmsg.v1.health_pb2 import Health
+from mcap.reader import make_reader
+
+from evaluation.service.live.proc import children, is_running
+from tests.system.running import kill, wait_until
+
+pytestmark = [pytest.mark.slow, pytest.mark.realtime]
+
+DEPTH = "tof/depth/image"
+
+
+def lost(frames: Sequence[FrameInfo]) -> int:
+    """Exposures whose images did not arrive; the device must not have begun anew."""
+    assert len({info.epoch for info in frames}) == 1, "the device was opened again"
+    numbers = [info.seq for info in frames]
+    assert numbers == sorted(set(numbers)), "twice, or out of order"
+    return numbers[-1] - numbers[0] + 1 - len(numbers)
+
+
+def not_published(listener) -> int:
+    """Exposures that capture itself says it left out."""
+    counters = listener.health("capture")[-1].counters
+    return counters["device.sim.late"] + counters[f"dropped.{DEPTH}"]
+
+
+def test_a_killed_tracker_comes_back_and_capture_goes_on(run):
+    process, listener = run
+    boot_id = listener.states()[-1][1].header.boot_id
+    killed_ns = kill(children(process.pid)["track"])
+    wait_until(listener.tracks_since(killed_ns), 30, "TRACKING again")
+    back_ns, state = next((t, s) for t, s in listener.states() if s.header.t_host_ns > killed_ns)
+    print(f"estimates again {(back_ns - killed_ns) * 1e-9:.1f} s after kill -9 of the tracker")
+    assert state.header.boot_id != boot_id
+    wait_until(lambda: listener.health("run")[-1].counters["restarts.track/sheet"] == 1, 5, "the restart in health")
+    frames = listener.frames(DEPTH)
+    # On a busy machine the listener itself may miss one or two that were published.
+    assert lost(frames) <= not_published(listener) + 0.05 * len(frames)
+
+
+def recorders(pid):
+    """Process numbers of the recorder and of the one that waits."""
+    listed = map(int, Path(f"/proc/{pid}/task/{pid}/children").read_text().split())
+    return [child for child in listed if b"\0record\0" in Path(f"/proc/{child}/cmdline").read_bytes()]
+
+
+def newest_image_ns(path) -> int:
+    with path.open("rb") as stream:
+        last = next(make_reader(stream).iter_messages(topics=f"/{DEPTH}", reverse=True))
+    return last[2].log_time
+
+
+def test_a_killed_recorder_comes_back_and_its_file_is_saved_up_to_the_last_second(run, tmp_path):
+    process, listener = run
+    wait_until(lambda: any(h.gauges["file_bytes"] > 1e6 for h in listener.health("record")), 20, "a growing file")
+    late = (
+        len(listener.frames(DEPTH)) + 22
+    )  # the file was flushed just now; most of a second later there is most to lose
+    wait_until(lambda: len(listener.frames(DEPTH)) > late, 10, "more images")
+    kill(children(process.pid)["record"])
+    killed_s = time.time()
+    (cut,) = (tmp_path / "takes").glob("*.mcap.active")
+    saved = cut.with_name(cut.name.removesuffix(".active"))
+    wait_until(saved.exists, 30, "recovery")
+    lost_s = killed_s - newest_image_ns(saved) * 1e-9
+    print(f"kill -9 of the recorder lost {lost_s:.2f} s")
+    assert lost_s < 1.3  # what is not flushed within a second, and what was on its way
+    (active,) = wait_until(lambda: list((tmp_path / "takes").glob("*.mcap.active")), 10, "a new file")
+    assert active != cut
+    size = active.stat().st_size
+    wait_until(lambda: active.stat().st_size > size + 1_000_000, 10, "growth of the new file")
+    frames = listener.frames(DEPTH)
+    # On a busy machine the listener itself may miss one or two that were published.
+    assert lost(frames) <= not_published(listener) + 0.05 * len(frames)
+    assert len({state.header.boot_id for _, state in listener.states()}) == 1, "the tracker was not restarted"
+
+
+def image_times_s(folder):
+    """Times of all images of the finished recordings of a folder [s]."""
+    found = []
+    for path in folder.glob("*.mcap"):
+        with path.open("rb") as stream:
+            found += [message.log_time * 1e-9 for *_, message in make_reader(stream).iter_messages(topics=f"/{DEPTH}")]
+    return sorted(found)
+
+
+def test_a_killed_recorder_leaves_a_gap_of_a_second_and_a_half_at_most(run, tmp_path):
+    process, listener = run
+    wait_until(lambda: len(recorders(process.pid)) == 2, 30, "the second recorder, which waits")
+    time.sleep(8)  # until it is loaded
+    kill(min(recorders(process.pid)))
+    files = listener.health("record")[-1].header.boot_id
+    wait_until(lambda: listener.health("record")[-1].header.boot_id != files, 10, "health of the second one")
+    wait_until(lambda: listener.health("record")[-1].counters["recovered"] == 1, 30, "recovery")
+    process.send_signal(signal.SIGTERM)
+    assert process.wait(10) == 0
+    times = image_times_s(tmp_path / "takes")
+    gap_s = max(b - a for a, b in itertools.pairwise(times))
+    print(f"kill -9 of the recorder left a gap of {gap_s:.2f} s")
+    assert gap_s < 1.5
+
+
+def test_a_folder_that_cannot_be_written_ends_neither_tracking_nor_recording_for_good(run, tmp_path):
+    process, listener = run
+    (tmp_path / "takes").rename(tmp_path / "moved")
+    (tmp_path / "takes").write_text("in the way")
+    kill(min(recorders(process.pid)))
+    killed_ns = time.monotonic_ns()
+
+    def says(level, text):
+        return lambda: (last := listener.health("record")[-1]).level == level and text in last.message
+
+    wait_until(says(Health.LEVEL_ERROR, "RECORD_FAILED [Errno 17] File exists"), 30, "the failure in health")
+    wait_until(listener.tracks_since(killed_ns, 30), 10, "estimates meanwhile")
+    (tmp_path / "takes").unlink()
+    wait_until(says(Health.LEVEL_OK, ""), 5, "recording again")
+    process.send_signal(signal.SIGTERM)
+    assert process.wait(10) == 1, "the recording has a gap"
+    assert [path.suffix for path in (tmp_path / "takes").iterdir()] == [".mcap"]
+
+
+def test_nothing_survives_a_killed_run(run):
+    process, _ = run
+    wait_until(lambda: len(recorders(process.pid)) == 2, 30, "the second recorder, which waits")
+    alive = {**children(process.pid), "waiting": max(recorders(process.pid))}
+    assert alive.keys() == {"capture", "track", "record", "waiting"}
+    begin_ns = kill(process.pid)
+    wait_until(lambda: not any(map(is_running, alive.values())), 5, "the end of the children")
+    print(f"the children ended {(time.monotonic_ns() - begin_ns) * 1e-9:.1f} s after kill -9 of run")
