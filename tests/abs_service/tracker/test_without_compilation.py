@@ -10,7 +10,7 @@ import pytest
 from tests.abs_service.tracker.random_vertices import INTERPRETED
 
 HERE = Path(__file__).parent
-FILES = (HERE / "synthesis" / "test_sparse_kernels.py", HERE / "terms" / "test_cost_kernels.py")
+FILES = (HERE / "synthesis" / "test_sparse_kernels.py", HERE / "terms" / "depth" / "test_cost_kernels.py")
 
 
 @pytest.mark.slow
