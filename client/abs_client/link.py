@@ -98,7 +98,7 @@ class Link:
         self._threads: list[threading.Thread] = []
         self._waiting: weakref.WeakSet[Wake] = weakref.WeakSet()
         try:
-            self._session = zenoh.open(zenoh.Config.from_json5(json.dumps(_settings(endpoint, tls))))
+            self._session = zenoh.open(zenoh.Config.from_json5(json.dumps(client_settings(endpoint, tls))))
         except zenoh.ZError as error:
             raise UnreachableError(f"nothing answers at {endpoint} within {CONNECT_S:g} s: is it running?") from error
         self._end = weakref.finalize(self, _end, self._session, self._threads)
@@ -194,7 +194,8 @@ def checked(name: str) -> str:
     return name
 
 
-def _settings(endpoint: str, tls: Tls | None) -> dict[str, object]:
+def client_settings(endpoint: str, tls: Tls | None = None) -> dict[str, object]:
+    """Configuration of zenoh for a client of the router at an endpoint; without certificates if `tls` is None."""
     own = {} if tls is None else {"connect_certificate": str(tls.certificate), "connect_private_key": str(tls.key)}
     link = {"tls": {"root_ca_certificate": str(tls.authority), "enable_mtls": True, **own}} if tls else {}
     return {

@@ -10,12 +10,10 @@ from typing import Any, Self
 import zenoh
 from zenoh import ext
 
-from abs_client.link import RETRY_MS, UnreachableError
+from abs_client.link import CONNECT_S, UnreachableError, client_settings
 from abs_client.ros2 import cdr, layout
 from abs_client.ros2.layout import Qos
 
-#: By when the router must answer [s].
-CONNECT_S = 3.0
 #: Period in which the last number of a topic that is kept is repeated, as rmw_zenoh does [s].
 HEARTBEAT_S = 0.5
 
@@ -38,7 +36,7 @@ class RosNode:
         self._lock = threading.Lock()
         self._publishers: dict[str, _Publisher] = {}
         try:
-            self._session = zenoh.open(zenoh.Config.from_json5(json.dumps(_settings(router))))
+            self._session = zenoh.open(zenoh.Config.from_json5(json.dumps(client_settings(router))))
         except zenoh.ZError as error:
             raise UnreachableError(f"nothing answers at {router} within {CONNECT_S:g} s: is it running?") from error
         self._node = layout.Node(domain, str(self._session.info.zid()), name)
@@ -119,17 +117,3 @@ class _Publisher:
         with self._lock:
             self.sent += 1
             self._declared.put(payload, attachment=layout.attachment(self.sent, time_ns, self._identity))
-
-
-def _settings(router: str) -> dict[str, object]:
-    return {
-        "mode": "client",
-        "connect": {
-            "endpoints": [router],
-            "timeout_ms": round(CONNECT_S * 1000),
-            "exit_on_failure": True,
-            "retry": {"period_init_ms": RETRY_MS[0], "period_max_ms": RETRY_MS[1]},
-        },
-        "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}, "delay": 0},
-        "transport": {"shared_memory": {"enabled": True}},
-    }

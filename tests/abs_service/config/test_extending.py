@@ -228,7 +228,8 @@ def test_a_device_of_another_distribution_delivers(installed) -> None:
     assert count >= 10
     assert late == 0  # nothing comes after the device is closed
     assert numbers == list(range(10))
-    assert depth == pytest.approx(0.6, abs=0.021)  # it swings by 20 mm; what is 620 mm rounds to more
+    # It swings by 20 mm, and 0.62 in single precision is a little more.
+    assert depth == pytest.approx(0.6, abs=0.020001)
     assert states == ["opening", "streaming", "closed"]
 
 

@@ -23,10 +23,8 @@ from abs_service.recording.recovery import recover
 from drivers.contract.frame import Frame, Geometry, Kind
 from drivers.encoding import codec
 
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.realtime,
-]  # each test starts at least one interpreter that imports everything
+# Each test starts at least one interpreter that imports everything.
+pytestmark = [pytest.mark.slow, pytest.mark.realtime]
 
 FLUSH_S = 0.2
 TOPIC = keys.image("tof", "depth")
