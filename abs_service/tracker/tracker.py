@@ -17,6 +17,7 @@ from abs_service.tracker import status
 from abs_service.tracker.estimate import Estimate, Status
 from abs_service.tracker.models.base import DeformationModel
 from abs_service.tracker.optimizers.base import Budget, Optimizer, Outcome, Search
+from abs_service.tracker.posterior.covariance.first_frame_slide import FirstFrameSlide, NoSlide
 from abs_service.tracker.posterior.covariance.observability import single_frame_deviation
 from abs_service.tracker.posterior.covariance.theta_covariance import ThetaCovariance
 from abs_service.tracker.posterior.covariance.vertex_covariance import VertexCovariance
@@ -57,7 +58,8 @@ class Tracker:
         self._evaluations = evaluations
         self._limits = limits
         self._theta_covariance = ThetaCovariance(model, registration_m)
-        self._vertex_covariance = VertexCovariance(model)
+        slide = NoSlide() if registration_m else FirstFrameSlide(model.mesh)
+        self._vertex_covariance = VertexCovariance(model, slide)
         self._shape = ShapeComparison(model.mesh)
         self._is_warm = False
         self._last_tracked = model.rest

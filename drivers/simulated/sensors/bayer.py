@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter
 
 from drivers.contract.frame import Frame, Kind
 from drivers.simulated.sensors.color import SIGMA, Picture, digitize
@@ -20,19 +19,15 @@ class Mosaic:
 
     Attributes:
         order: filter pattern, one of `ORDERS`.
-        blur_px: defocus: standard deviation of the Gaussian point spread function before the filters.
         crosstalk: fraction c of a pixel's light that is measured by its four neighbours, a quarter each. In smooth
             areas, red pixels then read (1 − c) R + c G, blue ones alike, and green ones (1 − c) G + c (R + B) / 2.
     """
 
     order: str = "grbg"
-    blur_px: float = 0.0
     crosstalk: float = 0.0
 
     def expose(self, levels: NDArray[np.float32]) -> NDArray[np.float32]:
         """Mosaic (height, width) of a colour image (height, width, 3)."""
-        if self.blur_px > 0:
-            levels = np.asarray(gaussian_filter(levels, (self.blur_px, self.blur_px, 0), mode="nearest"), np.float32)
         mosaic = np.empty(levels.shape[:2], np.float32)
         for place, letter in enumerate(self.order):
             row, column = divmod(place, 2)

@@ -33,24 +33,27 @@ class Picture:
         scene: the scene.
         samples: rays per pixel and axis (supersampling); one, through the centre, is enough
             unless the texture has details of the size of a pixel.
+        blur_px: blur of the lens: standard deviation of its Gaussian point spread function.
     """
 
-    def __init__(self, camera: Camera, scene: Scene, samples: int = 1) -> None:
+    def __init__(self, camera: Camera, scene: Scene, samples: int = 1, blur_px: float = 0.0) -> None:
         self.camera = camera
         self._samples = samples
+        self._blur_px = blur_px
         self._view = View(scene, _finer(camera, samples))
         self._wall = _levels(self._view.wall)
 
     def take(self, moment: Moment) -> NDArray[np.float32]:
-        """Image (height, width, 3) in levels of 256 at one moment, antialiased at rims."""
+        """Image (height, width, 3) in levels of 256 at one moment, antialiased at rims, blurred by the lens."""
         levels = self._wall.copy()
         for sight in self._view.look(moment):
             levels[sight.region] += sight.share[..., None] * (_levels(sight) - levels[sight.region])
-        if self._samples == 1:
-            return levels
-        # For integer factors this is the mean, ten times as fast as NumPy's.
-        size = (self.camera.width, self.camera.height)
-        return cv2.resize(levels, size, interpolation=cv2.INTER_AREA).astype(np.float32, copy=False)
+        if self._samples > 1:  # for integer factors this is the mean, ten times as fast as NumPy's
+            size = (self.camera.width, self.camera.height)
+            levels = cv2.resize(levels, size, interpolation=cv2.INTER_AREA)
+        if self._blur_px > 0:
+            levels = cv2.GaussianBlur(levels, (0, 0), self._blur_px, borderType=cv2.BORDER_REPLICATE)
+        return levels.astype(np.float32, copy=False)
 
 
 class Color:

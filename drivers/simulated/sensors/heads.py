@@ -28,7 +28,7 @@ class HeadFactory:
         offset, wiggle, dark, pattern: offsets of the time-of-flight head; see `Address`.
         lens: distortion of all imaging heads.
         mosaic: of the Bayer head.
-        samples: rays per pixel and axis of the colour and Bayer heads.
+        samples, blur_px: rays per pixel and axis, and blur of the lens, of the colour and Bayer heads; see `Picture`.
     """
 
     sizes: Mapping[str, tuple[int, int]] = field(default_factory=dict)
@@ -41,6 +41,7 @@ class HeadFactory:
     lens: LensModel = field(default_factory=Lens)
     mosaic: Mosaic = field(default_factory=Mosaic)
     samples: int = 1
+    blur_px: float = 0.0
 
     def head(self, name: str, scene: Scene) -> Head:
         """The head with a name in `OPTICS` or `BEAMS`, observing a scene.
@@ -68,7 +69,7 @@ class HeadFactory:
                 return Color(name, self._picture(camera, scene), self.rate_hz, self.noise * SIGMA)
 
     def _picture(self, camera: Camera, scene: Scene) -> Picture:
-        return Picture(camera, scene, self.samples)
+        return Picture(camera, scene, self.samples, self.blur_px)
 
     def _time_of_flight_noise(self) -> TimeOfFlightNoise:
         default = TimeOfFlightNoise()

@@ -1,9 +1,10 @@
-"""Covariance of every vertex: by the errors of Θ, by those of the initial mesh, and by the misfit of the model."""
+"""Covariance of every vertex: by the errors of Θ, by those of the initial mesh, and by what neither knows of."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.models.base import DeformationModel, SparseJacobian, Surface
+from abs_service.tracker.posterior.covariance.first_frame_slide import Slide
 from abs_service.tracker.posterior.covariance.mesh_noise import MeshNoise
 from abs_service.tracker.posterior.covariance.misfit import Misfit
 from abs_service.tracker.posterior.frame_posterior import FramePosterior
@@ -16,9 +17,11 @@ class VertexCovariance:
 
     Args:
         model: the deformation model.
+        slide: of its mesh in the first frame.
     """
 
-    def __init__(self, model: DeformationModel):
+    def __init__(self, model: DeformationModel, slide: Slide):
+        self._slide = slide
         self._mesh_noise = MeshNoise(model)
         self._misfit = Misfit(model.mesh)
         self._began = False
@@ -41,11 +44,10 @@ class VertexCovariance:
         if self._began and near.sensed:  # nothing has moved in the first frame, nothing is known in one without images
             self._mesh_noise.update(frame, optimum.theta)
         self._began = True
-        return (
-            propagated(near.sparse_jacobian, theta_covariance)
-            + along_normals(optimum.surface, self._mesh_noise.variance)
-            + isotropic(self._misfit.variance(*frame.misfit(optimum.surface)))
-        )
+        by_noise = propagated(near.sparse_jacobian, theta_covariance)
+        by_noise += along_normals(optimum.surface, self._mesh_noise.variance)
+        misfit = isotropic(self._misfit.variance(*frame.misfit(optimum.surface)))
+        return by_noise + self._slide.beyond(optimum.surface, by_noise) + misfit
 
 
 def propagated(sparse_jacobian: SparseJacobian, covariance: NDArray[np.float64]) -> NDArray[np.float64]:
