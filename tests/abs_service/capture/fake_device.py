@@ -2,12 +2,14 @@
 
 import threading
 
+import numpy as np
+
 from calib import pose
 from calib.camera import Camera
 from drivers.contract.capabilities import Capabilities, StreamInfo
 from drivers.contract.controls import Controls
 from drivers.contract.device import DeviceInfo, DeviceState
-from drivers.contract.frame import Kind
+from drivers.contract.frame import Frame, Kind
 
 CAMERA = Camera(4, 3, 5.0, 5.0, 1.5, 1.0, T_rs=pose.from_rotation_vector([0.1, 0.2, 0.3], [0.05, 0, 0.01]))
 
@@ -32,3 +34,24 @@ class FakeDevice:
 
     def close(self):
         self.closed.set()
+
+
+def frame(sensor="head", seq=0):
+    """An image of a head."""
+    return Frame(sensor, "image", Kind.COLOR, np.zeros((3, 4), np.uint8), "mono8", 1, 1, seq)
+
+
+def failing(reason):
+    """Makes a device that fails after its first frame."""
+
+    def start(sink):
+        sink.on_state(DeviceState.STREAMING, "")
+        sink.on_frame(frame())
+        sink.on_state(DeviceState.FAILED, reason)
+
+    return lambda: FakeDevice(start=start)
+
+
+def working():
+    """A device with one frame."""
+    return FakeDevice(start=lambda sink: (sink.on_state(DeviceState.STREAMING, ""), sink.on_frame(frame())))

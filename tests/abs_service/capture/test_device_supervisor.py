@@ -5,7 +5,6 @@ import threading
 import time
 from types import MappingProxyType
 
-import numpy as np
 import pytest
 from absmsg.v1.health_pb2 import Health as Message
 
@@ -13,14 +12,11 @@ from abs_service.bus.health import Health
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.capture import device_supervisor, stall_detector
 from abs_service.capture.device_supervisor import DeviceSupervisor
-from abs_service.commands.parts import rig_devices
-from abs_service.commands.parts.rig_devices import HeadError, SettingError
-from drivers.contract.controls import Control, ControlInfo, ControlKind, Controls
+from abs_service.commands.parts.rig_devices import HeadError
 from drivers.contract.device import AddressError, DeviceError, DeviceState
-from drivers.contract.frame import Frame, Kind
 from drivers.simulated import open_device
 from tests.abs_service.bus.loopback import LoopbackBus, health_now
-from tests.abs_service.capture.fake_device import FakeDevice
+from tests.abs_service.capture.fake_device import FakeDevice, failing, frame, working
 from tests.waiting import eventually
 
 
@@ -41,10 +37,6 @@ class Collector:
 
     def on_warning(self, condition, message):
         pass
-
-
-def frame(sensor="head", seq=0):
-    return Frame(sensor, "image", Kind.COLOR, np.zeros((3, 4), np.uint8), "mono8", 1, 1, seq)
 
 
 @pytest.fixture
@@ -80,21 +72,15 @@ def keep(monkeypatch, asked):
         supervisor.close(5)
 
 
+@pytest.fixture
+def soon_silent(monkeypatch):
+    """A device is stalled after 0.2 s, and opened again after 0.6 s."""
+    monkeypatch.setattr(stall_detector, "STALL_NS", 200_000_000)
+    monkeypatch.setattr(stall_detector, "REOPEN_NS", 600_000_000)
+
+
 def no_device():
     raise DeviceError("no such device; plug it in")
-
-
-def failing(reason):
-    def start(sink):
-        sink.on_state(DeviceState.STREAMING, "")
-        sink.on_frame(frame())
-        sink.on_state(DeviceState.FAILED, reason)
-
-    return lambda: FakeDevice(start=start)
-
-
-def working():
-    return FakeDevice(start=lambda sink: (sink.on_state(DeviceState.STREAMING, ""), sink.on_frame(frame())))
 
 
 def test_a_failed_device_is_opened_again_in_a_later_epoch(keep):
@@ -134,9 +120,8 @@ def test_a_mistake_of_a_driver_is_a_failure_like_any_other(keep, caplog):
     assert "ZeroDivisionError" in caplog.text
 
 
-def test_a_device_that_falls_silent_is_stalled_and_then_opened_again(keep, monkeypatch):
-    monkeypatch.setattr(stall_detector, "STALL_NS", 200_000_000)
-    monkeypatch.setattr(stall_detector, "REOPEN_NS", 600_000_000)
+@pytest.mark.usefixtures("soon_silent")
+def test_a_device_that_falls_silent_is_stalled_and_then_opened_again(keep):
     _, collector, health = keep(working, working)
     first = collector.frames.get(timeout=5)
     assert eventually(lambda: health().labels["device.sim"] == "stalled")
@@ -173,20 +158,6 @@ def test_warnings_and_gauges_of_a_device_are_in_the_health(keep):
     assert health().gauges["device.sim.temperature_c"] == 41.5
     sinks[0].on_warning("usb speed", "")
     assert eventually(lambda: health().level == Message.LEVEL_OK)
-
-
-def test_a_control_is_set_at_every_opening_and_a_wrong_one_is_explained():
-    held = {}
-    info = ControlInfo("exposure_s", ControlKind.NUMBER, "s", 1e-5, 0.03)
-    device = FakeDevice()
-    device.controls = Controls([Control(info, lambda: 0.0, lambda value: held.update(exposure_s=value))])
-    rig_devices.set_controls(device, {"exposure_s": 0.01}, "rig.toml: devices.cam.controls")
-    assert held == {"exposure_s": 0.01}
-    expected = r"^rig\.toml: devices\.cam\.controls\.exposure_s = 5: must be a number from 1e-05 to 0\.03 s$"
-    with pytest.raises(SettingError, match=expected):
-        rig_devices.set_controls(device, {"exposure_s": 5}, "rig.toml: devices.cam.controls")
-    with pytest.raises(SettingError, match=r"controls\.gain: the device has no such control, it has: exposure_s"):
-        rig_devices.set_controls(device, {"gain": 5}, "rig.toml: devices.cam.controls")
 
 
 def test_a_device_that_does_not_answer_when_it_is_set_is_tried_again(keep):
@@ -264,10 +235,8 @@ def test_what_fails_after_the_end_is_no_error_of_the_rig(keep):
     assert supervisor.fatal_error is None
 
 
-def test_a_frozen_camera_is_opened_again_and_counted(keep, monkeypatch):
-    monkeypatch.setattr(stall_detector, "STALL_NS", 200_000_000)
-    monkeypatch.setattr(stall_detector, "REOPEN_NS", 600_000_000)
-
+@pytest.mark.usefixtures("soon_silent")
+def test_a_frozen_camera_is_opened_again_and_counted(keep):
     def frozen():
         return open_device("simulated://sheet?sensors=tof&tof=32x24&fault=freeze@5", time.monotonic_ns)
 
