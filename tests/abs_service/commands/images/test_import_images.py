@@ -1,4 +1,4 @@
-"""`abs-service import` makes a recording that can be replayed, or says with exit code 2 what is wrong."""
+"""`abs-service import` makes a recording that can be replayed."""
 
 import json
 from collections.abc import Callable
@@ -12,38 +12,8 @@ from abs_service import cli
 from abs_service.supervision.exit_codes import Exit
 from drivers.contract.frame import Frame, Geometry, Kind
 from drivers.replay import Recording
+from tests.abs_service.commands.images.importing import frames_of, open3d, run
 from tests.drivers.o3r import pcic_messages
-
-CAMERA = """\
-[depth]
-width = 4
-height = 3
-fx = 4.0
-fy = 4.0
-cx = 1.5
-cy = 1.0
-"""
-COLOR = CAMERA.replace("depth", "color") + "T_rs = { translation = [0.05, 0.0, 0.0] }\n"
-
-
-@pytest.fixture
-def folder(tmp_path: Path) -> Path:
-    """Three exposures, one of them without colour, and a camera file."""
-    for k in range(3):
-        cv2.imwrite(str(tmp_path / f"depth_{k:03}.png"), np.full((3, 4), 1000 + k, np.uint16))
-        cv2.imwrite(str(tmp_path / f"mask_{k:03}.png"), np.eye(3, 4, dtype=np.uint8))
-        if k != 1:
-            cv2.imwrite(str(tmp_path / f"color_{k:03}.png"), np.full((3, 4, 3), 40 * k, np.uint8))
-    (tmp_path / "camera.toml").write_text(CAMERA + COLOR)
-    return tmp_path
-
-
-def run(folder: Path, *options: str) -> int:
-    return cli.main(["import", str(folder), "--layout", "pairs", "--out", str(folder / "out.mcap"), *options])
-
-
-def frames_of(path: Path) -> list[Frame]:
-    return [item for item in Recording(path).frames() if isinstance(item, Frame)]
 
 
 def test_pairs_become_a_recording(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -107,17 +77,6 @@ def test_a_benchmark_sequence_needs_no_camera_file(tmp_path: Path) -> None:
     assert Recording(tmp_path / "out.mcap").cameras["depth"].fx == 525
 
 
-def open3d(folder: Path, name: str, **changes: object) -> list[str]:
-    """A folder as Open3D's recorders write it; the arguments that import it."""
-    for sensor, image in (("depth/000007.png", np.full((3, 4), 2000, np.uint16)), ("color/000007.jpg", None)):
-        (folder / sensor).parent.mkdir()
-        cv2.imwrite(str(folder / sensor), np.zeros((3, 4, 3), np.uint8) if image is None else image)
-    matrix = [4.0, 0, 0, 0, 5.0, 0, 1.5, 1.0, 1]  # column by column
-    given = {"width": 4, "height": 3, "intrinsic_matrix": matrix, "serial_number": "1"} | changes
-    (folder / name).write_text(json.dumps(given))
-    return ["import", str(folder), "--layout", "open3d", "--out", str(folder / "out.mcap")]
-
-
 @pytest.mark.parametrize(
     ("name", "changes", "metres"),
     [("camera_intrinsic.json", {}, 2.0), ("intrinsic.json", {"depth_scale": 4000.0, "fps": 30.0}, 0.5)],
@@ -129,25 +88,6 @@ def test_a_folder_of_open3d_brings_its_camera(tmp_path: Path, name, changes, met
     cameras = Recording(tmp_path / "out.mcap").cameras
     for camera in (cameras["depth"], cameras["color"]):
         assert (camera.fx, camera.fy, camera.cx, camera.cy, camera.lens.is_pinhole) == (4, 5, 1.5, 1, True)
-
-
-@pytest.mark.parametrize(
-    ("changes", "complaint"),
-    [
-        ({"intrinsic_matrix": [1, 2]}, "camera_intrinsic.json:\n  intrinsic_matrix"),
-        ({"depth_scale": 0}, "camera_intrinsic.json:\n  depth_scale"),
-        ({"width": None}, "camera_intrinsic.json:\n  width"),
-    ],
-)
-def test_wrong_intrinsics_of_open3d_are_named(tmp_path: Path, capsys, changes, complaint) -> None:
-    assert cli.main(open3d(tmp_path, "camera_intrinsic.json", **changes)) == Exit.USER
-    assert complaint in capsys.readouterr().err
-
-
-def test_a_folder_of_open3d_without_intrinsics_is_refused(tmp_path: Path, capsys) -> None:
-    arguments = open3d(tmp_path, "other.json")
-    assert cli.main(arguments) == Exit.USER
-    assert "has neither camera_intrinsic.json nor intrinsic.json" in capsys.readouterr().err
 
 
 def test_a_recording_of_another_program_brings_its_calibration(
@@ -163,55 +103,6 @@ def test_a_recording_of_another_program_brings_its_calibration(
     assert recording.cameras["depth"].fx == pcic_messages.LENS[0]
     deviations = [frame for frame in frames_of(tmp_path / "out.mcap") if frame.kind == Kind.DEVIATION]
     assert [frame.unit for frame in deviations] == ["m", "m"]
-
-
-@pytest.mark.parametrize(
-    ("camera", "options", "complaint"),
-    [
-        (CAMERA, ["--depth", "*.tiff"], "no file matches '*.tiff'"),
-        (CAMERA, ["--mask", "m_*.png"], "no file matches 'm_*.png'"),
-        (CAMERA, ["--mask", "mask_*[01].png"], "depth_002.png: no mask that matches 'mask_*[01].png' has the number 2"),
-        (
-            CAMERA,
-            ["--depth", "color_*.png"],
-            "color_000.png: depth must have one channel of 16 bits, this is 3 × 8 bit",
-        ),
-        (CAMERA.replace("width = 4", "width = 5"), [], "depth_000.png: the image has 4 × 3 pixels, its camera 5 × 3"),
-        (CAMERA.replace("fx = 4.0\n", ""), [], "depth.fx: missing, but needed"),
-        (CAMERA.replace("fx", "focal"), [], "depth.focal: unknown key"),
-        (CAMERA.replace("fx = 4.0", "fx = -4.0"), [], "depth.fx = -4.0: must be greater than 0"),
-        (CAMERA + "geometry = 'x'", [], "depth.geometry = \"x\": must be 'z' or 'radial'"),
-        (CAMERA + "T_rs = { turn = 1 }", [], "depth.T_rs.turn: unknown key"),
-        (COLOR, [], "depth: missing, but needed"),
-        (CAMERA + "?", [], "camera.toml: cannot be understood"),
-        (None, ["--camera", "nowhere.toml"], "nowhere.toml: cannot be read: No such file"),
-        (None, [], "--camera: layout pairs needs a camera file"),
-        (CAMERA, ["--rig", "nowhere.toml"], "nowhere.toml: cannot be read"),
-        (CAMERA, ["--layout", "tum"], "depth.txt: cannot be read"),
-        (CAMERA, ["--layout", "tum", "--mask", "m*"], "--mask: only layout pairs has masks"),
-        (CAMERA, ["--out", "/nowhere/at/all.mcap"], "/nowhere/at/all.mcap: cannot be written: No such file"),
-    ],
-)
-def test_a_user_error_is_reported_with_exit_code_2(
-    folder: Path, capsys: pytest.CaptureFixture[str], camera: str | None, options: list[str], complaint: str
-) -> None:
-    if camera is not None:
-        (folder / "camera.toml").write_text(camera)
-        options = ["--camera", str(folder / "camera.toml"), *options]
-    before = sorted(folder.iterdir())
-    assert run(folder, *options) == Exit.USER
-    assert complaint in capsys.readouterr().err
-    assert sorted(folder.iterdir()) == before
-
-
-def test_a_missing_folder_and_an_existing_recording_are_named(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    camera = ["--camera", str(folder / "camera.toml")]
-    assert cli.main(["import", str(folder / "no"), "--layout", "pairs", "--out", "x.mcap", *camera]) == Exit.USER
-    assert "no: no such folder" in capsys.readouterr().err
-    (folder / "out.mcap").write_bytes(b"precious")
-    assert run(folder, *camera) == Exit.USER
-    assert "out.mcap: exists already" in capsys.readouterr().err
-    assert (folder / "out.mcap").read_bytes() == b"precious"
 
 
 @pytest.mark.parametrize(
@@ -251,32 +142,6 @@ def test_a_part_of_a_list_has_the_colours_of_its_moments(tmp_path: Path) -> None
         ("depth", 3),
         ("color", 3),
     ]
-
-
-def test_frames_that_are_not_there_are_refused(
-    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert run(folder, "--camera", str(folder / "camera.toml"), "--frames", "7:9") == Exit.USER
-    assert "--frames 7:9: no image has such a number; there are 0 to 2" in capsys.readouterr().err
-    arguments = ["import", str(tmp_path), "--layout", "o3r", "--out", str(tmp_path / "x.mcap"), "--frames", "0:2"]
-    assert cli.main(arguments) == Exit.USER
-    assert "--frames: a recording with layout o3r is imported as a whole" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize("frames", ["a", "1:2:0", "1-2", "", "1:2:3:4", "-1:2"])
-def test_frames_are_numbers_with_colons(folder: Path, capsys: pytest.CaptureFixture[str], frames: str) -> None:
-    with pytest.raises(SystemExit) as exit_info:
-        run(folder, f"--frames={frames}")
-    assert exit_info.value.code == Exit.USER
-    assert "must be FIRST:LAST or FIRST:LAST:STEP" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize("rate", ["0", "fast", "nan"])
-def test_a_rate_is_a_number(folder: Path, capsys: pytest.CaptureFixture[str], rate: str) -> None:
-    with pytest.raises(SystemExit) as exit_info:
-        run(folder, "--rate", rate)
-    assert exit_info.value.code == Exit.USER
-    assert f"'{rate}' must be a number from 0.001 to 10000" in capsys.readouterr().err
 
 
 def test_a_real_sequence_of_a_squeezed_toy(data_set: Callable[[str], Path], tmp_path: Path) -> None:
