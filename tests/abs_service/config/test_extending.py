@@ -5,10 +5,12 @@ import os
 import re
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 from typing import Any
 
 import pytest
+import tomli_w
 
 import abs_service as a
 from abs_service import config
@@ -16,15 +18,15 @@ from abs_service import config
 ROOT = Path(__file__).parents[3]
 PAGE = (ROOT / "docs" / "how-to" / "extending.md").read_text(encoding="utf-8")
 PARTS = dict(re.findall(r"```python\n# my_parts/(\w+)\.py\n(.*?)```", PAGE, re.DOTALL))
+SERVICE = ("-m", "abs_service")
 SAMPLE = ROOT / "recordings" / "sample.mcap"
 
 #: A thermal camera beside a depth camera; the second tracker does without.
 THERMAL = """
 version = 1
 name = "plate"
-
-[devices.cameras]
-uri = "simulated://sheet?sensors=tof,ir"
+devices.cameras.uri = "simulated://sheet?sensors=tof,ir"
+synchronisation.reference = "tof/depth"
 
 [sensors.tof]
 device = "cameras"
@@ -34,9 +36,6 @@ noise = { type = "constant", sigma = 0.002 }
 device = "cameras"
 head = "ir"
 noise = { type = "thermal", sigma_k = 0.1 }
-
-[synchronisation]
-reference = "tof/depth"
 
 [trackers.warm]
 sensors = ["tof", "thermal"]
@@ -75,7 +74,6 @@ for k in range(6):
         off[name] = max(off[name], abs(found[name].theta[0] - 0.002 * k))
 print(json.dumps([off, dict(found["warm"].residuals)]))
 """
-
 
 #: Tracks a disc before a wall with the page's template; prints status, centre [m] and largest radius [m].
 DISC = """
@@ -128,11 +126,11 @@ class Noise(grey.Noise): ...
 class Measurement(grey.Measurement): ...
 """
 ASKING = """
+import json
 from my_parts import derived
 from abs_service.tracker.measurements import grey, measurement
 
-for noise in (grey.Noise(), derived.Noise()):
-    print(type(measurement(noise)).__module__)
+print(json.dumps([type(measurement(noise)).__module__ for noise in (grey.Noise(), derived.Noise())]))
 """
 
 
@@ -158,44 +156,41 @@ def install(site: Path, parts: dict[str, str], declared: list[tuple[str, str, st
 
 def rig_file(folder: Path) -> Path:
     """The demo rig with every part from the page."""
-    text = config.to_toml(config.load_default())
-    text = re.sub(r"(?s)(\[trackers\.sheet\.model\]\n).*?\n(?=\[)", r'\1type = "translation"\n\n', text)
-    text = re.sub(r"(?s)(\[trackers\.sheet\.optimizer\]\n).*?(\n\[|\Z)", r'\1type = "random_search"\n\2', text)
-    text = re.sub(r"(?s)(\[trackers\.sheet\.region\]\n).*?\n(?=\[)", r'\1type = "left_half"\n\n', text)
-    text = re.sub(r"(?s)(\[trackers\.sheet\.objective\]\n).*?\n(?=\[)", r'\1type = "depth_only"\n\n', text)
-    noise = r'\1type = "linear"\nper_metre = 0.004\n\n'
-    text = re.sub(r"(?s)(\[sensors\.tof\.noise\]\n).*?\n(?=\[)", noise, text)
+    tree = tomllib.loads(config.to_toml(config.load_default()))
+    parts = {"model": "translation", "optimizer": "random_search", "region": "left_half", "objective": "depth_only"}
+    tree["trackers"]["sheet"] |= {table: {"type": part} for table, part in parts.items()}
+    tree["sensors"]["tof"]["noise"] = {"type": "linear", "per_metre": 0.004}
     path = folder / "rig.toml"
-    path.write_text(text, encoding="utf-8")
+    path.write_text(tomli_w.dumps(tree), encoding="utf-8")
     return path
 
 
-def estimates_of(recording: Path) -> list[a.Estimate]:
-    """The estimates of a recording."""
-    return list(a.open_recording(recording).estimates())
+def run(environment: dict[str, str], *arguments: str | Path, status: int = 0) -> subprocess.CompletedProcess[str]:
+    """Runs Python with these arguments, which has to end with this status."""
+    command = [sys.executable, *map(str, arguments)]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=240, check=False)
+    assert done.returncode == status, done.stderr
+    return done
 
 
-def run(environment: dict[str, str], *arguments: str | Path) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "abs_service", *map(str, arguments)]
-    return subprocess.run(command, env=environment, capture_output=True, text=True, timeout=240, check=False)
+def printed(environment: dict[str, str], program: str, *arguments: Path) -> list[Any]:
+    """The output of a program, read as JSON."""
+    return json.loads(run(environment, "-c", program, *arguments).stdout)
 
 
 def test_the_page_has_an_example_for_each_entry_point() -> None:
-    assert set(PARTS) == {
-        *("translation", "random_search", "left_half", "disc", "depth_only", "linear", "thermal", "plate"),
-    }
+    parts = ["translation", "random_search", "left_half", "disc", "depth_only", "linear", "thermal", "plate"]
+    assert sorted(PARTS) == sorted(parts)
 
 
 def test_parts_of_another_distribution_track_a_recording(installed, tmp_path) -> None:
     rig = rig_file(tmp_path)
-    checked = run(installed, "check", rig)
-    assert checked.returncode == 0, checked.stderr
-    done = run(installed, "replay", SAMPLE, "--config", rig, "--json", "--out", tmp_path / "out.mcap")
-    assert done.returncode == 0, done.stderr
+    run(installed, *SERVICE, "check", rig)
+    done = run(installed, *SERVICE, "replay", SAMPLE, "--config", rig, "--json", "--out", tmp_path / "out.mcap")
     estimates = [json.loads(line) for line in done.stdout.splitlines()]
     assert len(estimates) == 15
     assert {len(estimate["theta"]) for estimate in estimates} == {3}
-    fits = estimates_of(tmp_path / "out.mcap")
+    fits = a.open_recording(tmp_path / "out.mcap").estimates()
     assert {sensor for estimate in fits for sensor in estimate.residuals} == {"tof"}  # the objective of the page
     assert {estimate["status"] for estimate in estimates} <= {"TRACKING", "DEGRADED", "LOST"}
 
@@ -203,13 +198,9 @@ def test_parts_of_another_distribution_track_a_recording(installed, tmp_path) ->
 def test_a_measurement_of_another_distribution_counts(installed, tmp_path) -> None:
     rig = tmp_path / "plate.toml"
     rig.write_text(THERMAL, encoding="utf-8")
-    checked = run(installed, "check", rig)
-    assert checked.returncode == 0, checked.stderr
+    checked = run(installed, *SERVICE, "check", rig)
     assert "noise thermal" in checked.stdout
-    command = [sys.executable, "-c", SLIDING, str(rig)]
-    done = subprocess.run(command, env=installed, capture_output=True, text=True, timeout=240, check=False)
-    assert done.returncode == 0, done.stderr
-    off, residuals = json.loads(done.stdout)
+    off, residuals = printed(installed, SLIDING, rig)
     assert off["warm"] < 5e-4
     assert off["cold"] > 5e-3  # distances alone do not show that a wall slides along itself
     assert residuals["thermal"] == pytest.approx(1, abs=0.3)
@@ -234,36 +225,23 @@ def test_a_device_of_another_distribution_delivers(installed) -> None:
 
 
 def test_a_device_of_another_distribution_is_listed_and_its_addresses_checked(installed, tmp_path) -> None:
-    listed = run(installed, "devices", "--json")
+    listed = run(installed, *SERVICE, "devices", "--json")
     assert "plate://1" in listed.stdout
     rig = tmp_path / "plate.toml"
     text = THERMAL.partition("[sensors.thermal]")[0].replace("simulated://sheet?sensors=tof,ir", "plate://2")
-    rig.write_text(text + '[synchronisation]\nreference = "tof/depth"\n', encoding="utf-8")
-    refused = run(installed, "check", rig)
-    assert refused.returncode == 2
+    rig.write_text(text, encoding="utf-8")
+    refused = run(installed, *SERVICE, "check", rig, status=2)
     assert "must be plate:// or plate://1" in refused.stderr
-
-
-def printed(environment: dict[str, str], program: str) -> list[Any]:
-    """The output of a program, read as JSON."""
-    command = [sys.executable, "-c", program]
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=240, check=False)
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
 
 
 def test_a_declared_measurement_may_have_a_derived_noise_and_a_broken_one_disturbs_nobody(tmp_path) -> None:
     group, names = "abs_service.tracker.measurements", ("broken", "derived")
     parts = {"broken": "raise ImportError", "derived": DERIVED}
     environment = install(tmp_path / "site", parts, [(group, name, f"my_parts.{name}") for name in names])
-    command = [sys.executable, "-c", ASKING]
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=240, check=False)
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.split() == ["abs_service.tracker.measurements.grey", "my_parts.derived"]
+    assert printed(environment, ASKING) == ["abs_service.tracker.measurements.grey", "my_parts.derived"]
 
 
 def test_parts_that_are_not_installed_are_refused_with_what_there_is(tmp_path) -> None:
-    refused = run(dict(os.environ), "check", rig_file(tmp_path))
-    assert refused.returncode == 2
+    refused = run(dict(os.environ), *SERVICE, "check", rig_file(tmp_path), status=2)
     assert 'type = "translation": no such type' in refused.stderr
     assert "nurbs" in refused.stderr
