@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from abs_service.bus.clock_offsets import Offset
 from abs_service.pairing.common_clock import CommonClock
 from abs_service.pairing.synchroniser import Synchroniser
-from tests.abs_service.pairing.test_synchroniser import COLOR, MS, TOF, TOLERANCE, frame
+from tests.abs_service.pairing.streams import COLOR, MS, TOF, TOLERANCE, frame
 
 PERIOD_MS = 33
 HOUR_NS = 3600 * 10**9
