@@ -1,0 +1,73 @@
+"""A stream of images on the bus, and its recordings."""
+
+import queue
+import threading
+
+import numpy as np
+from absmsg.v1.deformation_state_pb2 import DeformationState
+from absmsg.v1.health_pb2 import Health
+from mcap.reader import make_reader
+
+from abs_service.bus import keys
+from abs_service.bus.contract import IMAGES, STATE
+from abs_service.bus.session import Role
+from abs_service.bus.stamps import HeaderFactory, WallClock
+from abs_service.bus.zenoh_bus import ZenohBus
+from drivers.contract.frame import Frame, Geometry, Kind
+from drivers.encoding import codec
+
+TOPIC = keys.image("tof", "depth")
+
+
+class Stream:
+    """Publishes noisy frames at 200 Hz from a thread and listens to the recorder's health."""
+
+    def __init__(self, endpoint, shape=(48, 64)):
+        self._clock = WallClock()
+        self._headers = HeaderFactory("demo", self._clock)
+        self._pixels = np.random.default_rng(1).integers(0, 65535, shape, np.uint16)
+        self._stop = threading.Event()
+        self._bus = ZenohBus.open("demo", endpoint, Role.ROUTER)
+        self.health = queue.SimpleQueue()
+        self._bus.subscribe("health/record", lambda sample: self.health.put(Health.FromString(sample.payload)))
+        self._thread = threading.Thread(target=self._run)
+
+    def __enter__(self):
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_):
+        self._stop.set()
+        self._thread.join()
+        self._bus.close()
+
+    def track(self):
+        """Publishes an estimate of the tracker "sheet"."""
+        publisher = self._bus.publisher(keys.state("sheet"), DeformationState.DESCRIPTOR.full_name, STATE)
+        state = DeformationState(header=self._headers.now(0), tracker="sheet", status=DeformationState.STATUS_TRACKING)
+        publisher.put(state.SerializeToString())
+
+    def wait_for(self, condition):
+        """The first health of the recorder that meets a condition."""
+        while not condition(health := self.health.get(timeout=20)):
+            pass
+        return health
+
+    def _run(self):
+        publisher = self._bus.publisher(TOPIC, codec.IMAGE_SCHEMA, IMAGES)
+        seq = 0
+        while not self._stop.wait(0.005):
+            t_ns = self._clock.monotonic()
+            frame = Frame("tof", "depth", Kind.DEPTH, self._pixels, "16UC1", t_ns, t_ns, seq, geometry=Geometry.RADIAL)
+            header = self._headers.at(t_ns, seq)
+            publisher.put(codec.encode_image(frame, self._clock.wall(t_ns)), codec.encode_info(frame, header))
+            seq += 1
+
+
+def frames(path):
+    """(sequence, log time [s]) of every frame in a recording, which must be readable by its index."""
+    with path.open("rb") as stream:
+        return [
+            (message.sequence, message.log_time / 1e9)
+            for _, _, message in make_reader(stream).iter_messages(topics=f"/{TOPIC}")
+        ]
