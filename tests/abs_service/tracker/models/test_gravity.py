@@ -1,7 +1,6 @@
 """The gravity model is eq. 9 segment by segment: exact, isometric, and stable for straight segments."""
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 import pytest
@@ -26,16 +25,15 @@ LENGTH, WIDTH = 0.3, 0.05
 HELD = pose.from_rotation_vector((0.3, -0.2, 0.1), (0.05, -0.1, 1.0))
 FLAT = np.zeros(65)
 DOWN = np.array([0.0, 1.0, 0.0])
+CAMERA = Camera(176, 144, 220.0, 220.0, 87.5, 71.5)
 
 #: Rounded, because eq. 9 as printed loses all digits where an angle is tiny; small ones have a test of their own.
 bends = st.lists(st.integers(-1500, 1500), min_size=1, max_size=8).map(lambda milli: np.array(milli) / 1000)
 poses = st.lists(st.floats(-0.5, 0.5), min_size=6, max_size=6).map(np.array)
 
 
-def model(
-    segments: int, T_rg: np.ndarray = HELD, turn: np.ndarray = FLAT, gripper: Literal["free", "fixed"] = "free"
-) -> Gravity:
-    return Gravity(Strip(T_rg, LENGTH, WIDTH, turn, 0.004), segments, gripper == "free", 300, DOWN)
+def model(segments: int, T_rg: np.ndarray = HELD, turn: np.ndarray = FLAT) -> Gravity:
+    return Gravity(Strip(T_rg, LENGTH, WIDTH, turn, 0.004), segments, True, 300, DOWN)
 
 
 def flat_points(shape: Gravity) -> np.ndarray:
@@ -117,9 +115,8 @@ def test_scales_move_the_flat_strip_by_about_a_metre_per_unit(segments):
     shape = model(segments)
     motion = shape.jacobian(np.zeros(segments + 6)) * shape.scales
     farthest = np.linalg.norm(motion, axis=1).max(axis=0)
-    assert np.all(
-        (farthest[[*range(segments), *range(-3, 0)]] > 0.3) & (farthest[[*range(segments), *range(-3, 0)]] < 1.5)
-    )
+    moving = farthest[[*range(segments), *range(-3, 0)]]
+    assert np.all((moving > 0.3) & (moving < 1.5))
 
 
 def test_many_segments_get_enough_columns():
@@ -159,7 +156,7 @@ def test_the_gripper_line_is_found_in_a_depth_image(stiffness, degrees):
     places, angles, sizes, bends = [], [], [], []
     for seed in range(2, 14):
         case = seen(f"simulated://strip?seed={seed}&stiffness={stiffness}", seed)
-        found = find_strip(case.detection, np.array([0, 1.0, 0]), np.array([0, -1.0, 0]))
+        found = find_strip(case.detection, DOWN, -DOWN)
         places.append(found.T_rg[:3, 3] - case.strip.T_rg[:3, 3])
         cosines = np.abs(np.sum(found.T_rg[:3, :3] * case.strip.T_rg[:3, :3], axis=0))
         angles.append(np.rad2deg(np.arccos(np.minimum(cosines, 1))).max())
@@ -178,7 +175,7 @@ def test_the_gripper_line_is_found_in_a_depth_image(stiffness, degrees):
 def test_lengths_scatter_as_they_say_they_do(stiffness):
     """Regression: the gripper's end of a strip that sags by 80° turned away from the camera, 50 mm too long."""
     cases = [seen(f"simulated://strip?seed={seed}&stiffness={stiffness}", 0) for seed in range(1, 13)]
-    found = [find_strip(case.detection, np.array([0, 1.0, 0]), np.array([0, -1.0, 0])) for case in cases]
+    found = [find_strip(case.detection, DOWN, -DOWN) for case in cases]
     errors = np.array([(one.length - 0.30) / one.length_deviation for one in found])
     assert np.sqrt(np.mean(errors**2)) < 1.2
     assert np.abs(errors).max() < 3
@@ -188,7 +185,7 @@ def test_lengths_scatter_as_they_say_they_do(stiffness):
 def test_the_load_that_a_first_frame_shows_scatters_as_it_says(stiffness):
     """Regression: mixed pixels at the rim bent the fitted strip, whose stiffness was up to a third too small."""
     cases = [seen(f"simulated://strip?seed={seed}&stiffness={stiffness}", 0) for seed in range(1, 13)]
-    found = [find_strip(case.detection, np.array([0, 1.0, 0]), np.array([0, -1.0, 0])) for case in cases]
+    found = [find_strip(case.detection, DOWN, -DOWN) for case in cases]
     # To first order, the bending angle of a strip is proportional to the load.
     turned = [np.ptp(case.strip.profile.angle) for case in cases]
     errors = np.array([np.log(abs(one.turn[-1]) / true) for one, true in zip(found, turned)])
@@ -205,18 +202,16 @@ def test_which_end_is_held_is_what_the_user_says():
 
 
 def test_too_little_to_see_is_said():
-    camera = Camera(176, 144, 220.0, 220.0, 87.5, 71.5)
     distance = np.full((144, 176), np.nan, np.float32)
     distance[70:74, 80:90] = 1.0
     with pytest.raises(DetectionError, match="the strip is too small in the depth image: 40 pixels, 100 needed"):
-        gravity.Settings().build(InitialDetection(distance, camera, 300))
+        gravity.Settings().build(InitialDetection(distance, CAMERA, 300))
 
 
 def test_a_wall_is_no_strip():
-    camera = Camera(176, 144, 220.0, 220.0, 87.5, 71.5)
-    wall = (1.6 / camera.rays()[..., 2]).astype(np.float32)
+    wall = (1.6 / CAMERA.rays()[..., 2]).astype(np.float32)
     with pytest.raises(DetectionError, match="the object is no strip"):
-        gravity.Settings().build(InitialDetection(wall, camera, 300))
+        gravity.Settings().build(InitialDetection(wall, CAMERA, 300))
 
 
 def test_a_strip_of_another_length_is_not_the_one_that_is_meant():
@@ -228,7 +223,7 @@ def test_a_strip_of_another_length_is_not_the_one_that_is_meant():
 @pytest.mark.parametrize("seed", [1, 8])
 def test_a_few_pixels_between_strip_and_wall_do_not_mislead(seed):
     case = seen(f"simulated://strip?seed={seed}&stiffness=0.01", seed)
-    found = find_strip(case.detection, np.array([0, 1.0, 0]), np.array([0, -1.0, 0]), 0.3)
+    found = find_strip(case.detection, DOWN, -DOWN, 0.3)
     # Two pixels; it was 40 mm when mixed pixels were included in the fit.
     assert np.linalg.norm(found.T_rg[:3, 3] - case.strip.T_rg[:3, 3]) < 10e-3
 

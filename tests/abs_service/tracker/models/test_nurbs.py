@@ -24,13 +24,17 @@ CASES = pytest.mark.parametrize("case", MODELS, ids=str)
 seeds = st.integers(0, 2**32 - 1)
 
 
+def vectors(largest: float) -> st.SearchStrategy[np.ndarray]:
+    return st.tuples(*[st.floats(-largest, largest)] * 3).map(np.array)
+
+
 def vertices_of(model: Nurbs, theta: np.ndarray) -> np.ndarray:
     return model.deform(theta[None]).vertices[0].T
 
 
-def order_of(mesh: Mesh) -> np.ndarray:
-    """For every vertex of `MESH` the index of the vertex of `mesh` with the same colour."""
-    return np.array([np.flatnonzero((mesh.colors == color).all(axis=1))[0] for color in MESH.colors])
+def order_of(mesh: Mesh, given: Mesh = MESH) -> np.ndarray:
+    """For every vertex of `given` the index of the vertex of `mesh` with the same colour."""
+    return np.array([np.flatnonzero((mesh.colors == color).all(axis=1))[0] for color in given.colors])
 
 
 @CASES
@@ -49,10 +53,6 @@ def test_only_the_order_of_the_vertices_changes(case):
     np.testing.assert_array_equal(mesh.chart[place], MESH.chart)
 
 
-def random_weights(generator: np.random.Generator, shape: tuple[int, int] = (5, 4)) -> np.ndarray:
-    return generator.uniform(0.5, 2.0, shape)
-
-
 def bound(control, weights, degree, count, generator):
     """Surface parameters, offsets and the corresponding vertices."""
     u, w = generator.uniform(0.05, 0.95, (2, count))
@@ -66,12 +66,11 @@ def bent_control(rows=5, columns=4):
     return np.stack([x, y, wave(x, y)], axis=-1)
 
 
-@pytest.mark.parametrize("degree", [2, 3])
-@pytest.mark.parametrize("weighted", [False, True])
+@pytest.mark.parametrize(("degree", "weighted"), [(2, False), (3, False), (2, True), (3, True)])
 def test_binding_finds_the_closest_point_and_the_offset(degree, weighted):
     """Eqs. 6 and 7, from an inaccurate initial guess."""
     generator = np.random.default_rng(7)
-    weights = random_weights(generator) if weighted else np.ones((5, 4))
+    weights = generator.uniform(0.5, 2.0, (5, 4)) if weighted else np.ones((5, 4))
     u, w, offset, vertices = bound(bent_control(), weights, degree, 40, generator)
     start = np.clip(np.stack([u, w]) + generator.uniform(-0.05, 0.05, (2, 40)), 0, 1)
     found = bind(vertices, bent_control(), weights, degree, *start)
@@ -91,11 +90,11 @@ def test_deformation_is_eq_8(shape, degree, seed, weighted):
     u, w, offset = *generator.uniform(0, 1, (2, 9)), generator.uniform(-0.02, 0.02, 9)
     mesh = sheet(3, 3)
     rest = bent_control(*shape)
-    weights = random_weights(generator, shape) if weighted else np.ones(shape)
+    weights = generator.uniform(0.5, 2.0, shape) if weighted else np.ones(shape)
     model = Nurbs(mesh, rest, weights, degree, u, w, offset)
     control = rest + generator.normal(0, 0.01, rest.shape)
     surface = model.deform(control.reshape(1, -1))
-    place = [np.flatnonzero((model.mesh.colors == color).all(axis=1))[0] for color in mesh.colors]
+    place = order_of(model.mesh, mesh)
     expected = [reference.deform(*at, control, weights, degree) for at in zip(u, w, offset)]
     normals = [reference.surface_normal(*at, control, weights, degree) for at in zip(u, w)]
     np.testing.assert_allclose(surface.vertices[0].T[place], expected, atol=2e-6)
@@ -109,8 +108,7 @@ def test_offsets_may_be_replaced_at_rest_and_deformed():
     model, other = (Nurbs(mesh, rest, weights, 2, u, w, offset) for offset in (before, after))
     model.set_offsets(other.offset.astype(float), np.full(9, 1e-3))
     theta = model.rest + generator.normal(0, 0.01, model.rest.shape)
-    for one, same in zip(model.deform(theta[None]).vertices, other.deform(theta[None]).vertices, strict=True):
-        np.testing.assert_array_equal(one, same)
+    np.testing.assert_array_equal(vertices_of(model, theta), vertices_of(other, theta))
     np.testing.assert_array_equal(model.jacobian(theta), other.jacobian(theta))
     np.testing.assert_array_equal(model.mesh.vertices, other.mesh.vertices)
     np.testing.assert_array_equal(model.mesh.deviation, 1e-3)
@@ -127,9 +125,7 @@ def test_every_candidate_is_deformed_by_itself(case):
         np.testing.assert_array_equal(together.normals[k], alone.normals[0])
 
 
-@given(
-    st.tuples(*[st.floats(-1.5, 1.5)] * 3).map(np.array), st.tuples(*[st.floats(-0.3, 0.3)] * 3).map(np.array), seeds
-)
+@given(vectors(1.5), vectors(0.3), seeds)
 def test_moving_all_control_points_rigidly_moves_the_mesh(rotation, translation, seed):
     model = MODELS[(4, 4), 2]
     T = pose.from_rotation_vector(rotation, translation)
@@ -171,8 +167,8 @@ def test_parameters_are_lengths_of_which_there_are_three_per_control_point():
 
 @pytest.mark.parametrize(("shape", "degree"), [((3, 3), 3), ((3, 12), 4), ((4, 3), 3)])
 def test_too_few_control_points_for_the_degree_are_named(shape, degree):
-    message = rf"control_points = \[{shape[0]}, {shape[1]}\] is too few for degree = {degree}: .* at least {degree + 1}"
-    with pytest.raises(ModelError, match=message):
+    few = rf"control_points = \[{shape[0]}, {shape[1]}\] is too few for degree = {degree}: .* at least {degree + 1}"
+    with pytest.raises(ModelError, match=few):
         Settings(control_points=shape, degree=degree).of_mesh(MESH)
 
 
@@ -222,8 +218,7 @@ def test_weights_without_control_points_are_refused():
 )
 def test_control_points_follow_from_the_proportions_and_the_mesh(rows, columns, size, shape):
     mesh = sheet(rows, columns, flat, size)
-    metres = replace(mesh, chart=mesh.vertices[:, :2])
-    for one in (mesh, metres):  # a chart may be in any unit
+    for one in (mesh, replace(mesh, chart=mesh.vertices[:, :2])):  # a chart may be in any unit
         assert len(Settings().of_mesh(one).rest) == 3 * shape[0] * shape[1]
 
 
@@ -250,7 +245,6 @@ def test_given_numbers_override_what_is_derived():
 
 @pytest.mark.parametrize("weights", [((1.0,) * 4,) * 3, ((1.0,) * 3,) * 4, ((1.0,) * 4, (1.0,) * 3) * 2])
 def test_weights_that_are_not_one_per_control_point_are_refused(weights):
-    with pytest.raises(
-        ValueError, match=r"4 rows of 4 numbers, one for each of control_points = \[4, 4\], not rows of"
-    ):
+    needed = r"4 rows of 4 numbers, one for each of control_points = \[4, 4\], not rows of"
+    with pytest.raises(ValueError, match=needed):
         Settings((4, 4), weights=weights)
