@@ -115,17 +115,15 @@ def test_as_many_unseen_samples_as_promised_lie_within_one_and_two_deviations(se
 
 def test_a_model_that_is_wrong_by_a_factor_is_told_by_the_variance():
     right = tof_amplitude.fit(laws.time_of_flight(1))
-    half = dataclasses.replace(
-        right, sigma=tuple(s / 2 for s in right.sigma), sigma_amplitude=right.sigma_amplitude / 2, minimum_sigma=1e-4
-    )
+    halves = {"sigma": tuple(s / 2 for s in right.sigma), "sigma_amplitude": right.sigma_amplitude / 2}
+    half = dataclasses.replace(right, **halves, minimum_sigma=1e-4)
     quality = goodness_of_fit(half, laws.time_of_flight(2))
     assert quality.variance == pytest.approx(4, rel=0.1)
     assert quality.within_95 < 0.75
 
 
 def test_a_model_that_explains_nothing_is_no_reason_to_fail():
-    far = constant.Constant(1e-4, offset=1.0)
-    quality = goodness_of_fit(far, laws.time_of_flight(1))
+    quality = goodness_of_fit(constant.Constant(1e-4, offset=1.0), laws.time_of_flight(1))
     assert quality.outlier_share == 0.5
     assert np.isfinite(quality.log_likelihood)
     assert np.isnan(quality.variance)
@@ -135,12 +133,8 @@ def test_a_model_that_explains_nothing_is_no_reason_to_fail():
 @pytest.mark.parametrize("name", FITS)
 def test_the_same_samples_give_the_same_model_and_no_returns_change_nothing(name):
     samples = laws.time_of_flight(1, 3000, outliers=0.02)
-    lost = Samples(
-        np.array([np.nan, np.inf, -1.0, 0.0, 1.0, 1.0]),
-        np.array([1.0, 1.0, 1.0, 1.0, np.nan, np.inf]),
-        np.full(6, 3000.0),
-        *laws.somewhere(6),
-    )
+    measured, true = [np.nan, np.inf, -1.0, 0.0, 1.0, 1.0], [1.0, 1.0, 1.0, 1.0, np.nan, np.inf]
+    lost = Samples(np.array(measured), np.array(true), np.full(6, 3000.0), *laws.somewhere(6))
     both = joined([samples, lost])
     assert FITS[name](samples) == FITS[name](both) == FITS[name](samples)
 
@@ -179,8 +173,7 @@ def test_bright_returns_that_err_more_are_not_read_as_a_negative_law():
 
 def test_where_the_domain_s_corner_holds_no_sample_the_deviation_is_no_less_than_elsewhere():
     samples = laws.time_of_flight(4)
-    model = gaussian_polynomial.fit(samples, (1, 3), (1, 1))
-    sigma = model.deviation(*laws.grid(), laws.somewhere(400))
+    sigma = gaussian_polynomial.fit(samples, (1, 3), (1, 1)).deviation(*laws.grid(), laws.somewhere(400))
     assert sigma.min() > 0.8 * laws.TOF.sigma(samples.true, samples.amplitude).min()
 
 
@@ -199,9 +192,8 @@ def test_more_samples_than_needed_are_thinned_and_tell_the_same(monkeypatch):
     everything = tof_amplitude.fit(samples)
     monkeypatch.setattr(fitting, "LARGEST", 5000)
     assert len(fitting.subsampled(samples)) == 5000
-    x, a = laws.grid()
-    p = laws.somewhere(len(x))
-    ratio = tof_amplitude.fit(samples).deviation(x, a, p) / everything.deviation(x, a, p)
+    everywhere = *laws.grid(), laws.somewhere(400)
+    ratio = tof_amplitude.fit(samples).deviation(*everywhere) / everything.deviation(*everywhere)
     assert np.abs(ratio - 1).max() < 0.1
 
 
