@@ -1,6 +1,6 @@
 """Interface of the conformance tests: a bench sets up a fake device of a driver with injectable faults.
 
-`test_conformance.py` runs the same tests for every driver. A driver joins by one module
+`test_conformance.py` and `test_faults.py` run the same tests for every driver. A driver joins by one module
 `tests/drivers/conformance/benches/NAME.py` with one function, a context manager that sets up a fake of its device:
 
     @contextmanager
@@ -19,11 +19,16 @@ On real hardware the tests without faults run with
 
 import threading
 from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from enum import StrEnum
 from pathlib import Path
 from typing import Protocol
 
 from drivers.contract.device import Device
+from tests.drivers.recording_sink import RecordingSink
+
+Open = Callable[[], Device]
 
 #: Frames of each stream that a fake delivers before its fault.
 BEFORE = 3
@@ -71,3 +76,15 @@ def resources() -> Counter[str]:
     held = Counter(thread.name for thread in threading.enumerate())
     held["descriptors"] = len(list(Path("/proc/self/fd").iterdir()))
     return held
+
+
+@contextmanager
+def streaming(device: Device) -> Iterator[RecordingSink]:
+    """A streaming device and its sink; closed at the end."""
+    sink = RecordingSink()
+    try:
+        device.start(sink)
+        assert sink.receives(1)
+        yield sink
+    finally:
+        device.close()

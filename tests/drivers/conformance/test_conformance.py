@@ -1,61 +1,19 @@
 """Conformance of every driver to the contract, on its fake and on real hardware; see `bench.py`."""
 
 import math
-import pkgutil
 import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from importlib import import_module
 from urllib.parse import urlsplit
 
-import numpy as np
 import pytest
 
 from drivers.contract.controls import ControlInfo, ControlKind, Value
-from drivers.contract.device import ControlError, Device, DeviceError, DeviceState
-from drivers.contract.frame import Kind
-from drivers.opening import open_device
-from tests.drivers.conformance import benches
-from tests.drivers.conformance.bench import Bench, Fault, dropped, resources
+from drivers.contract.device import ControlError, DeviceError, DeviceState
+from tests.drivers.conformance.bench import Bench, Open, resources, streaming
 from tests.drivers.recording_sink import RecordingSink
 from tests.waiting import eventually
 
-NAMES = sorted(module.name for module in pkgutil.iter_modules(benches.__path__))
 STARTS = 50
-
-Open = Callable[[], Device]
-
-
-@pytest.fixture(params=NAMES)
-def bench(request: pytest.FixtureRequest) -> Iterator[Bench]:
-    """The fake of each driver, one after the other."""
-    with import_module(f"tests.drivers.conformance.benches.{request.param}").bench() as bench:
-        yield bench
-
-
-@pytest.fixture(params=[*NAMES, pytest.param("hardware", marks=pytest.mark.hardware)])
-def opener(request: pytest.FixtureRequest) -> Iterator[Open]:
-    """Opens a working device: each driver's fake, or the real one that was named."""
-    if request.param == "hardware":
-        import time
-
-        uri = request.getfixturevalue("device_uri")
-        yield lambda: open_device(uri, time.monotonic_ns)
-        return
-    with import_module(f"tests.drivers.conformance.benches.{request.param}").bench() as bench:
-        yield bench.open
-
-
-@contextmanager
-def streaming(device: Device) -> Iterator[RecordingSink]:
-    """A streaming device and its sink; closed at the end."""
-    sink = RecordingSink()
-    try:
-        device.start(sink)
-        assert sink.receives(1)
-        yield sink
-    finally:
-        device.close()
 
 
 def test_it_says_who_it_is_and_what_it_delivers_and_delivers_that(opener: Open) -> None:
@@ -220,59 +178,3 @@ def test_two_devices_of_one_kind_do_not_disturb_each_other(bench: Bench) -> None
             assert first.receives(2)
             assert second.receives(2)
         assert second.receives(2)
-
-
-def test_lost_data_is_counted_and_never_delivered_torn(bench: Bench) -> None:
-    device = bench.open(Fault.DROP)
-    sizes = {stream.key: (stream.height, stream.width) for stream in device.capabilities.streams}
-    with streaming(device) as sink:
-        assert eventually(lambda: dropped(device) > 0)
-        assert sink.receives(2)
-    assert all(frame.data.shape[:2] == sizes[frame.key] for frame in sink.frames)
-    for frame in sink.frames:  # nothing is torn: what is lacking has no return
-        assert not frame.incomplete or (frame.kind == Kind.DEPTH and np.isnan(frame.si()).any())
-
-
-def test_a_device_that_stalls_can_be_stopped_and_started_again(bench: Bench) -> None:
-    device = bench.open(Fault.STALL)
-    with streaming(device) as sink:
-        assert sink.falls_silent()
-        assert device.state in {DeviceState.STREAMING, DeviceState.FAILED}
-        device.stop()
-        assert device.state == DeviceState.CLOSED
-        device.stop()
-
-
-def test_a_device_that_is_unplugged_says_so_and_can_be_closed(bench: Bench) -> None:
-    device = bench.open(Fault.UNPLUG)
-    with streaming(device) as sink:
-        assert sink.reaches(DeviceState.FAILED)
-        assert device.state == DeviceState.FAILED
-        reason = next(reason for state, reason in sink.states if state == DeviceState.FAILED)
-        assert reason
-        count = len(sink.frames)
-        assert not sink.receives(1, 0.2)
-    assert len(sink.frames) == count
-    assert device.state == DeviceState.CLOSED
-
-
-def test_images_of_the_wrong_size_are_counted_and_left_out(bench: Bench) -> None:
-    device = bench.open(Fault.WRONG_SIZE)
-    sizes = {stream.key: (stream.height, stream.width) for stream in device.capabilities.streams}
-    with streaming(device) as sink:
-        assert eventually(lambda: dropped(device) > 0)
-        assert sink.receives(2)
-    assert all(frame.data.shape[:2] == sizes[frame.key] for frame in sink.frames)
-
-
-def test_an_image_without_any_measurement_is_an_image(bench: Bench) -> None:
-    device = bench.open(Fault.NAN)
-    empty = []
-    with streaming(device) as sink:
-
-        def seen() -> bool:
-            empty[:] = [f for f in list(sink.frames) if f.kind == Kind.DEPTH and np.isnan(f.si()).all()]
-            return bool(empty)
-
-        assert eventually(seen)
-        assert sink.receives(2)

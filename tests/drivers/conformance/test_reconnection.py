@@ -1,9 +1,5 @@
 """The device supervisor reopens an unplugged device of every driver: same device, later epoch."""
 
-import pkgutil
-from collections.abc import Iterator
-from importlib import import_module
-
 import pytest
 
 from abs_service.bus.health import Health
@@ -12,17 +8,9 @@ from abs_service.capture import device_supervisor
 from abs_service.capture.device_supervisor import DeviceSupervisor
 from drivers.contract.device import Device
 from tests.abs_service.bus.loopback import LoopbackBus, health_now
-from tests.drivers.conformance import benches
 from tests.drivers.conformance.bench import Bench, Fault
 from tests.drivers.recording_sink import RecordingSink
 from tests.waiting import eventually
-
-
-@pytest.fixture(params=sorted(module.name for module in pkgutil.iter_modules(benches.__path__)))
-def bench(request: pytest.FixtureRequest) -> Iterator[Bench]:
-    """The fake of each driver, one after the other."""
-    with import_module(f"tests.drivers.conformance.benches.{request.param}").bench() as bench:
-        yield bench
 
 
 def test_an_unplugged_device_is_reopened_in_a_later_epoch(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
