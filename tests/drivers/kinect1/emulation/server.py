@@ -26,6 +26,7 @@ import numpy as np
 from tests.drivers.kinect1.emulation.emulated_camera import FORMS, EmulatedKinect, noise
 from tests.drivers.kinect1.emulation.packet_stream import RATE_HZ, PacketStream
 from tests.drivers.kinect1.emulation.testbed import NAMES, NUMBERS, SERIALS
+from tests.drivers.kinect1.emulation.umockdev import Program
 from tests.drivers.kinect1.emulation.usbfs import BEGIN_S, Connection, Socketed
 
 
@@ -76,7 +77,7 @@ class Bus:
     def _accept(listener: socket.socket, device: Socketed, patient: bool) -> None:
         while True:
             stream, _ = listener.accept()
-            threading.Thread(target=Connection(stream, device, patient).serve, daemon=True).start()
+            threading.Thread(target=Connection(Program(stream), device, patient).serve, daemon=True).start()
 
 
 def load(path: Path) -> EmulatedKinect:

@@ -1,29 +1,22 @@
 """The kernel's side of USB devices (usbfs), for programs that run under umockdev.
 
 umockdev's preloaded library sends every ioctl on a device's file to a socket; this answers them with an emulated camera
-behind. The protocol is umockdev's own and internal: 24 bytes in (command, request, argument), and out as many of
-"read so many bytes at an address of yours" and "write these" as are needed before "done, with this result".
+behind.
 """
 
 import errno
-import socket
 import struct
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
 from tests.drivers.kinect1.emulation import usb_descriptors
 from tests.drivers.kinect1.emulation.emulated_camera import EmulatedKinect
 from tests.drivers.kinect1.emulation.packet_stream import MICROFRAMES_HZ, images_of
-
-# umockdev's commands.
-_DONE, _RUN, _READ_MEMORY, _WRITE_MEMORY, _READ, _WRITE = 3, 4, 5, 6, 7, 8
-_MESSAGE = struct.Struct("<QQQ")
-_RESULT = struct.Struct("<qqq")
+from tests.drivers.kinect1.emulation.umockdev import Program
 
 # struct usbdevfs_urb, and struct usbdevfs_iso_packet_desc behind it: length, actual length, status.
 _URB = struct.Struct("<BBxxiIxxxxQiiiiiIQ")
@@ -91,14 +84,14 @@ class Connection:
     """One open file of a device: serves ioctls until it is closed.
 
     Args:
-        stream: the program's end.
+        program: the one that has the file open.
         device: what the file is.
         patient: whether the device waits while nobody takes its packets, as no real one does. A test of what becomes of
             packets needs it on a machine that is too busy for real time.
     """
 
-    def __init__(self, stream: socket.socket, device: Socketed, patient: bool) -> None:
-        self._stream = stream
+    def __init__(self, program: Program, device: Socketed, patient: bool) -> None:
+        self._program = program
         self._device = device
         self._queues: dict[int, deque[_Urb]] = {0x81: deque(), 0x82: deque()}
         self._ends: dict[int, int] = {0x81: 0, 0x82: 0}
@@ -121,16 +114,8 @@ class Connection:
 
     def serve(self) -> None:
         """Until the program closes the file."""
-        with self._stream:
-            while message := self._receive(_MESSAGE.size):
-                command, request, argument = _MESSAGE.unpack(message)
-                if command in {_READ, _WRITE}:  # of the file itself, which holds the descriptors: may be done there
-                    self._stream.sendall(_MESSAGE.pack(_RUN, 0, 0))
-                    self._receive(_MESSAGE.size)
-                    self._stream.sendall(_RESULT.pack(_DONE, 0, 0))
-                    continue
-                result = self._ioctl(request, argument)
-                self._stream.sendall(_RESULT.pack(_DONE, -1 if result < 0 else result, -min(result, 0)))
+        for request, argument in self._program.ioctls():
+            self._program.done(self._ioctl(request, argument))
         self._device.claimed -= self._claimed
 
     def _ioctl(self, request: int, argument: int) -> int:
@@ -140,11 +125,11 @@ class Connection:
         return self._handlers.get(request, lambda _: -errno.ENOTTY)(argument)
 
     def _capabilities(self, argument: int) -> int:
-        self._write(argument, struct.pack("<I", _CAPABLE))
+        self._program.write(argument, struct.pack("<I", _CAPABLE))
         return 0
 
     def _driver(self, argument: int) -> int:
-        self._write(argument + 4, self._device.driver.encode() + b"\0")
+        self._program.write(argument + 4, self._device.driver.encode() + b"\0")
         return 0 if self._device.driver else -errno.ENODATA
 
     def _release(self, _: int) -> int:
@@ -160,7 +145,7 @@ class Connection:
         return 0
 
     def _disconnect(self, argument: int) -> int:
-        _, code, _ = struct.unpack("<iiQ", self._read(argument, 16))
+        _, code, _ = struct.unpack("<iiQ", self._program.read(argument, 16))
         if code != DISCONNECT:
             return -errno.ENOTTY
         if self._device.stubborn:
@@ -169,7 +154,7 @@ class Connection:
         return 0
 
     def _submit(self, address: int) -> int:
-        kind, endpoint, _, _, buffer, _, _, _, count, *_ = _URB.unpack(self._read(address, _URB.size))
+        kind, endpoint, _, _, buffer, _, _, _, count, *_ = _URB.unpack(self._program.read(address, _URB.size))
         if kind == _CONTROL_URB:
             status, size = self._control(buffer)
             self._finish(address, status, size)
@@ -186,10 +171,10 @@ class Connection:
 
     def _control(self, buffer: int) -> tuple[int, int]:
         """Status and length of a control transfer, whose data follow its eight bytes of setup."""
-        kind, request, value, _, size = struct.unpack("<BBHHH", self._read(buffer, 8))
+        kind, request, value, _, size = struct.unpack("<BBHHH", self._program.read(buffer, 8))
         match kind, request:
             case 0x40, 0:
-                self._device.kinect.request(self._read(buffer + 8, size))
+                self._device.kinect.request(self._program.read(buffer + 8, size))
                 return 0, size
             case 0xC0, 0:
                 answer = self._device.kinect.answer(size)
@@ -197,7 +182,7 @@ class Connection:
                 answer = usb_descriptors.string(self._device.serial)[:size]
             case _:
                 return -errno.EPIPE, 0
-        self._write(buffer + 8, answer)
+        self._program.write(buffer + 8, answer)
         return 0, len(answer)
 
     def _reap(self, argument: int) -> int:
@@ -205,7 +190,7 @@ class Connection:
             self._advance()
         if not self._finished:
             return -errno.EAGAIN if self._device.plugged else -errno.ENODEV
-        self._write(argument, struct.pack("<Q", self._finished.popleft()))
+        self._program.write(argument, struct.pack("<Q", self._finished.popleft()))
         return 0
 
     def _advance(self) -> None:
@@ -226,8 +211,8 @@ class Connection:
         results[:, 0], results[:, 1] = packets.shape[1], lengths
         if self._device.disturbed:
             results[urb.first * 7 % 64 :: 64, 2] = 2**32 - errno.EPROTO
-        self._write(urb.buffer, packets.tobytes())
-        self._write(urb.address + _PACKETS, results.tobytes())
+        self._program.write(urb.buffer, packets.tobytes())
+        self._program.write(urb.address + _PACKETS, results.tobytes())
         self._finish(urb.address, 0, packets.size)
 
     def _discard(self, address: int) -> int:
@@ -240,26 +225,9 @@ class Connection:
         return -errno.EINVAL
 
     def _finish(self, address: int, status: int, size: int) -> None:
-        self._write(address + _STATUS, struct.pack("<i", status))
-        self._write(address + _ACTUAL, struct.pack("<i", size))
+        self._program.write(address + _STATUS, struct.pack("<i", status))
+        self._program.write(address + _ACTUAL, struct.pack("<i", size))
         self._finished.append(address)
-
-    def _read(self, address: int, size: int) -> bytes:
-        self._stream.sendall(_MESSAGE.pack(_READ_MEMORY, address, size))
-        return self._receive(size)
-
-    def _write(self, address: int, data: Any) -> None:
-        if data:
-            self._stream.sendall(_MESSAGE.pack(_WRITE_MEMORY, address, len(data)) + data)
-
-    def _receive(self, size: int) -> bytes:
-        parts = bytearray()
-        while len(parts) < size:
-            part = self._stream.recv(size - len(parts))
-            if not part:
-                return b""
-            parts += part
-        return bytes(parts)
 
 
 def _now() -> int:
