@@ -1,7 +1,7 @@
 """Bags of librealsense: synthetic files, written after the format description, are read back in SI units."""
 
 import contextlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -29,79 +29,83 @@ def bag(tmp_path: Path) -> Path:
     return write(tmp_path / "d435.bag")
 
 
+class Bag:
+    """Writes the messages of a camera into a bag."""
+
+    def __init__(self, writer: Any, store: Any) -> None:
+        self._writer = writer
+        self._store = store
+        self._connections: dict[str, Any] = {}
+
+    def put(self, topic: str, message: Any, time_ns: int = 1) -> None:
+        name = type(message).__msgtype__
+        if topic not in self._connections:
+            self._connections[topic] = self._writer.add_connection(topic, name, typestore=self._store)
+        self._writer.write(self._connections[topic], time_ns, self._store.serialize_ros1(message, name))
+
+    def make(self, name: str, **values: Any) -> Any:
+        return self._store.types[name](**values)
+
+    def header(self, seq: int, time_ns: int) -> Any:
+        stamp = self.make("builtin_interfaces/msg/Time", sec=time_ns // 10**9, nanosec=time_ns % 10**9)
+        return self.make("std_msgs/msg/Header", seq=seq, stamp=stamp, frame_id="0")
+
+    def image(self, seq: int, encoding: str, data: np.ndarray) -> Any:
+        h, w, flat = data.shape[0], data.shape[1], data.view(np.uint8).ravel()
+        step = flat.size // h
+        values = {"height": h, "width": w, "encoding": encoding, "is_bigendian": 0, "step": step, "data": flat}
+        return self.make("sensor_msgs/msg/Image", header=self.header(seq, 360 * 10**9 + seq * 10**8), **values)
+
+    def info(self, model: str) -> Any:
+        region = {"x_offset": 0, "y_offset": 0, "height": 0, "width": 0, "do_rectify": False}
+        return self.make(
+            "sensor_msgs/msg/CameraInfo",
+            header=self.header(0, 0),
+            height=6,
+            width=8,
+            distortion_model=model,
+            D=np.array([0.1, -0.02, 0.001, 0.002, 0.0]),
+            K=np.array([9.0, 0, 4, 0, 8.0, 3, 0, 0, 1]),
+            R=np.zeros(9),
+            P=np.zeros(12),
+            binning_x=0,
+            binning_y=0,
+            roi=self.make("sensor_msgs/msg/RegionOfInterest", **region),
+        )
+
+    def pose(self, turn: Iterable[float], translation: Iterable[float]) -> Any:
+        rotation = self.make("geometry_msgs/msg/Quaternion", **dict(zip("xyzw", map(float, turn))))
+        offset = self.make("geometry_msgs/msg/Vector3", **dict(zip("xyz", map(float, translation))))
+        return self.make("geometry_msgs/msg/Transform", rotation=rotation, translation=offset)
+
+
 def write(path: Path, model: str = "Brown Conrady", units: float = 0.0001, with_info: bool = True) -> Path:
     pytest.importorskip("rosbags", reason="needs rosbags: make all")
     from rosbags.rosbag1 import Writer
     from rosbags.typesys import Stores, get_typestore
 
-    store = get_typestore(Stores.ROS1_NOETIC)
-    types = store.types
-
-    def make(name: str, **values: Any) -> Any:
-        return types[name](**values)
-
-    def header(seq: int, time_ns: int) -> Any:
-        stamp = make("builtin_interfaces/msg/Time", sec=time_ns // 10**9, nanosec=time_ns % 10**9)
-        return make("std_msgs/msg/Header", seq=seq, stamp=stamp, frame_id="0")
-
-    def image(seq: int, encoding: str, data: np.ndarray) -> Any:
-        h, w, flat = data.shape[0], data.shape[1], data.view(np.uint8).ravel()
-        step = flat.size // h
-        values = {"height": h, "width": w, "encoding": encoding, "is_bigendian": 0, "step": step, "data": flat}
-        return make("sensor_msgs/msg/Image", header=header(seq, 360 * 10**9 + seq * 10**8), **values)
-
-    region = make("sensor_msgs/msg/RegionOfInterest", x_offset=0, y_offset=0, height=0, width=0, do_rectify=False)
-    info = make(
-        "sensor_msgs/msg/CameraInfo",
-        header=header(0, 0),
-        height=6,
-        width=8,
-        distortion_model=model,
-        D=np.array([0.1, -0.02, 0.001, 0.002, 0.0]),
-        K=np.array([9.0, 0, 4, 0, 8.0, 3, 0, 0, 1]),
-        R=np.zeros(9),
-        P=np.zeros(12),
-        binning_x=0,
-        binning_y=0,
-        roi=region,
-    )
     with Writer(path) as writer:
-        connections: dict[str, Any] = {}
-
-        def put(topic: str, message: Any, time_ns: int = 1) -> None:
-            name = type(message).__msgtype__
-            if topic not in connections:
-                connections[topic] = writer.add_connection(topic, name, typestore=store)
-            writer.write(connections[topic], time_ns, store.serialize_ros1(message, name))
-
-        put("/device_0/sensor_0/option/Depth Units/value", make("std_msgs/msg/Float32", data=units))
+        bag = Bag(writer, get_typestore(Stores.ROS1_NOETIC))
+        bag.put("/device_0/sensor_0/option/Depth Units/value", bag.make("std_msgs/msg/Float32", data=units))
         for stream, turn, translation in (
             ("sensor_0/Depth_0", (0, 0, 0, 1), (0, 0, 0)),
             ("sensor_1/Color_0", TURN, TRANSLATION),
         ):
             if with_info:
-                put(f"/device_0/{stream}/info/camera_info", info)
-            x, y, z, w = map(float, turn)
-            rotation = make("geometry_msgs/msg/Quaternion", x=x, y=y, z=z, w=w)
-            x, y, z = map(float, translation)
-            offset = make("geometry_msgs/msg/Vector3", x=x, y=y, z=z)
-            pose = make("geometry_msgs/msg/Transform", rotation=rotation, translation=offset)
-            put(f"/device_0/{stream}/tf/0", pose)
-        for seq, topic, encoding, data, exposure in (
+                bag.put(f"/device_0/{stream}/info/camera_info", bag.info(model))
+            bag.put(f"/device_0/{stream}/tf/0", bag.pose(turn, translation))
+        for seq, stream, encoding, data, exposure in (
             (7, "sensor_0/Depth_0", "mono16", DEPTH, "6452"),
             (3, "sensor_1/Color_0", "rgb8", COLOR, "166"),
             (8, "sensor_0/Depth_0", "mono16", DEPTH + np.uint16(1), "nan"),
         ):
             time_ns = seq * 10**8
-            put(f"/device_0/{topic}/image/data", image(seq, encoding, data), time_ns)
+            bag.put(f"/device_0/{stream}/image/data", bag.image(seq, encoding, data), time_ns)
             about = {"timestamp_domain": "Hardware Clock", "system_time": str(1.5e12 + seq * 100 + 17 * (seq == 8))}
             for key, value in (about | {"Actual Exposure": exposure, "Gain Level": "16"}).items():
-                put(
-                    f"/device_0/{topic}/image/metadata",
-                    make("diagnostic_msgs/msg/KeyValue", key=key, value=value),
-                    time_ns,
-                )
-        put("/device_1/sensor_0/Depth_0/image/data", image(1, "mono16", DEPTH), 5)
+                said = bag.make("diagnostic_msgs/msg/KeyValue", key=key, value=value)
+                bag.put(f"/device_0/{stream}/image/metadata", said, time_ns)
+        bag.put("/device_1/sensor_0/Depth_0/image/data", bag.image(1, "mono16", DEPTH), 5)
     return path
 
 
