@@ -1,4 +1,4 @@
-"""Shared fixtures: repeatable property tests, processes of the service, a real device, large data sets."""
+"""Shared fixtures: repeatable property tests, processes of the service, a real device, large data sets, a browser."""
 
 import faulthandler
 import os
@@ -28,6 +28,20 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 
 #: Time that the interpreter has to end after the last line of the report [s].
 EXIT_S = 10.0
+
+CHROMIUM = "/usr/bin/chromium"
+CHROMIUM_OPTIONS = [
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--enable-unsafe-swiftshader",
+    "--use-angle=swiftshader",
+]
 
 
 def pytest_unconfigure() -> None:
@@ -143,3 +157,16 @@ def launch():
         if process.poll() is None:
             process.send_signal(signal.SIGKILL)
         process.communicate()
+
+
+@pytest.fixture
+def browser():
+    """Chromium; skipped where it is missing."""
+    sync_api = pytest.importorskip("playwright.sync_api")
+    with sync_api.sync_playwright() as playwright:
+        try:
+            opened = playwright.chromium.launch(executable_path=CHROMIUM, args=CHROMIUM_OPTIONS)
+        except sync_api.Error as error:
+            pytest.skip(f"no Chromium: {str(error).splitlines()[0]}")
+        yield opened
+        opened.close()

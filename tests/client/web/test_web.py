@@ -116,23 +116,16 @@ def test_node_prints_estimates(tracker, address):
 
 
 @pytest.mark.slow
-def test_a_browser_shows_theta_and_draws_the_mesh(tracker, address):
-    sync_api = pytest.importorskip("playwright.sync_api")
-    with sync_api.sync_playwright() as playwright:
-        try:
-            browser = playwright.chromium.launch(executable_path="/usr/bin/chromium", args=["--no-sandbox"])
-        except sync_api.Error as error:
-            pytest.skip(f"no Chromium: {str(error).splitlines()[0]}")
-        page = browser.new_page()
-        page.set_default_timeout(1e3 * TIMEOUT_S)
-        page.goto(address)
-        blank = page.locator("canvas").screenshot()
-        with estimating(tracker):
-            page.get_by_text("Θ[1] = 0.500").wait_for()
-            page.get_by_text("TRACKING").wait_for()
-            drawn = page.locator("canvas").screenshot()
-        page.get_by_text("STALE").wait_for()
-        browser.close()
+def test_a_browser_shows_theta_and_draws_the_mesh(tracker, address, browser):
+    page = browser.new_page()
+    page.set_default_timeout(1e3 * TIMEOUT_S)
+    page.goto(address)
+    blank = page.locator("canvas").screenshot()
+    with estimating(tracker):
+        page.get_by_text("Θ[1] = 0.500").wait_for()
+        page.get_by_text("TRACKING").wait_for()
+        drawn = page.locator("canvas").screenshot()
+    page.get_by_text("STALE").wait_for()
     assert drawn != blank
 
 

@@ -6,6 +6,7 @@ import pytest
 
 from tests.system.running import wait_until
 
+pytest.importorskip("viser")
 sync_api = pytest.importorskip("playwright.sync_api")
 
 PATIENCE_S = 120  # a browser that renders in software, beside a rig

@@ -26,16 +26,7 @@ def test_the_page_shows_a_mesh_that_moves_acts_and_connects_again(run, rig_file,
     time.sleep(1.0)
     before = picture_of(page)
     wait_until(lambda: picture_of(page) != before, PATIENCE_S, "motion of the mesh")
-
-    version = listener.states()[-1][1].mesh_version
-    page.get_by_role("button", name="Reinitialise").click()
-    wait_until(lambda: listener.states()[-1][1].mesh_version > version, PATIENCE_S, "a new mesh")
-    says(page, "New mesh, version")
-    version = chosen_by_a_click(page, listener)
-    column, row = re.findall(r"\d+", page.inner_text("body").partition("pixel = ")[2])[:2]
-    done = abs_service("reinitialize", rig_file, "sheet", "--seed", column, row)
-    assert f'type = "seed"\npixel = [{column}, {row}]\n' in done.stdout
-    wait_until(lambda: listener.states()[-1][1].mesh_version > version, PATIENCE_S, "a new mesh from the command line")
+    meshes_are_made_anew(page, listener, rig_file)
 
     page.get_by_role("button", name="Start recording").click()
     says(page, "it records as long as it runs")
@@ -63,6 +54,19 @@ def test_the_page_shows_a_mesh_that_moves_acts_and_connects_again(run, rig_file,
     with RigListener(endpoint) as again:
         wait_until(again.tracks_since(0), START_S, "TRACKING")
     says(page, "Tracking")
+
+
+def meshes_are_made_anew(page, listener, rig_file):
+    """By the button, by a click on the object, and by the command that the page then names."""
+    version = listener.states()[-1][1].mesh_version
+    page.get_by_role("button", name="Reinitialise").click()
+    wait_until(lambda: listener.states()[-1][1].mesh_version > version, PATIENCE_S, "a new mesh")
+    says(page, "New mesh, version")
+    version = chosen_by_a_click(page, listener)
+    column, row = re.findall(r"\d+", page.inner_text("body").partition("pixel = ")[2])[:2]
+    done = abs_service("reinitialize", rig_file, "sheet", "--seed", column, row)
+    assert f'type = "seed"\npixel = [{column}, {row}]\n' in done.stdout
+    wait_until(lambda: listener.states()[-1][1].mesh_version > version, PATIENCE_S, "a new mesh from the command line")
 
 
 def test_all_trackers_of_a_rig_are_shown(endpoint, launch, browser, port, tmp_path):
