@@ -3,7 +3,6 @@
 import faulthandler
 import os
 import signal
-import socket
 import subprocess
 import sys
 from collections.abc import Callable
@@ -16,6 +15,7 @@ from abs_service import cli
 from abs_service.bus.security.mutual_tls import MutualTls
 from abs_service.bus.session import Role
 from abs_service.bus.zenoh_bus import ZenohBus
+from tests.ports import free_endpoint, free_port
 
 # The same examples on every machine and in every run; the first one may have to wait for a kernel to compile.
 hypothesis.settings.register_profile("repeatable", derandomize=True, deadline=None)
@@ -85,9 +85,13 @@ def data_set() -> Callable[[str], Path]:
 @pytest.fixture
 def endpoint():
     """An address on which nobody listens."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    return free_endpoint()
+
+
+@pytest.fixture
+def port():
+    """A port on which nobody listens."""
+    return free_port()
 
 
 @pytest.fixture

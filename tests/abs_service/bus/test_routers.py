@@ -1,7 +1,6 @@
 """Rigs whose routers connect to one of the lab: who is connected there reads them all, and no rig needs it."""
 
 import queue
-import socket
 from contextlib import closing
 
 import pytest
@@ -12,14 +11,9 @@ from abs_service.bus.session import BusError, Role
 from abs_service.bus.zenoh_bus import ZenohBus
 from abs_service.config import ConfigError, load
 from tests.conftest import encrypted
+from tests.ports import free_endpoint
 
 ATTEMPTS = 300
-
-
-def free_endpoint():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
 
 
 @pytest.fixture

@@ -38,13 +38,6 @@ def view(now_ns=NOW_NS, **capture):
 
 
 @pytest.fixture
-def port():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
-
-
-@pytest.fixture
 def read(port):
     """Reads all numbers by name and labels, as Prometheus does."""
     parser = pytest.importorskip("prometheus_client.parser", reason="needs the extra metrics")

@@ -2,13 +2,13 @@
 
 import json
 import signal
-import socket
 import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from tests.ports import free_port
 from tests.system.running import START_S, RigListener, kill, wait_until, write_rig
 
 pytestmark = [pytest.mark.slow, pytest.mark.realtime]
@@ -24,9 +24,7 @@ def write(path: Path, endpoint: str, **changes: tuple[str, str]) -> Path:
 
 
 def test_what_one_process_captures_another_tracks(endpoint, launch, tmp_path):
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        far = f"127.0.0.1:{probe.getsockname()[1]}"
+    far = f"127.0.0.1:{free_port()}"
     name, uri = ('name = "demo"', 'name = "cameras"'), 'uri = "simulated://sheet?seed=1"'
     cameras = write(
         tmp_path / "cameras.toml", f"tcp/{far}", name=name, uri=(uri, uri.replace("seed=1", "seed=1&rate=10&speed=0.2"))

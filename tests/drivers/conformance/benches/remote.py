@@ -1,6 +1,5 @@
 """Remote rigs, published over zenoh by threads of the test."""
 
-import socket
 import threading
 import time
 from collections.abc import Iterator
@@ -22,6 +21,7 @@ from drivers.contract.frame import Frame, Kind
 from drivers.opening import open_device
 from tests.drivers.conformance.bench import Fault
 from tests.drivers.replay.recordings import CAMERAS, SIMULATION
+from tests.ports import free_port
 
 RATE_HZ = 60
 #: The fault shows so many exposures after the device was opened, which has to subscribe first.
@@ -114,10 +114,7 @@ class RemoteBench:
 
 @contextmanager
 def bench() -> Iterator[RemoteBench]:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
-    bench = RemoteBench(port)
+    bench = RemoteBench(free_port())
     try:
         yield bench
     finally:
