@@ -1,8 +1,6 @@
 """A tracker that is nothing but its messages."""
 
-import threading
 import time
-from contextlib import contextmanager
 
 import numpy as np
 
@@ -11,6 +9,7 @@ from abs_service.bus.contract import MESH, STATE
 from abs_service.wire import estimate_messages
 from drivers.contract.host_clock import host_clock
 from tests.client.messages import TRIANGLE, mesh, state, topology
+from tests.waiting import repeating
 
 PERIOD_S = 0.01
 
@@ -42,19 +41,6 @@ class Tracker:
         self._mesh.put(mesh(self.seq, self.version, self.boot, self.vertices).SerializeToString())
 
 
-@contextmanager
 def estimating(tracker, **settings):
-    """Goes on estimating: nobody knows when a subscriber is there."""
-    enough = threading.Event()
-
-    def estimate():
-        while not enough.wait(PERIOD_S):
-            tracker.estimate(**settings)
-
-    thread = threading.Thread(target=estimate)
-    thread.start()
-    try:
-        yield
-    finally:
-        enough.set()
-        thread.join()
+    """Goes on estimating."""
+    return repeating(lambda: tracker.estimate(**settings), PERIOD_S)

@@ -21,6 +21,7 @@ from drivers.encoding import codec
 from drivers.simulated.address import parse
 from tests.client.publishing import PERIOD_S
 from tests.conftest import encrypted
+from tests.waiting import repeating
 
 POSE = np.array([[1.0, 0, 0, 0.05], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
 MODEL = SensorModel(sensor="tof", width=4, height=3, fx=5, fy=6, cx=1, cy=2, lens=[0.1], T_rs=POSE.ravel())
@@ -65,19 +66,8 @@ def test_what_is_no_image_is_told(change):
 def test_the_next_image_of_a_stream(bus, rig):
     frame = SIMULATION.frames(0)[0]
     images = bus.publisher(topics.image("tof", "depth"), codec.IMAGE_SCHEMA, IMAGES)
-    enough = threading.Event()
-
-    def put():
-        while not enough.wait(PERIOD_S):
-            images.put(sample(frame).payload, sample(frame).attachment)
-
-    thread = threading.Thread(target=put)
-    thread.start()
-    try:
+    with repeating(lambda: images.put(sample(frame).payload, sample(frame).attachment), PERIOD_S):
         np.testing.assert_array_equal(rig.image("tof", "depth").pixels, frame.data)
-    finally:
-        enough.set()
-        thread.join()
     with pytest.raises(NothingReceivedError):
         rig.image("tof", "amplitude", timeout_s=0.2)
 

@@ -16,6 +16,7 @@ from absmsg.v1.deformed_mesh_pb2 import DeformedMesh, MeshTopology
 from abs_service.bus import keys
 from abs_service.bus.contract import MESH, STATE
 from tests.abs_service.wire.golden.freeze import BINARY
+from tests.waiting import repeating
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "examples"
@@ -142,18 +143,5 @@ def reading(command):
             reader.kill()
 
 
-@contextmanager
 def putting(publisher, message):
-    enough = threading.Event()
-
-    def put():
-        while not enough.wait(PERIOD_S):
-            publisher.put(message.SerializeToString())
-
-    thread = threading.Thread(target=put)
-    thread.start()
-    try:
-        yield
-    finally:
-        enough.set()
-        thread.join()
+    return repeating(lambda: publisher.put(message.SerializeToString()), PERIOD_S)

@@ -26,7 +26,7 @@ from drivers.encoding import codec
 from drivers.simulated.address import parse
 from tests.client.publishing import estimating
 from tests.client.test_rig import sample
-from tests.waiting import eventually
+from tests.waiting import eventually, repeating
 
 FRAME = next(one for one in parse("simulated://sheet?sensors=tof").build().frames(0) if one.stream == "depth")
 HEIGHT, WIDTH = FRAME.data.shape
@@ -74,27 +74,9 @@ def in_ros(bus, endpoint, ros_router):
 
 
 @contextmanager
-def putting(publish):
-    """Goes on publishing: nobody knows when a subscriber is there."""
-    enough = threading.Event()
-
-    def put():
-        while not enough.wait(0.02):
-            publish()
-
-    thread = threading.Thread(target=put)
-    thread.start()
-    try:
-        yield
-    finally:
-        enough.set()
-        thread.join()
-
-
-@contextmanager
 def imaging(bus):
     publisher, one = bus.publisher(topics.image("tof", "depth"), codec.IMAGE_SCHEMA, IMAGES), sample(FRAME)
-    with putting(lambda: publisher.put(one.payload, one.attachment)):
+    with repeating(lambda: publisher.put(one.payload, one.attachment), 0.02):
         yield
 
 
@@ -188,7 +170,7 @@ def test_health_and_what_was_not_published_arrive_as_diagnostics(bus, in_ros, ro
         images.put(broken)
 
     found = {}
-    with putting(publish):
+    with repeating(publish, 0.02):
         while not {"demo/capture", "demo/ros2"} <= found.keys() or not found["demo/ros2"].values:
             said = diagnostics.next()[0].status[0]
             found[said.name] = said
