@@ -8,6 +8,8 @@ import sys
 import pytest
 from abs_client.ros2 import program
 
+from tests.waiting import eventually
+
 TIMEOUT_S = 30.0
 
 
@@ -23,10 +25,17 @@ def test_it_publishes_until_it_is_told_to_end(bus, endpoint, ros_router, number)
     router, session = ros_router
     with started("--endpoint", endpoint, "--router", router, environment={"ROS_DOMAIN_ID": "7"}) as process:
         assert next(iter(process.stdout or ())) == f"rig demo at {endpoint}: to ROS domain 7 at {router}\n"
-        (token,) = [str(one.ok.key_expr) for one in session.liveliness().get("@ros2_lv/**") if one.ok]
+        tokens = []  # the router may know of the node a moment after the program says that it publishes
+
+        def announced():
+            tokens[:] = [str(one.ok.key_expr) for one in session.liveliness().get("@ros2_lv/**") if one.ok]
+            return tokens
+
+        assert eventually(announced)
         process.send_signal(number)
         output, errors = process.communicate(timeout=TIMEOUT_S)
     assert (process.returncode, output, errors) == (0, "", "")
+    (token,) = tokens
     assert token.endswith("/0/0/NN/%/%/abs_demo")
     assert token.startswith("@ros2_lv/7/")
 
