@@ -5,7 +5,10 @@ import io
 import os
 import stat
 import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import BinaryIO
 from zipfile import BadZipFile, ZipFile
 
 from numpy.lib.npyio import NpzFile
@@ -15,6 +18,19 @@ from numpy.typing import NDArray
 LARGEST_TEXT = 1 << 20
 #: Largest file with the arrays of a noise model or of covariances, compressed or not [bytes].
 LARGEST_ARRAYS = 1 << 28
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[BinaryIO]:
+    """Opens a regular file of any size.
+
+    Raises:
+        OSError: it cannot be read, or is no regular file.
+    """
+    with open(path, "rb", opener=_without_waiting) as stream:
+        if not stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
+            raise OSError(errno.EINVAL, "it is no regular file", str(path))
+        yield stream
 
 
 def read(path: Path, largest: int) -> bytes:
@@ -27,12 +43,10 @@ def read(path: Path, largest: int) -> bytes:
     Raises:
         OSError: it cannot be read, is no regular file, or is larger.
     """
-    with open(path, "rb", opener=_without_waiting) as stream:
-        about = os.fstat(stream.fileno())
-        if not stat.S_ISREG(about.st_mode):
-            raise OSError(errno.EINVAL, "it is no regular file", str(path))
-        content = stream.read(largest + 1) if about.st_size <= largest else b""
-        if max(about.st_size, len(content)) > largest:
+    with opened(path) as stream:
+        size = os.fstat(stream.fileno()).st_size
+        content = stream.read(largest + 1) if size <= largest else b""
+        if max(size, len(content)) > largest:
             raise OSError(errno.EFBIG, f"it is larger than {largest} bytes", str(path))
         return content
 

@@ -1,4 +1,4 @@
-"""The size of a compressed image, from its header: before anything is decoded."""
+"""The size of a compressed image, from its header, and whether its end is there: before anything is decoded."""
 
 import io
 import warnings
@@ -8,16 +8,27 @@ from PIL import Image, UnidentifiedImageError
 #: Most pixels of an image: 8192 × 8192. Decoded, they are up to 512 MiB.
 MAX_PIXELS = 1 << 26
 
+#: First bytes of a format, what its last part begins with, and what ends it: decoders make up what is missing.
+_ENDS = ((b"\x89PNG", b"IDAT", b"IEND"), (b"\xff\xd8", b"\xff\xda", b"\xff\xd9"))
+
 
 class ImageSizeError(ValueError):
     """An image that is too large, or whose size is unknown."""
 
 
-def check(content: bytes) -> None:
+def is_cut_off(content: bytes) -> bool:
+    """True for a PNG or JPEG whose end is missing."""
+    return any(content.startswith(first) and content.rfind(end) <= content.rfind(last) for first, last, end in _ENDS)
+
+
+def check(content: bytes) -> tuple[int, int]:
     """Checks the size of an image that is to be decoded.
 
     Args:
         content: PNG, TIFF, PGM, PPM, JPEG, WebP or BMP.
+
+    Returns:
+        Width and height [px].
 
     Raises:
         ImageSizeError: more than `MAX_PIXELS`, or no image.
@@ -33,3 +44,4 @@ def check(content: bytes) -> None:
         raise ImageSizeError(f"no image with a known size: {type(error).__name__}") from error
     if width * height > MAX_PIXELS:
         raise ImageSizeError(f"{width} × {height} pixels, {MAX_PIXELS} are allowed")
+    return width, height

@@ -13,8 +13,6 @@ from drivers.image_folder.listing import ImageFolderError
 
 #: Largest file [bytes].
 LARGEST = 1 << 28
-#: First bytes of a format, what its last part begins with, and what ends it: decoders make up what is missing.
-_ENDS = ((b"\x89PNG", b"IDAT", b"IEND"), (b"\xff\xd8", b"\xff\xda", b"\xff\xd9"))
 #: Formats that can be read, for messages.
 READABLE = "PNG, TIFF, PGM, PPM, JPEG, WebP and BMP"
 
@@ -29,9 +27,8 @@ def read(path: Path) -> NDArray[Any]:
         content = limited.read(path, LARGEST)
     except OSError as error:
         raise ImageFolderError(f"{path}: cannot be read: {error.strerror}") from error
-    for first, last, end in _ENDS:
-        if content.startswith(first) and content.rfind(end) <= content.rfind(last):
-            raise ImageFolderError(f"{path}: the image is truncated: its end is missing")
+    if image_size.is_cut_off(content):
+        raise ImageFolderError(f"{path}: the image is truncated: its end is missing")
     try:
         image_size.check(content)
         image = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED)

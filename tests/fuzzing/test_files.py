@@ -27,12 +27,15 @@ from calib.formats.content import Hints
 from calib.noise.base import NoiseError
 from calib.noise.fit import maps
 from drivers.contract.device import DeviceError
+from drivers.encoding.foreign_recording import ForeignRecordingError
 from drivers.encoding.mcap_file import McapFile
 from drivers.image_folder import image_file
 from drivers.image_folder.listing import ImageFolderError
 from drivers.replay.contents import scan
 from drivers.replay.messages import messages
+from drivers.sens.recording import SensRecording
 from tests.drivers.replay import recordings
+from tests.drivers.sens.sens_file import SensFile, shots
 
 SECONDS = float(os.environ.get("ABS_FUZZ_SECONDS", "0"))
 #: What is put into a file: numbers that say sizes, and what nests.
@@ -78,6 +81,10 @@ def exported(path: Path) -> None:
     viewers.export(path, scan(path), io.BytesIO(), 0.0, lambda: None)
 
 
+def scanned(path: Path) -> list[object]:
+    return list(SensRecording(path).frames())
+
+
 def npz() -> bytes:
     stream = io.BytesIO()
     np.savez_compressed(stream, distances=np.arange(2.0), amplitudes=np.arange(2.0))
@@ -111,6 +118,7 @@ TARGETS = (
     Target("noise maps", npz(), lambda path: maps.load(path, set()), (NoiseError,)),
     Target("recording", recording(), replayed, (DeviceError,)),
     Target("recovery", recording(), recover, (RecoveryError,)),
+    Target("scan", SensFile(shots(3)).content(), scanned, (ForeignRecordingError,)),
     Target("export", recording(), exported, (ExportError, DeviceError)),
     *(Target(suffix, picture(suffix), image_file.read, (ImageFolderError,)) for suffix in SUFFIXES),
     *map(of_format, FORMATS),

@@ -6,17 +6,21 @@
   abs-service import rgbd_dataset_freiburg1_xyz --layout tum --out xyz.mcap
   abs-service import dataset/realsense --layout open3d --out scan.mcap
   abs-service import kinect.mkv --layout azure --out kinect.mcap
+  abs-service import scene0000_00.sens --layout sens --frames 0:299 --out scene.mcap
 
 Recordings of other programs bring their own calibration: `azure` (Azure Kinect, MKV), `o3r` (ifm O3R, buffers of its
-process interface), `oak` (depthai, MCAP), `realsense` (librealsense, ROS 1 bag) and `ros2` (ROS 2 bag of any camera).
-See docs/how-to/devices.md.
+process interface), `oak` (depthai, MCAP), `realsense` (librealsense, ROS 1 bag), `ros2` (ROS 2 bag of any camera) and
+`sens` (BundleFusion and ScanNet). See docs/how-to/devices.md.
 
 Folders hold images. Layout `pairs`: images of one exposure share the last number in their names. They carry no time, so
 the recording begins in 1970. Layout `tum`: the lists depth.txt and rgb.txt of the TUM RGB-D benchmark name the images
 and their times. Layout `open3d`: what Open3D's recorders write, with color/, depth/ and camera_intrinsic.json or
 intrinsic.json; like `pairs`, without times. --frames 200:319 takes a part, both ends included; 200:319:5 every fifth;
-7,9,20: has several ranges. Numbers are those in the names (`pairs`, `open3d`) or count the lines of depth.txt from 0
-(`tum`).
+7,9,20: has several ranges. Numbers are those in the names (`pairs`, `open3d`) or count from 0 the lines of depth.txt
+(`tum`) or the frames of the file (`sens`).
+
+Many files of layout `sens` have no time stamps: a note says so, and that 30 frames per second are assumed; --rate
+gives another rate.
 
 Depth images have one channel of 16 bits, in millimetres (`pairs`; `open3d` if its file does not tell) or 1/5000 m
 (`tum`), colour images have 8 bits. The camera file says what took them; without a table `color` in it there are no
@@ -40,6 +44,7 @@ colour images:
 
 import argparse
 import math
+import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -52,13 +57,16 @@ from drivers.encoding.foreign_recording import ForeignRecording
 from drivers.image_folder.images import ColorImages, DepthImages, ImageFolder, Images
 from drivers.image_folder.listing import ImageFile, ImageFolderError, by_list, by_number
 from drivers.opening import open_recording
+from drivers.sens.recording import SensRecording
 
 #: Metres per unit of depth images whose camera file does not tell.
 DEPTH_SCALES = {"open3d": 0.001, "pairs": 0.001, "tum": 1 / 5000}
 #: Depth and colour images of the layouts whose images are numbered.
 PATTERNS = {"open3d": ("depth/*.png", "color/*"), "pairs": ("depth_*.png", "color_*.png")}
 #: Layouts that are one file and know their cameras.
-RECORDINGS = ("azure", "o3r", "oak", "realsense", "ros2")
+RECORDINGS = ("azure", "o3r", "oak", "realsense", "ros2", "sens")
+#: Exposures per second of numbered images, if no option tells [Hz].
+RATE_HZ = 30.0
 
 
 class ImportOptionError(Exception):
@@ -79,14 +87,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--color", metavar="GLOB", help="colour images (pairs: color_*.png, open3d: color/*)")
     parser.add_argument("--mask", metavar="GLOB", help="images, black or transparent where depth is left out (pairs)")
     parser.add_argument(
-        "--rate", type=_rate, default=30.0, metavar="HZ", help="exposures per second (pairs, open3d; %(default)g)"
+        "--rate",
+        type=_rate,
+        metavar="HZ",
+        help=f"exposures per second (pairs, open3d: {RATE_HZ:g}; sens: default is the file's time stamps)",
     )
     parser.add_argument(
         "--frames",
         type=frame_numbers.parse,
         default=frame_numbers.ALL,
         metavar="FIRST:LAST[:STEP]",
-        help="numbers of the exposures to import (pairs, open3d, tum; default: all)",
+        help="numbers of the exposures to import (pairs, open3d, sens, tum; default: all)",
     )
     parser.add_argument("--rig", type=Path, metavar="FILE", help="configuration to attach, for a replay without one")
 
@@ -118,9 +129,20 @@ def _foreign_recording(arguments: argparse.Namespace) -> ForeignRecording:
     for option in ("camera", "mask"):
         if getattr(arguments, option) is not None:
             raise ImportOptionError(f"--{option}: a recording with layout {arguments.layout} needs none")
+    if arguments.layout == "sens":
+        return _sens(arguments)
     if arguments.frames is not frame_numbers.ALL:
         raise ImportOptionError(f"--frames: a recording with layout {arguments.layout} is imported as a whole")
     return open_recording(arguments.layout, arguments.path)
+
+
+def _sens(arguments: argparse.Namespace) -> ForeignRecording:
+    """Frames that are numbered, as images are, but may have times of their own."""
+    recording = SensRecording(arguments.path, arguments.frames.__contains__, arguments.rate)
+    if recording.time_problem:
+        what = f"{arguments.path}: {recording.time_problem}; --rate gives another rate"
+        print(f"abs-service: note: {what}", file=sys.stderr)
+    return recording
 
 
 def _cameras(arguments: argparse.Namespace) -> CameraFile:
@@ -152,7 +174,7 @@ def _streams(arguments: argparse.Namespace, cameras: CameraFile) -> Mapping[str,
     numbered = arguments.layout in PATTERNS
     if arguments.mask is not None and arguments.layout != "pairs":
         raise ImportOptionError("--mask: only layout pairs has masks")
-    folder, rate = arguments.path, arguments.rate
+    folder, rate = arguments.path, arguments.rate or RATE_HZ
     if not folder.is_dir():
         raise ImageFolderError(f"{folder}: no such folder")
     depth = cameras.depth

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -14,6 +15,7 @@ from drivers.contract.frame import Frame, Geometry, Kind
 from drivers.replay import Recording
 from tests.abs_service.commands.images.importing import frames_of, open3d, run
 from tests.drivers.o3r import pcic_messages
+from tests.drivers.sens.sens_file import OCCI, SensFile, shots
 
 
 def test_pairs_become_a_recording(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -103,6 +105,56 @@ def test_a_recording_of_another_program_brings_its_calibration(
     assert recording.cameras["depth"].fx == pcic_messages.LENS[0]
     deviations = [frame for frame in frames_of(tmp_path / "out.mcap") if frame.kind == Kind.DEVIATION]
     assert [frame.unit for frame in deviations] == ["m", "m"]
+
+
+def sens(folder: Path, *options: str, **changes: Any) -> int:
+    """Imports a file of four frames; its exit code."""
+    (folder / "scene.sens").write_bytes(SensFile(shots(4), **changes).content())
+    return cli.main(
+        ["import", str(folder / "scene.sens"), "--layout", "sens", "--out", str(folder / "out.mcap"), *options]
+    )
+
+
+def test_a_scan_becomes_a_recording(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert sens(tmp_path, "--frames", "1:3:2") == Exit.OK
+    output = capsys.readouterr()
+    assert "2 depth, 2 color images" in output.out
+    assert "scene.sens: time stamps do not increase" in output.err
+    assert "30 frames per second are assumed; --rate gives another rate" in output.err
+    recording = Recording(tmp_path / "out.mcap")
+    assert (recording.cameras["depth"].fx, recording.cameras["color"].fx) == (7, 9)
+    np.testing.assert_allclose(np.linalg.norm(recording.cameras["color"].center), 0.0251, atol=1e-4)
+    frames = frames_of(tmp_path / "out.mcap")
+    assert [(frame.sensor, frame.seq, frame.t_host_ns) for frame in frames] == [
+        ("depth", 1, 33_333_333),
+        ("color", 1, 33_333_333),
+        ("depth", 3, 100_000_000),
+        ("color", 3, 100_000_000),
+    ]
+    np.testing.assert_allclose(frames[2].si()[0, :3], [np.nan, 1.004, 1.005], rtol=1e-6)
+    assert frames[1].data[0, 0].tolist() == [11, 100, 200]
+
+
+def test_a_scan_may_have_a_rate(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert sens(tmp_path, "--rate", "10") == Exit.OK
+    assert "time stamps" not in capsys.readouterr().err
+    assert frames_of(tmp_path / "out.mcap")[-1].t_host_ns == 300_000_000
+
+
+@pytest.mark.parametrize(
+    ("options", "changes", "complaint"),
+    [
+        ([], {"depth_compression": OCCI}, "scene.sens: depth_compression_type = 2 (occi_ushort): only 0 (raw_ushort)"),
+        ([], {"count": 9}, "scene.sens: frame 4 of 9 is cut off"),
+        (["--frames", "7:9"], {}, "scene.sens: it has none of the frames that were asked for; there are 0 to 3"),
+        (["--camera", "x.toml"], {}, "--camera: a recording with layout sens needs none"),
+        (["--mask", "m*"], {}, "--mask: a recording with layout sens needs none"),
+    ],
+)
+def test_a_scan_that_cannot_be_read_is_refused(tmp_path: Path, capsys, options, changes, complaint) -> None:
+    assert sens(tmp_path, *options, **{"inertial": 0, **changes}) == Exit.USER
+    assert complaint in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["scene.sens"]
 
 
 @pytest.mark.parametrize(
