@@ -166,5 +166,6 @@ class FrameSubscriber:
 
     def _receive(self, sample: Sample) -> None:
         with suppress(DecodeError):  # reported when it is decoded
-            self._gaps.add(sample.topic, FrameInfo.FromString(sample.attachment).header)
+            header = FrameInfo.FromString(sample.attachment).header
+            self._gaps.add(sample.topic, header.boot_id, header.seq)
         self._queue.put(sample.topic, (sample, self._clock()))

@@ -3,9 +3,10 @@
 from collections import Counter
 from collections.abc import Mapping
 
-from absmsg.v1.common_pb2 import Header
-
 from drivers.encoding.message_check import LARGEST_GAP
+
+#: Publishers of a topic that are followed: those heard last. Two hosts with cameras both publish `health/capture`.
+PUBLISHERS = 4
 
 
 class SequenceGaps:
@@ -13,17 +14,25 @@ class SequenceGaps:
 
     def __init__(self) -> None:
         self._lost: Counter[str] = Counter()
-        self._latest: dict[str, tuple[str, int]] = {}
+        self._latest: dict[str, dict[str, int]] = {}  # by topic and publisher, the one heard last at the end
 
     @property
     def lost(self) -> Mapping[str, int]:
         """Messages that never came, by topic. Those after the last one that came are unknown."""
         return dict(self._lost)
 
-    def add(self, topic: str, header: Header) -> None:
-        """Takes the header of a message in the order of arrival."""
-        publisher, latest = self._latest.get(topic, ("", 0))
-        gap = header.seq - latest - 1
-        if publisher == header.boot_id and 0 < gap <= LARGEST_GAP:
-            self._lost[topic] += gap
-        self._latest[topic] = header.boot_id, header.seq
+    def add(self, topic: str, publisher: str, seq: int) -> int:
+        """Takes the number of a message in the order of arrival; returns how many were lost just before it."""
+        latest = self._latest.setdefault(topic, {})
+        gap = seq - latest.pop(publisher, seq) - 1
+        latest[publisher] = seq
+        if len(latest) > PUBLISHERS:
+            del latest[next(iter(latest))]
+        if not 0 < gap <= LARGEST_GAP:
+            return 0
+        self._lost[topic] += gap
+        return gap
+
+    def forget(self) -> None:
+        """Takes the next message of each topic as the first."""
+        self._latest.clear()

@@ -10,18 +10,15 @@ from enum import StrEnum
 import zenoh
 
 from abs_service.bus.security.mutual_tls import NO_SECURITY, MutualTls, NoSecurity
+from drivers.encoding import connection
 from drivers.encoding.message_check import LARGEST_IMAGE
 
 _log = logging.getLogger(__name__)
 
 #: Where a rig listens unless it is configured otherwise.
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
-#: Lease: a peer without a keep-alive for this long is disconnected [ms].
-LEASE_MS = 2000
 #: Timeout of a client's connection to its router [ms].
 CONNECT_TIMEOUT_MS = 3000
-#: Time between the tries to connect again to a router that is gone: at first, and at most [ms].
-RETRY_MS = 250, 1000
 #: Two publishing processes fit into the 64 MB that a container has by default; without room, TCP takes over.
 SHARED_MEMORY_POOL_BYTES = 30 << 20
 
@@ -131,13 +128,14 @@ def _settings(
             # A rig works without the other routers of a lab, and connects to them when they come back.
             "timeout_ms": -1 if listens else connect_timeout_ms,
             "exit_on_failure": not listens,
-            "retry": {"period_init_ms": RETRY_MS[0], "period_max_ms": RETRY_MS[1]},
+            "retry": {**connection.RETRY},
         },
         "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}, "delay": 0},
         "timestamping": {"enabled": True},  # what caches of late joiners are ordered by
         "transport": {
+            "unicast": {**connection.UNICAST},
             "link": {
-                "tx": {"lease": LEASE_MS},
+                "tx": {"lease": connection.LEASE_MS},
                 "rx": {"max_message_size": LARGEST_MESSAGE_BYTES},
                 **security.link,
             },

@@ -11,12 +11,12 @@ from google.protobuf.json_format import MessageToJson
 from abs_service.bus import keys
 from abs_service.bus.contract import Sample
 from abs_service.bus.health import Health
+from abs_service.bus.sequence_gaps import SequenceGaps
 from abs_service.bus.stamps import WallClock
 from abs_service.recording.take import Take
 from abs_service.wire import message_header as header
 from drivers.encoding.encoded_image import ImageEncoder
 from drivers.encoding.mcap_file import McapFileError
-from drivers.encoding.message_check import LARGEST_GAP
 from drivers.encoding.parsing import CodecError
 
 #: Messages repeated at the start of each file, so that every file is self-contained.
@@ -38,7 +38,7 @@ class SampleWriter:
         self._clock = clock
         self._lock = threading.Lock()
         self._latched: dict[str, Sample] = {}
-        self._last_seq: dict[str, int] = {}
+        self._gaps = SequenceGaps()
         self._counts: Counter[str] = Counter()  # of the open file
         self._attached: dict[str, str] = {}  # to the open file: calib_id by sensor
         self._reported_drops: Counter[str] = Counter()  # drops in the metadata of finished files
@@ -65,7 +65,7 @@ class SampleWriter:
 
     def pause(self) -> None:
         """Marks a pause on purpose: the gap after it is no loss."""
-        self._last_seq = {}
+        self._gaps.forget()
 
     def write(self, take: Take, sample: Sample, is_repeated: bool = False) -> None:
         """Writes one message and counts it.
@@ -92,7 +92,7 @@ class SampleWriter:
             self._health.count("refused")
             self._health.label("refused", str(error))
             return
-        self._count(sample.topic, about.seq)
+        self._count(sample.topic, about)
         self.latch([sample])
 
     def summary(self, dropped: Mapping[str, int]) -> dict[str, str]:
@@ -116,11 +116,9 @@ class SampleWriter:
         is_usable = 0 < stamp_ns < 1 << 63
         return stamp_ns if is_usable and not is_repeated else self._clock.wall(self._clock.monotonic())
 
-    def _count(self, topic: str, seq: int) -> None:
+    def _count(self, topic: str, about: header.MessageHeader) -> None:
         self._counts[f"messages.{topic}"] += 1
         self._health.count("recorded")
-        gap = seq - self._last_seq.get(topic, seq) - 1
-        if 0 < gap <= LARGEST_GAP:  # lost before they came here
+        if gap := self._gaps.add(topic, about.publisher, about.seq):  # lost before they came here
             self._counts[f"missing.{topic}"] += gap
             self._health.count(f"missing.{topic}", gap)
-        self._last_seq[topic] = seq

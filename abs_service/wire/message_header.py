@@ -31,10 +31,11 @@ class MessageHeaderError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class MessageHeader:
-    """Time stamp (wall clock) [ns], 0 if the message has none, and sequence number."""
+    """Time stamp (wall clock) [ns], 0 if the message has none, sequence number, and the process that counts."""
 
     stamp_ns: int
     seq: int
+    publisher: str = ""
 
 
 _WITH_HEADER = (
@@ -54,7 +55,7 @@ def _ns(stamp: Timestamp) -> int:
 
 
 def _of_header(message: Any) -> MessageHeader:
-    return MessageHeader(_ns(message.header.stamp), message.header.seq)
+    return MessageHeader(_ns(message.header.stamp), message.header.seq, message.header.boot_id)
 
 
 def _of_timestamp(message: Any) -> MessageHeader:
@@ -107,7 +108,7 @@ def parse(sample: Sample) -> MessageHeader:
     try:
         if sample.message == IMAGE:
             info = frame_info_pb2.FrameInfo.FromString(sample.attachment)
-            return MessageHeader(_ns(info.header.stamp), info.seq)
+            return MessageHeader(_ns(info.header.stamp), info.seq, info.header.boot_id)
         message, header = _PARSERS[sample.message]
         return header(message.FromString(sample.payload))
     except KeyError:

@@ -22,8 +22,8 @@ from abs_client.wake import Wake
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 #: By when a rig must answer that is connected to, and a query [s].
 CONNECT_S, QUERY_S = 3.0, 2.0
-#: Time between the tries to connect again to a rig that is gone: at first, and at most [ms].
-RETRY_MS = 250, 1000
+#: Time between the tries to connect again to a rig that is gone, at first and at most, and the longest of a try [ms].
+RETRY_MS, TRY_MS = (250, 1000), 2000
 #: Messages of one topic that may wait for their thread; the oldest goes first.
 WAITING = 4
 #: By when receiving threads have ended after their session has [s].
@@ -207,7 +207,7 @@ def client_settings(endpoint: str, tls: Tls | None = None) -> dict[str, object]:
             "retry": {"period_init_ms": RETRY_MS[0], "period_max_ms": RETRY_MS[1]},
         },
         "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}, "delay": 0},
-        "transport": {"link": link, "shared_memory": {"enabled": True}},
+        "transport": {"unicast": {"open_timeout": TRY_MS}, "link": link, "shared_memory": {"enabled": True}},
     }
 
 

@@ -12,12 +12,9 @@ import zenoh
 
 from drivers.contract.callbacks import from_non_daemon_thread
 from drivers.contract.device import DeviceError
+from drivers.encoding import connection
 from drivers.remote.address import Address
 
-#: Keep-alive timeout after which the peer is considered gone [ms].
-LEASE_MS = 2000
-#: Time between the tries to connect again: at first, and at most [ms].
-RETRY_MS = 250, 1000
 #: Timeout of queries [s].
 ANSWER_S = 3.0
 
@@ -98,10 +95,14 @@ def open_link(address: Address, timeout_s: float = ANSWER_S) -> Link:
             "endpoints": [address.endpoint],
             "timeout_ms": round(timeout_s * 1000),
             "exit_on_failure": True,
-            "retry": {"period_init_ms": RETRY_MS[0], "period_max_ms": RETRY_MS[1]},
+            "retry": {**connection.RETRY},
         },
         "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}, "delay": 0},
-        "transport": {"link": {"tx": {"lease": LEASE_MS}}, "shared_memory": {"enabled": address.shared_memory}},
+        "transport": {
+            "unicast": {**connection.UNICAST},
+            "link": {"tx": {"lease": connection.LEASE_MS}},
+            "shared_memory": {"enabled": address.shared_memory},
+        },
     }
     zenoh.init_log_from_env_or("error")
     try:

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from absmsg.v1.deformation_state_pb2 import DeformationState
 from absmsg.v1.frame_info_pb2 import FrameInfo
@@ -60,7 +60,7 @@ class RigListener:
     def close(self) -> None:
         self._bus.close()
 
-    def __enter__(self) -> "RigListener":
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -5,6 +5,8 @@ import threading
 
 import pytest
 from absmsg.v1 import frame_info_pb2
+from absmsg.v1.common_pb2 import Header
+from absmsg.v1.health_pb2 import Health
 from absmsg.v1.sensor_model_pb2 import SensorModel
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
@@ -162,6 +164,16 @@ def test_gaps_in_the_numbers_are_counted_by_topic(tmp_path):
         rig.publish_image(depth(seq))
     rig.recorder.stop(5)
     assert metadata(recordings(tmp_path)[0])[f"missing.{DEPTH}"] == "3"
+
+
+def test_a_topic_of_two_hosts_has_no_gap_where_they_alternate(tmp_path):
+    rig = Rig(tmp_path)
+    rig.recorder.start()
+    for boot_id, seq in (("here", 1), ("there", 70), ("here", 2), ("there", 71), ("here", 4)):
+        health = Health(component="capture", header=Header(boot_id=boot_id, seq=seq))
+        rig.bus.deliver(Sample("health/capture", Health.DESCRIPTOR.full_name, health.SerializeToString()))
+    rig.recorder.stop(5)
+    assert metadata(recordings(tmp_path)[0])["missing.health/capture"] == "1"
 
 
 def test_messages_of_every_type_have_an_envelope():

@@ -1,0 +1,11 @@
+"""Times of a connection to a router, in zenoh's configuration: those of the bus and of a rig elsewhere."""
+
+from collections.abc import Mapping
+
+#: A peer without a keep-alive for this long is disconnected [ms].
+LEASE_MS = 2000
+#: Time between the tries to connect again to a router that is gone: at first, and at most [ms].
+RETRY: Mapping[str, int] = {"period_init_ms": 250, "period_max_ms": 1000}
+#: Longest time of a try [ms]. One that begins while the network is cut would, by default, wait for 10 s: TCP repeats
+#: its question after 1, 3, 7 s and so does not know that the network is back.
+UNICAST: Mapping[str, int] = {"open_timeout": 2000}
