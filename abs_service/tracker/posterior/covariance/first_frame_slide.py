@@ -63,7 +63,7 @@ class FirstFrameSlide:
             noise = np.trace(tangents @ known @ tangents.transpose(0, 2, 1), axis1=1, axis2=2)
             explained = np.mean(np.vecdot(slide, slide)) < 0.5 * NOT_BY_CHANCE * np.mean(noise)
             self._slide = slide * (0.0 if explained else 1.0)
-        error = np.vecdot(tangents, self._slide[:, :, None], axis=1)
+        error = np.einsum("nki,nk->ni", tangents, self._slide)
         return error[:, :, None] * error[:, None, :]
 
     def _tangents(self, surface: Surface) -> NDArray[np.float64]:

@@ -1,4 +1,4 @@
-"""What the first estimate moves along the surface stays in the covariance of the vertices."""
+"""The slide along the surface that the first estimate shows stays in the covariance of the vertices."""
 
 import numpy as np
 import pytest
