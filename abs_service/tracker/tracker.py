@@ -7,7 +7,7 @@ Equation numbers: A. Jordt, R. Koch, Reconstruction of Deformation from Depth an
 Models.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from abs_service.tracker.models.base import DeformationModel
 from abs_service.tracker.optimizers.base import Budget, Optimizer, Outcome, Search
 from abs_service.tracker.posterior.covariance.first_frame_slide import FirstFrameSlide, NoSlide
 from abs_service.tracker.posterior.covariance.observability import single_frame_deviation
+from abs_service.tracker.posterior.covariance.parallax import FittedParallax, NoParallax
 from abs_service.tracker.posterior.covariance.theta_covariance import ThetaCovariance
 from abs_service.tracker.posterior.covariance.vertex_covariance import VertexCovariance
 from abs_service.tracker.posterior.frame_posterior import FramePosterior
@@ -38,6 +39,7 @@ class Tracker:
         evaluations: maximum number of cost evaluations per frame.
         limits: thresholds of the status.
         registration_m: standard deviation of the pose of a template's mesh; 0 if the first frame defines it [m].
+        centers: of the cameras that the appearance is taken with, each (3,) [m].
 
     Attributes:
         model: see above.
@@ -51,6 +53,7 @@ class Tracker:
         evaluations: int,
         limits: status.Settings,
         registration_m: float = 0.0,
+        centers: Sequence[NDArray[np.float64]] = (),
     ):
         self.model = model
         self._posterior = posterior
@@ -58,8 +61,11 @@ class Tracker:
         self._evaluations = evaluations
         self._limits = limits
         self._theta_covariance = ThetaCovariance(model, registration_m)
-        slide = NoSlide() if registration_m else FirstFrameSlide(model.mesh)
-        self._vertex_covariance = VertexCovariance(model, slide)
+        first = registration_m == 0  # the first frame defines the mesh
+        fitted = first and not np.any(model.mesh.deviation) and len(centers) > 0
+        parallax = FittedParallax(model, centers) if fitted else NoParallax()
+        slide = FirstFrameSlide(model.mesh) if first else NoSlide()
+        self._vertex_covariance = VertexCovariance(model, parallax, slide)
         self._shape = ShapeComparison(model.mesh)
         self._is_warm = False
         self._last_tracked = model.rest

@@ -28,6 +28,7 @@ from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.tracker import Tracker
 from abs_service.tracking.monitors import loss_monitor
 from abs_service.tracking.offsets.vertex_offsets import Settings as VertexOffsetSettings
+from calib.noise.base import ImageNoise
 from calib.rig import Rig
 
 
@@ -168,4 +169,5 @@ def make_tracker(
         raise
     posterior, mesh = make_posterior(plan, rig, model, observation, sight)
     optimizer = plan.optimizer.build(posterior.dimension, np.random.default_rng(plan.seed))
-    return Tracker(model, posterior, optimizer, plan.evaluations, plan.status, sight.registration_m), mesh
+    centers = [sensor.camera.center for sensor in rig.sensors.values() if isinstance(sensor.noise, ImageNoise)]
+    return Tracker(model, posterior, optimizer, plan.evaluations, plan.status, sight.registration_m, centers), mesh

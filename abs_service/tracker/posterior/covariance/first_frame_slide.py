@@ -1,12 +1,9 @@
 """Slide along the surface in the first frame: an error that lasts.
 
 The mesh is made from the first frame, so nothing has moved when its first estimate is found: what that estimate moves
-along the surface is an error. It lasts, because the sensors go on disagreeing as they do there. A mesh that was made
-too near, by e, is moved back by its distances; but its colours were taken where their lines of sight met it, and they
-hold every vertex on its line. On a surface that is turned away by an angle α, that is e · tan α beside the material
-point. Likewise a print with sharp edges is read from the nearest pixels, and an edge along a row of them is off for all
-its vertices at once. Neither is in the residuals, which are small. A slide that noise explains is in the covariance
-already.
+along the surface is an error. It lasts, because the sensors go on disagreeing as they do there: a print with sharp
+edges is read from the nearest pixels, and an edge along a row of them is off for all its vertices at once. The
+residuals do not show it, they are small. A slide that noise explains is in the covariance already.
 """
 
 from typing import Protocol
@@ -16,6 +13,7 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import Surface
+from abs_service.tracker.posterior.covariance.tangents import Tangents, along_tangents
 
 #: A slide by noise alone is a vector of two numbers, much the same for all vertices. The square of its length, over
 #: half of the mean that is expected, is smaller than this with a probability of 95 % (χ² of two degrees of freedom).
@@ -52,32 +50,15 @@ class FirstFrameSlide:
 
     def __init__(self, mesh: Mesh):
         self._made = mesh.vertices.astype(np.float64)
-        self._beside = _neighbors(mesh)
+        self._tangents = Tangents(mesh)
         self._slide = np.zeros((0, 2))
 
     def beyond(self, surface: Surface, known: NDArray[np.float64]) -> NDArray[np.float64]:
         """That of an error as long as the slide, in its direction, which turns with the surface."""
-        tangents = self._tangents(surface)
+        tangents = self._tangents.along(surface)
         if not len(self._slide):
             slide = np.vecdot(tangents, (surface.vertices[0].T - self._made)[:, None])
             noise = np.trace(tangents @ known @ tangents.transpose(0, 2, 1), axis1=1, axis2=2)
             explained = np.mean(np.vecdot(slide, slide)) < 0.5 * NOT_BY_CHANCE * np.mean(noise)
             self._slide = slide * (0.0 if explained else 1.0)
-        error = np.einsum("nki,nk->ni", tangents, self._slide)
-        return error[:, :, None] * error[:, None, :]
-
-    def _tangents(self, surface: Surface) -> NDArray[np.float64]:
-        """Orthonormal tangents (n, 2, 3): towards a neighbour, and across that."""
-        vertices, normals = (one[0].T.astype(np.float64) for one in (surface.vertices, surface.normals))
-        edge = vertices[self._beside] - vertices
-        first = edge - np.vecdot(edge, normals)[:, None] * normals
-        first /= np.maximum(np.linalg.norm(first, axis=1, keepdims=True), np.finfo(float).tiny)
-        return np.stack([first, np.cross(normals, first)], axis=1)
-
-
-def _neighbors(mesh: Mesh) -> NDArray[np.int64]:
-    """A neighbour (n,) of every vertex, always the same one."""
-    result = np.arange(len(mesh.vertices))
-    for one, other in (mesh.edges.T, mesh.edges.T[::-1]):
-        result[one] = other
-    return result
+        return along_tangents(tangents, self._slide)

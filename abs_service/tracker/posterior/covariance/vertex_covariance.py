@@ -7,6 +7,7 @@ from abs_service.tracker.models.base import DeformationModel, SparseJacobian, Su
 from abs_service.tracker.posterior.covariance.first_frame_slide import Slide
 from abs_service.tracker.posterior.covariance.mesh_noise import MeshNoise
 from abs_service.tracker.posterior.covariance.misfit import Misfit
+from abs_service.tracker.posterior.covariance.parallax import Parallax
 from abs_service.tracker.posterior.frame_posterior import FramePosterior
 from abs_service.tracker.posterior.optimum import Optimum
 from calib.jit import kernel
@@ -17,10 +18,12 @@ class VertexCovariance:
 
     Args:
         model: the deformation model.
+        parallax: of its appearance.
         slide: of its mesh in the first frame.
     """
 
-    def __init__(self, model: DeformationModel, slide: Slide):
+    def __init__(self, model: DeformationModel, parallax: Parallax, slide: Slide):
+        self._parallax = parallax
         self._slide = slide
         self._mesh_noise = MeshNoise(model)
         self._misfit = Misfit(model.mesh)
@@ -46,6 +49,7 @@ class VertexCovariance:
         self._began = True
         by_noise = propagated(near.sparse_jacobian, theta_covariance)
         by_noise += along_normals(optimum.surface, self._mesh_noise.variance)
+        by_noise += self._parallax.covariance(optimum, frame)
         misfit = isotropic(self._misfit.variance(*frame.misfit(optimum.surface)))
         return by_noise + self._slide.beyond(optimum.surface, by_noise) + misfit
 
