@@ -55,6 +55,8 @@ class FirstFrameSlide:
 
     def beyond(self, surface: Surface, known: NDArray[np.float64]) -> NDArray[np.float64]:
         """That of an error as long as the slide, in its direction, which turns with the surface."""
+        if len(self._slide) and not self._slide.any():
+            return np.zeros_like(known)
         tangents = self._tangents.along(surface)
         if not len(self._slide):
             slide = np.vecdot(tangents, (surface.vertices[0].T - self._made)[:, None])
