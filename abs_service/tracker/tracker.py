@@ -17,9 +17,7 @@ from abs_service.tracker import status
 from abs_service.tracker.estimate import Estimate, Status
 from abs_service.tracker.models.base import DeformationModel
 from abs_service.tracker.optimizers.base import Budget, Optimizer, Outcome, Search
-from abs_service.tracker.posterior.covariance.first_frame_slide import FirstFrameSlide, NoSlide
 from abs_service.tracker.posterior.covariance.observability import single_frame_deviation
-from abs_service.tracker.posterior.covariance.parallax import FittedParallax, NoParallax
 from abs_service.tracker.posterior.covariance.theta_covariance import ThetaCovariance
 from abs_service.tracker.posterior.covariance.vertex_covariance import VertexCovariance
 from abs_service.tracker.posterior.frame_posterior import FramePosterior
@@ -61,11 +59,7 @@ class Tracker:
         self._evaluations = evaluations
         self._limits = limits
         self._theta_covariance = ThetaCovariance(model, registration_m)
-        first = registration_m == 0  # the first frame defines the mesh
-        fitted = first and not np.any(model.mesh.deviation) and len(centers) > 0
-        parallax = FittedParallax(model, centers) if fitted else NoParallax()
-        slide = FirstFrameSlide(model.mesh) if first else NoSlide()
-        self._vertex_covariance = VertexCovariance(model, parallax, slide)
+        self._vertex_covariance = VertexCovariance(model, registration_m, centers)
         self._shape = ShapeComparison(model.mesh)
         self._is_warm = False
         self._last_tracked = model.rest

@@ -62,5 +62,5 @@ class FirstFrameSlide:
             slide = np.vecdot(tangents, (surface.vertices[0].T - self._made)[:, None])
             noise = np.trace(tangents @ known @ tangents.transpose(0, 2, 1), axis1=1, axis2=2)
             explained = np.mean(np.vecdot(slide, slide)) < 0.5 * NOT_BY_CHANCE * np.mean(noise)
-            self._slide = slide * (0.0 if explained else 1.0)
+            self._slide = np.zeros_like(slide) if explained else slide
         return along_tangents(tangents, self._slide)

@@ -19,9 +19,7 @@ from abs_service.tracker.models.base import DeformationModel
 from abs_service.tracker.posterior.covariance.tangents import Tangents, along_tangents
 from abs_service.tracker.posterior.frame_posterior import FramePosterior
 from abs_service.tracker.posterior.optimum import Optimum
-
-#: Smallest cosine between line of sight and normal; at grazing views the error would grow without bound.
-MIN_COSINE = 0.2
+from abs_service.tracker.terms.gradients import MIN_COSINE
 
 
 class Parallax(Protocol):
@@ -74,7 +72,7 @@ class FittedParallax:
 
     @staticmethod
     def _beside(optimum: Optimum, normals: NDArray[np.float64], center: NDArray[np.float64]) -> NDArray[np.float64]:
-        """D / (n · d) − n (n, 3) of the lines of sight from a camera's centre."""
+        """The vectors d / (n · d) − n (n, 3) of the lines of sight from a camera's centre."""
         sight = optimum.surface.vertices[0].T - center
         sight = sight / np.linalg.norm(sight, axis=1, keepdims=True)
         cosine = np.minimum(np.vecdot(sight, normals), -MIN_COSINE)

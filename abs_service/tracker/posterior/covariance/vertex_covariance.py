@@ -1,13 +1,15 @@
 """Covariance of every vertex: by the errors of Θ, by those of the initial mesh, and by what neither knows of."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.models.base import DeformationModel, SparseJacobian, Surface
-from abs_service.tracker.posterior.covariance.first_frame_slide import Slide
+from abs_service.tracker.posterior.covariance.first_frame_slide import FirstFrameSlide, NoSlide, Slide
 from abs_service.tracker.posterior.covariance.mesh_noise import MeshNoise
 from abs_service.tracker.posterior.covariance.misfit import Misfit
-from abs_service.tracker.posterior.covariance.parallax import Parallax
+from abs_service.tracker.posterior.covariance.parallax import FittedParallax, NoParallax, Parallax
 from abs_service.tracker.posterior.frame_posterior import FramePosterior
 from abs_service.tracker.posterior.optimum import Optimum
 from calib.jit import kernel
@@ -18,13 +20,15 @@ class VertexCovariance:
 
     Args:
         model: the deformation model.
-        parallax: of its appearance.
-        slide: of its mesh in the first frame.
+        registration_m: standard deviation of the pose of a template's mesh; 0 if the first frame defines it [m].
+        centers: of the cameras that the appearance is taken with, each (3,) [m].
     """
 
-    def __init__(self, model: DeformationModel, parallax: Parallax, slide: Slide):
-        self._parallax = parallax
-        self._slide = slide
+    def __init__(self, model: DeformationModel, registration_m: float, centers: Sequence[NDArray[np.float64]]):
+        is_new = registration_m == 0  # made from the first frame
+        is_fitted = is_new and len(centers) > 0 and not np.any(model.mesh.deviation)
+        self._parallax: Parallax = FittedParallax(model, centers) if is_fitted else NoParallax()
+        self._slide: Slide = FirstFrameSlide(model.mesh) if is_new else NoSlide()
         self._mesh_noise = MeshNoise(model)
         self._misfit = Misfit(model.mesh)
         self._began = False
