@@ -3,7 +3,6 @@
 import math
 
 import numpy as np
-import scipy  # its parts are imported when they are first used
 from numpy.typing import NDArray
 
 Basis = NDArray[np.float64]
@@ -18,7 +17,18 @@ def clamped_knots(control_points: int, degree: int) -> NDArray[np.float64]:
 def base_splines(u: NDArray[np.floating], control_points: int, degree: int, derivative: int = 0) -> Basis:
     """Basis functions n_{i,d}(u) of eqs. 4 and 5, or a derivative, (len(u), control_points); u = 1 is included."""
     knots = clamped_knots(control_points, degree)
-    return scipy.interpolate.BSpline(knots, np.eye(control_points), degree)(np.clip(u, 0.0, 1.0), nu=derivative)
+    u = np.clip(u, 0.0, 1.0)
+    basis = np.eye(control_points + degree)[degree + _spans(u, control_points, degree)]
+    for d in range(1, degree + 1):
+        length = knots[d : d + basis.shape[1]] - knots[: basis.shape[1]]
+        per_length = np.divide(1.0, length, out=np.zeros_like(length), where=length > 0)
+        if d > degree - derivative:
+            lower = d * per_length * basis
+            basis = lower[:, :-1] - lower[:, 1:]
+        else:
+            rising = (u[:, None] - knots[: basis.shape[1]]) * per_length
+            basis = rising[:, :-1] * basis[:, :-1] + (1.0 - rising[:, 1:]) * basis[:, 1:]
+    return basis
 
 
 def rational_basis(
