@@ -53,6 +53,9 @@ MODULES = {
     **{name: f"recordings.{name}" for name in ("export", "info", "recover", "replay", "stiffness")},
 }
 
+#: Modules that a command's processes have in common; imported by another process while this one imports the command.
+PRELOADED = {"run": "abs_service.commands.processes.preloaded"}
+
 #: Threads of the libraries that compute, read when they are first imported. Arrays are small here, so that more threads
 #: cost time, and BLAS its order of summation. One thread in each process is also what shares the cores fairly.
 THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENCV_FOR_THREADS_NUM")
@@ -104,9 +107,9 @@ def main(argv: Sequence[str] | None = None) -> int:
             return Exit.USER
         chosen = parser.parse_args(given[:1]).command
         name, given = f"{name} {chosen}".strip(), given[1:]
-        path = f"{module.__name__}.{MODULES.get(name, chosen)}"
-        parent_watchdog.load_gently(path)
-        module = import_module(path)
+        if chosen in PRELOADED and not {"-h", "--help"} & set(given):
+            _preload(PRELOADED[chosen])
+        module = import_module(f"{module.__name__}.{MODULES.get(name, chosen)}")
         commands = getattr(module, "COMMANDS", {})
     from abs_service.commands.parts import logs  # noqa: PLC0415 - `logging` takes a third of the time of --help
 
@@ -126,6 +129,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         return Exit.PIPE_CLOSED
     except Exception as error:
         return logs.end_with(error, arguments)
+
+
+def _preload(module: str) -> None:
+    from abs_service.supervision import forked  # noqa: PLC0415 - `multiprocessing` is for those that have processes
+
+    forked.preload(module)
 
 
 def _parser() -> argparse.ArgumentParser:

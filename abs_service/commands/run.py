@@ -15,7 +15,7 @@ import os
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import closing, contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext
 from functools import partial
 from pathlib import Path
 from urllib.parse import parse_qsl, urlencode, urlsplit, urlunsplit
@@ -34,12 +34,11 @@ from abs_service.display.terminal.journal import JournalDisplay
 from abs_service.display.terminal.lines import JsonDisplay, PlainDisplay
 from abs_service.display.terminal.table import TableDisplay
 from abs_service.recording.disk import folder
-from abs_service.supervision import log_lines, metrics, parent_watchdog, systemd
-from abs_service.supervision.child_process import ChildProcess, Process
+from abs_service.supervision import forked, log_lines, metrics, systemd
+from abs_service.supervision.child_process import ChildProcess, Process, Spawn
 from abs_service.supervision.exit_codes import Exit
 from abs_service.supervision.rig_view import Display
 from abs_service.supervision.run_session import RunSession
-from abs_service.supervision.standby import Standby
 from abs_service.supervision.supervisor import Child, Limits, Supervisor
 from abs_service.wire.commands import RefusedError
 
@@ -79,13 +78,13 @@ def run(arguments: argparse.Namespace) -> int:
         in_memory(rig) as file,
         make_display(as_json=arguments.json) as display,
         _logging_to(display, logs.on_stderr(arguments)) if not arguments.log_file else nullcontext(),
-        closing(starting(display, arguments)) as starts,
         metrics.served(rig.run.metrics_port) as measure,
     ):
+        starts = starting(display, arguments)
         supervisor = Supervisor(children(rig, file.path, page), starts, time.monotonic_ns, limits(rig))
         about = (rig.name, rig.bus.endpoint, rig.record.directory)
         notifier = systemd.notifier(os.environ)
-        watchers = (notifier.update, measure)
+        watchers = (notifier.update, measure, lambda _: forked.ensure_running())
         session = RunSession(bus, *about, rig.trackers, supervisor, display, WallClock(), watchers)
         session.answer_reloads(lambda: file.exchange(partial(read_again, arguments), supervisor.children))
         try:
@@ -183,21 +182,14 @@ def limits(rig: config.ServiceConfig) -> Limits:
     return Limits(table.max_restarts, *(int(value * 1e9) for value in seconds))
 
 
-def starting(display: Display, arguments: argparse.Namespace) -> Standby:
-    """Starts child processes, which log as this one does; a second recorder waits."""
-    to = partial(_pass_on, display, logs.on_stderr(arguments)), logs.options(arguments)
-    return Standby("record", partial(spawn, *to), partial(prepare, *to))
+def starting(display: Display, arguments: argparse.Namespace) -> Spawn:
+    """Starts child processes, which log as this one does."""
+    return partial(spawn, partial(_pass_on, display, logs.on_stderr(arguments)), logs.options(arguments))
 
 
 def spawn(pass_on: PassOn, log_options: Sequence[str], component: str, arguments: Sequence[str]) -> Process:
     """Starts a child process."""
     return ChildProcess(component, [*arguments, *log_options], pass_on)
-
-
-def prepare(pass_on: PassOn, log_options: Sequence[str], component: str, arguments: Sequence[str]) -> ChildProcess:
-    """Starts a child process that waits until it is woken."""
-    waits = {parent_watchdog.STANDBY: "1"}
-    return ChildProcess(component, [*arguments, *log_options], pass_on, environment=waits)
 
 
 def recording_code(ended: Iterable[Child]) -> Exit:

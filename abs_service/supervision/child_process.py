@@ -3,17 +3,16 @@
 import contextlib
 import os
 import signal
-import subprocess
-import sys
 import threading
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from multiprocessing.connection import Connection, wait
+from multiprocessing.context import ForkServerProcess
 from pathlib import Path
-from types import MappingProxyType
-from typing import IO, Protocol
+from typing import Protocol
 
-from abs_service.supervision import parent_watchdog
+from abs_service.supervision import forked
 
 #: Lines of a child's output that are kept.
 TAIL_LINES = 40
@@ -95,14 +94,13 @@ Spawn = Callable[[str, Sequence[str]], Process]
 
 
 class ChildProcess:
-    """`abs-service ARGUMENTS` as a child.
+    """`abs-service ARGUMENTS` as a child, forked from a process that has imported what it needs; see `preload`.
 
     Args:
         component: its name.
         arguments: the command line after `abs-service`.
         on_line: called with the component and each line that the child writes, from a thread.
-        program: runs the arguments.
-        environment: added to the environment of this process.
+        program: runs the arguments in the child; a function of a module.
     """
 
     def __init__(
@@ -110,34 +108,30 @@ class ChildProcess:
         component: str,
         arguments: Sequence[str],
         on_line: Callable[[str, str], None],
-        program: Sequence[str] = (sys.executable, "-m", "abs_service"),
-        environment: Mapping[str, str] = MappingProxyType({}),
+        program: Callable[[Sequence[str]], None] = forked.abs_service,
     ) -> None:
         self._lines: deque[str] = deque(maxlen=TAIL_LINES)
-        # Its own process group: Ctrl-C in the terminal reaches only the supervisor, which stops the children in order.
-        self._process = subprocess.Popen(
-            [*program, *arguments],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            env=os.environ | {parent_watchdog.VARIABLE: "1", "PYTHONUNBUFFERED": "1"} | dict(environment),
-            process_group=0,
-            text=True,
-            errors="replace",
-        )
-        self._reader = threading.Thread(
-            target=self._read, args=(self._process.stdout, component, on_line), name=component, daemon=True
-        )
+        stdin, self._to_child = forked.CONTEXT.Pipe(duplex=False)
+        self._from_child, output = forked.CONTEXT.Pipe(duplex=False)
+        with stdin, output:
+            self._process = forked.CONTEXT.Process(
+                target=forked.begin, args=(stdin, output, program, list(arguments)), name=component, daemon=True
+            )
+            self._process.start()
+        self._ended, self._code = _end_of(self._process), None  # exit code
+        self._reader = threading.Thread(target=self._read, args=(component, on_line), name=component, daemon=True)
         self._reader.start()
 
     @property
     def pid(self) -> int:
         """See `Process`."""
-        return self._process.pid
+        return self._process.pid or 0
 
     def poll(self) -> int | None:
         """See `Process`."""
-        return self._process.poll()
+        if self._code is None and wait([self._ended], 0.0):
+            self._code = self._exit_code()
+        return self._code
 
     def threads(self) -> Mapping[int, ThreadTimes]:
         """See `Process`; empty if it has ended, or where the kernel does not say (/proc/PID/task/*/schedstat)."""
@@ -150,31 +144,52 @@ class ChildProcess:
 
     def terminate(self) -> None:
         """See `Process`."""
-        if self.poll() is None:
-            self._process.terminate()
+        self._send(os.kill, signal.SIGTERM)
 
     def kill(self) -> None:
         """See `Process`."""
-        if self.poll() is None:
-            os.killpg(self.pid, signal.SIGKILL)
-            with contextlib.suppress(subprocess.TimeoutExpired):  # stuck in the kernel, say in a driver
-                self._process.wait(1.0)
+        self._send(os.killpg, signal.SIGKILL)
+        self._send(os.kill, signal.SIGKILL)  # one that has not got its group yet
+        if wait([self._ended], 1.0):  # else it is stuck in the kernel, say in a driver
+            self._process.join(1.0)
 
     def wake(self) -> None:
         """See `Process`."""
-        with contextlib.suppress(BrokenPipeError, ValueError):  # which is closed after its end
-            print(file=self._process.stdin, flush=True)
+        with contextlib.suppress(OSError):  # of a pipe that is closed after its end
+            os.write(self._to_child.fileno(), b"\n")
 
     def output_tail(self) -> str:
         """See `Process`; waits until all that an ended process wrote has been read."""
         self._reader.join(timeout=1.0)
         return "\n".join(self._lines)
 
-    def _read(self, output: IO[str], component: str, on_line: Callable[[str, str], None]) -> None:
-        with output, self._process:  # leaving the latter waits for the end and closes the watchdog's pipe
-            for line in output:
-                self._lines.append(line.rstrip("\n"))
-                on_line(component, line.rstrip("\n"))
+    def _exit_code(self) -> int | None:
+        try:
+            return os.waitstatus_to_exitcode(os.waitpid(self.pid, 0)[1])
+        except ChildProcessError:  # as long as the process that it was forked from lives, that one is its parent
+            return self._process.exitcode
+
+    def _send(self, send: Callable[[int, int], None], number: signal.Signals) -> None:
+        if self.poll() is None:
+            with contextlib.suppress(ProcessLookupError):
+                send(self.pid, number)
+
+    def _read(self, component: str, on_line: Callable[[str, str], None]) -> None:
+        # Leaving the latter closes the watchdog's pipe.
+        with self._from_child, self._to_child:
+            with open(self._from_child.fileno(), closefd=False, encoding="utf-8", errors="replace") as output:
+                for line in output:
+                    self._lines.append(line.rstrip("\n"))
+                    on_line(component, line.rstrip("\n"))
+            wait([self._ended])
+
+
+def _end_of(process: ForkServerProcess) -> Connection | int:
+    """What can be read when a process has ended, also if the one that it was forked from has ended before."""
+    try:
+        return Connection(os.pidfd_open(process.pid or 0), writable=False)  # which closes itself
+    except ProcessLookupError:  # already
+        return process.sentinel
 
 
 def longest_wait_ns(before: Mapping[int, ThreadTimes], now: Mapping[int, ThreadTimes], elapsed_ns: int) -> int:

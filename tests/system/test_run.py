@@ -34,12 +34,14 @@ FOXGLOVE = {
 def end(process, send):
     """Asks a rig to end; returns how long it took [s]. Nothing is left over, and nothing is complained about."""
     alive = children(process.pid)
-    assert alive.keys() == {"capture", "track", "record"}
+    assert alive.keys() == {"preloaded", "capture", "track", "record"}
     begin_s = time.monotonic()
     send()
     assert process.wait(10) == 0
     took_s = time.monotonic() - begin_s
+    preloaded = alive.pop("preloaded")
     assert not any(map(is_running, alive.values()))
+    wait_until(lambda: not is_running(preloaded), 1, "the end of what the others were forked from")
     complaints = process.stderr.read()
     assert "Traceback" not in complaints
     assert "FATAL" not in complaints

@@ -24,7 +24,7 @@ from abs_service.recording.recorder_settings import RecorderSettings
 from abs_service.recording.recovery import RecoveryError, leftovers, recover, remove_interrupted
 from abs_service.recording.triggers.first_tracking import FirstTracking
 from abs_service.recording.triggers.trigger import ALWAYS, Asked, Trigger
-from abs_service.supervision import gc_tuning, parent_watchdog
+from abs_service.supervision import gc_tuning
 from abs_service.supervision.exit_codes import Exit
 from abs_service.wire import commands
 from drivers.encoding import encoded_image
@@ -47,8 +47,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Records until SIGTERM or SIGINT."""
     rig = rig_process.load_config(arguments)
-    if parent_watchdog.wait_until_needed():
-        rig = rig_process.load_config(arguments)  # it may have changed in the meantime
     settings = _settings(rig)
     stop = rig_process.stop_on_signals()
     clock = WallClock()

@@ -9,6 +9,7 @@ Without CONFIG TRACKER it is the only tracker of the simulated demo rig.
 import argparse
 import threading
 import time
+from collections.abc import Mapping
 from contextlib import suppress
 from functools import partial
 from queue import SimpleQueue
@@ -32,12 +33,12 @@ from abs_service.tracking.live.live_tracker import LiveTracker
 from abs_service.tracking.live.tracker_health import TrackerHealth
 from abs_service.tracking.plan import Plan
 from abs_service.tracking.session import TrackingSession, streams
-from abs_service.tracking.warmup.board import warm_up
+from abs_service.tracking.warmup.board import is_undistorted, load_cached, warm_up
 from abs_service.wire import commands
 from abs_service.wire.checked_bus import CheckedBus
 from calib.camera import Camera
 from calib.jit import load_compiler
-from calib.rig import Rig
+from calib.rig import Noise, Rig
 from drivers.encoding.parsing import CodecError
 from drivers.encoding.sensor_model import decode_camera
 
@@ -55,7 +56,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Tracks until SIGTERM or SIGINT."""
     settings = rig_process.load_config(arguments)
     name = arguments.tracker or next(iter(settings.trackers), "")
-    plan = wiring.plan(settings, name)
+    plan, noises = wiring.plan(settings, name), wiring.noises(settings, name)
     stop = rig_process.stop_on_signals()
     clock = WallClock()
     headers = HeaderFactory(settings.name, clock)
@@ -63,7 +64,7 @@ def run(arguments: argparse.Namespace) -> int:
         health = Health(bus, f"track/{name}", headers)
         bus.declare_liveliness(f"track/{name}")
         rigs: SimpleQueue[Rig] = SimpleQueue()
-        preparing = threading.Thread(target=_prepare, args=(rigs, plan, health), daemon=True)
+        preparing = threading.Thread(target=_prepare, args=(rigs, noises, plan, health), daemon=True)
         preparing.start()
         cameras = await_cameras(bus, settings.trackers[name].sensors, health, stop)
         if stop.is_set():
@@ -142,16 +143,18 @@ def await_cameras(bus: Bus, sensors: tuple[str, ...], health: Health, stop: thre
             break
         health.report("calibration", Level.WARNING, f"waits for the calibration of {', '.join(missing)}")
         health.tick()
-        stop.wait(0.1)
+        stop.wait(0.03)
     health.report("calibration", Level.OK)
     return cameras
 
 
-def _prepare(rigs: SimpleQueue[Rig], plan: Plan, health: Health) -> None:
-    """Loads the compiler while the devices open, and then the kernels that the rig needs."""
+def _prepare(rigs: SimpleQueue[Rig], noises: Mapping[str, Noise], plan: Plan, health: Health) -> None:
+    """Loads the compiler and likely kernels while the devices open, and then all that the rig needs."""
     load_compiler()
+    loaded = load_cached(noises, plan)
     rig = rigs.get()
-    health.label("phase", "preparing")
-    warm_up(rig, plan, lambda progress: health.label("kernels", str(progress)))
-    health.label("kernels", "")
+    if not (loaded and is_undistorted(rig)):
+        health.label("phase", "preparing")
+        warm_up(rig, plan, lambda progress: health.label("kernels", str(progress)))
+        health.label("kernels", "")
     health.label("phase", "waiting")

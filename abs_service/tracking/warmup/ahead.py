@@ -8,6 +8,7 @@ import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from math import ceil, isfinite
 from typing import Any
 
@@ -70,6 +71,34 @@ def compiled_ahead(report: Callable[[Progress], None] = ignore) -> Iterator[Pool
                 kernel.forget()
         while not pool.wait(PERIOD_S):
             report(Progress(pool.done, pool.total, pool.left_s))
+
+
+class NotCachedError(Exception):
+    """A kernel would have to be compiled."""
+
+
+@contextmanager
+def cached_only() -> Iterator[None]:
+    """Within it, a kernel that is not in the cache raises NotCachedError instead of being compiled."""
+    taken: list[Kernel] = []
+
+    def stand_in(kernel: Kernel) -> Callable[..., Any]:
+        taken.append(kernel)
+        return partial(_call_cached, kernel)
+
+    Kernel.stand_in = stand_in
+    try:
+        yield
+    finally:
+        Kernel.stand_in = None
+        for kernel in taken:
+            kernel.forget()
+
+
+def _call_cached(kernel: Kernel, *arguments: Any) -> Any:
+    if not kernel.load(kernel.types(arguments)):
+        raise NotCachedError(kernel.digest)
+    return kernel.dispatcher(*arguments)
 
 
 class StandIn:

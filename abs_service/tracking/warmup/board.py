@@ -1,6 +1,6 @@
 """Tracking of a synthetic board, so that all kernels are called before the first real frame."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -9,17 +9,40 @@ from abs_service.tracker.detection.regions import nearest
 from abs_service.tracker.detection.templates import first_image
 from abs_service.tracking.plan import Plan
 from abs_service.tracking.session import TrackingSession, streams
-from abs_service.tracking.warmup.ahead import Progress, compiled_ahead, ignore
+from abs_service.tracking.warmup.ahead import NotCachedError, Progress, cached_only, compiled_ahead, ignore
 from calib.camera import Camera
 from calib.noise.base import DepthNoise
 from calib.noise.gaussian_polynomial import GaussianPolynomial
-from calib.rig import Rig, Sensor
+from calib.rig import Noise, Rig, Sensor
 from drivers.contract.frame import Frame, FrameSet, Geometry, Kind
 
 #: Placeholder camera: kernels accept images of any size, and in a small one there is little to compute.
 _CAMERA = Camera(160, 120, 200.0, 200.0, 79.5, 59.5)
 #: Placeholder for every depth noise, of which a per-pixel map would not fit the camera; a polynomial that is evaluated.
 _NOISE = GaussianPolynomial(((0.01,), (1e-4,)))
+
+
+def load_cached(noises: Mapping[str, Noise], plan: Plan) -> bool:
+    """Loads kernels before the cameras are known, as for cameras without distortion; compiles none.
+
+    Args:
+        noises: noise models of the tracker's sensors, by name.
+        plan: settings of the tracker.
+
+    Returns:
+        False if a kernel was not in the cache.
+    """
+    try:
+        with cached_only():
+            _track_board({name: Sensor(name, _CAMERA, noise) for name, noise in noises.items()}, plan)
+    except NotCachedError:
+        return False
+    return True
+
+
+def is_undistorted(rig: Rig) -> bool:
+    """True if all cameras are such as `load_cached` takes them for."""
+    return all(sensor.camera.lens.is_pinhole for sensor in rig.sensors.values())
 
 
 def warm_up(rig: Rig, plan: Plan, report: Callable[[Progress], None] = ignore) -> None:
@@ -32,19 +55,23 @@ def warm_up(rig: Rig, plan: Plan, report: Callable[[Progress], None] = ignore) -
         plan: settings of the tracker.
         report: called with the number of compiled kernels.
     """
-    seen = Rig("warm-up", {name: _sensor(sensor) for name, sensor in rig.sensors.items()})
     with compiled_ahead(report) as pool:
-        _track_board(seen, plan)
+        _track_board(rig.sensors, plan)
     if pool.total:
-        _track_board(seen, plan)
+        _track_board(rig.sensors, plan)
 
 
-def _track_board(rig: Rig, plan: Plan) -> None:
+def _track_board(sensors: Mapping[str, Sensor], plan: Plan) -> None:
+    rig = Rig("warm-up", {name: _sensor(sensor) for name, sensor in sensors.items()})
     frames = [_board(head, Kind(stream), plan.model.board) for head, stream in streams(rig.sensors.values())]
     tracking = TrackingSession(rig, replace(plan, region=nearest.Settings(), template=first_image.Settings()))
     changed = [[change(frame) for frame in frames] for change in (_with_dropout, _moved, _without_object)]
     for seq, seen in enumerate((frames, *changed)):
         tracking.track(FrameSet(seq, round(seq * 33e6), {frame.key: frame for frame in seen}), lambda: False)
+
+
+def _seen(sensors: Mapping[str, Sensor]) -> Rig:
+    return Rig("warm-up", {name: _sensor(sensor) for name, sensor in sensors.items()})
 
 
 def _sensor(sensor: Sensor) -> Sensor:

@@ -24,12 +24,6 @@ def killed(component: str, rig: RunningRig) -> Made:
     return Made(begin_ns, begin_ns)
 
 
-def recorder_killed(rig: RunningRig) -> Made:
-    """`kill -9` of the recorder, where another one is loaded."""
-    rig.await_second_recorder()
-    return killed("record", rig)
-
-
 def run_killed(rig: RunningRig) -> Made:
     """`kill -9` of `run`, which is started again when its processes have ended."""
     processes = rig.processes().values()
@@ -74,14 +68,23 @@ def hangs(component: str, rig: RunningRig) -> Made:
 _BACK = "restarted; the others go on"
 _HANGS = f"hangs (`run.stall_timeout_s = {STALL_S:g}`)"
 _CAPTURE, _TRACK, _RECORD = (frozenset({name}) for name in ("capture", "track", "record"))
-_ALL = frozenset({"run", *_CAPTURE, *_TRACK, *_RECORD})
+_ALL = frozenset({"run", "preloaded", *_CAPTURE, *_TRACK, *_RECORD})
 #: `run` itself is gone, which says so.
 _UNSAID = math.inf
 
 FAULTS = (
     Fault("kill -9 of `capture`", _BACK, partial(killed, "capture"), 3.0, 3.0, restarted=_CAPTURE),
     Fault("kill -9 of `track`", _BACK, partial(killed, "track"), 3.0, restarted=_TRACK),
-    Fault("kill -9 of `record`", "nothing older than 1 s is lost", recorder_killed, 0.5, 1.5, restarted=_RECORD),
+    Fault(
+        "kill -9 of `record`", "nothing older than 1 s is lost", partial(killed, "record"), 0.5, 1.5, restarted=_RECORD
+    ),
+    Fault(
+        "kill -9 of the process that the others are forked from",
+        "nothing is lost; another one is ready",
+        partial(killed, "preloaded"),
+        noticed_s=_UNSAID,
+        restarted=frozenset({"preloaded"}),
+    ),
     Fault(
         "kill -9 of `run`, started again",
         f"its processes end within {END_S:g} s; then it tracks within {TRACKS_S:g} s",

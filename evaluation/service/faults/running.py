@@ -23,8 +23,6 @@ NAME = "faults"
 START_S = 180.0
 #: A process without health for this long is killed; the default of ten seconds only takes longer [s].
 STALL_S = 4.0
-#: Time for which a second recorder must have been there to be loaded [s].
-LOAD_S = 8.0
 
 
 class Processes(Protocol):
@@ -117,11 +115,6 @@ class RunningRig:
 
         return self._wait(calm, timeout_s, "the rig did not become calm" if required else "")
 
-    def await_second_recorder(self) -> None:
-        """Waits until a second recorder is loaded."""
-        self._wait(lambda: len(self._recorders()) == 2, 30.0, "there is no second recorder")
-        time.sleep(max(0.0, LOAD_S - _age_s(max(self._recorders()))))
-
     def await_new_frame(self, condition: Callable[[int, int], bool], timeout_s: float) -> int:
         """Waits for a depth image whose number and epoch fulfil a condition; returns its arrival [ns]."""
         seen = len(self.listener.frames)
@@ -153,11 +146,6 @@ class RunningRig:
         """Stamps of the wall clock as times of CLOCK_MONOTONIC, sorted [ns]."""
         wall_ns = time.time_ns() - time.monotonic_ns()
         return sorted(stamp - wall_ns for stamp in stamps)
-
-    def _recorders(self) -> list[int]:
-        run = self.processes()["run"]
-        listed = Path(f"/proc/{run}/task/{run}/children").read_text(encoding="utf-8").split()
-        return [pid for pid in map(int, listed) if b"\0record\0" in _command_line(pid)]
 
     def _wait(self, condition: Callable[[], bool], timeout_s: float, what: str) -> bool:
         """Waits for a condition; False, or an error that says `what`, when the time is over."""
@@ -220,16 +208,3 @@ def mount(*arguments: str) -> None:
         raise UnavailableError("there is no mount(8)") from error
     except subprocess.CalledProcessError as error:
         raise UnavailableError(f"mount {' '.join(arguments)}: {error.stderr.strip()}") from error
-
-
-def _command_line(pid: int) -> bytes:
-    try:
-        return Path(f"/proc/{pid}/cmdline").read_bytes()
-    except OSError:
-        return b""
-
-
-def _age_s(pid: int) -> float:
-    """Time since a process began [s]."""
-    ticks = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()[19]
-    return time.clock_gettime(time.CLOCK_BOOTTIME) - int(ticks) / os.sysconf("SC_CLK_TCK")

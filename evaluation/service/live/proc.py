@@ -1,7 +1,8 @@
 """CPU time and memory of processes and of the machine, from proc(5)."""
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -61,7 +62,7 @@ def machine() -> Machine:
 def children(pid: int) -> Mapping[str, int]:
     """Process numbers of the commands of `abs-service` that a process has started, by command: the oldest of each.
 
-    A younger one is a recorder that waits, or another tracker.
+    A younger one is another tracker. `preloaded` is the process that the others are forked from.
     """
     found: dict[str, int] = {}
     for command, child in every_child(pid):
@@ -70,10 +71,14 @@ def children(pid: int) -> Mapping[str, int]:
 
 
 def every_child(pid: int) -> list[tuple[str, int]]:
-    """Commands of `abs-service` that a process has started, each with its process number, the oldest first."""
-    listed = Path(f"/proc/{pid}/task/{pid}/children").read_text(encoding="utf-8").split()
-    words = ((Path(f"/proc/{child}/cmdline").read_bytes().decode().split("\0"), int(child)) for child in listed)
-    return [(command, child) for line, child in words if (command := _command(line))]
+    """Commands of `abs-service` that descend from a process, each with its process number, the oldest first."""
+    found: list[tuple[str, int]] = []
+    for child in map(int, Path(f"/proc/{pid}/task/{pid}/children").read_text(encoding="utf-8").split()):
+        with suppress(FileNotFoundError, ProcessLookupError):  # it has ended
+            title = Path(f"/proc/{child}/cmdline").read_bytes().decode().replace("\0", " ").split()
+            found += [(title[1], child)] if title[:1] == ["abs-service"] else []
+            found += every_child(child)
+    return found
 
 
 def is_running(pid: int) -> bool:
@@ -82,9 +87,3 @@ def is_running(pid: int) -> bool:
         return Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()[0] != "Z"
     except (FileNotFoundError, ProcessLookupError):
         return False
-
-
-def _command(words: Iterable[str]) -> str:
-    """Word after `abs_service` on a command line; "" if there is none."""
-    words = iter(words)
-    return next(words, "") if "abs_service" in words else ""

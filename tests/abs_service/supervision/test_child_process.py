@@ -7,20 +7,22 @@ import time
 
 import pytest
 
+from abs_service.supervision import forked
 from abs_service.supervision.child_process import ChildProcess, ThreadTimes
+from tests.abs_service.supervision import child_code
 from tests.waiting import eventually
 
 PATH = os.pathsep.join(sys.path)
 
 
 @pytest.fixture
-def child(monkeypatch):
+def child():
     """Starts Python code as a child; whatever is left is killed."""
-    monkeypatch.setenv("PYTHONPATH", PATH)
+    forked.preload("json")
     started = []
 
-    def start(code, on_line=lambda component, line: None):
-        started.append(ChildProcess("act", ["-c", code], on_line, program=(sys.executable,)))
+    def start(text, on_line=lambda component, line: None):
+        started.append(ChildProcess("act", [text], on_line, child_code.run))
         return started[-1]
 
     yield start
@@ -49,8 +51,8 @@ def test_lines_of_both_outputs_arrive_with_the_name_of_the_component(child):
 
 def test_a_child_ends_in_order_when_asked_and_asking_twice_is_harmless(child):
     ready = threading.Event()
-    code = "import signal, sys\nsignal.signal(signal.SIGTERM, lambda *_: sys.exit(7))\nprint('ready')\nsignal.pause()"
-    process = child(code, lambda *_: ready.set())
+    text = "import signal, sys\nsignal.signal(signal.SIGTERM, lambda *_: sys.exit(7))\nprint('ready')\nsignal.pause()"
+    process = child(text, lambda *_: ready.set())
     assert ready.wait(10)
     process.terminate()
     assert wait_for_end(process) == 7
@@ -61,11 +63,11 @@ def test_a_child_ends_in_order_when_asked_and_asking_twice_is_harmless(child):
 def test_killing_a_child_kills_what_it_started(child):
     lines = []
     ready = threading.Event()
-    code = (
+    text = (
         "import signal, subprocess, sys\nsignal.signal(signal.SIGTERM, signal.SIG_IGN)\n"
         "print(subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(60)']).pid)\nsignal.pause()"
     )
-    process = child(code, lambda _, line: (lines.append(line), ready.set()))
+    process = child(text, lambda _, line: (lines.append(line), ready.set()))
     assert ready.wait(10)
     process.kill()
     assert process.poll() == -signal.SIGKILL
@@ -74,9 +76,9 @@ def test_killing_a_child_kills_what_it_started(child):
 
 SUPERVISOR = """
 import sys, time
-from abs_service.supervision.child_process import ChildProcess, ThreadTimes
-from tests.waiting import eventually
-code = '''
+from abs_service.supervision.child_process import ChildProcess
+from tests.abs_service.supervision import child_code
+text = '''
 import signal, time
 from abs_service.supervision import parent_watchdog
 parent_watchdog.GRACE_S = 0.2
@@ -86,7 +88,7 @@ print("ready", flush=True)
 while True:
     time.sleep(60)
 '''
-child = ChildProcess("act", ["-c", code], lambda *_: print(child.pid, flush=True), program=(sys.executable,))
+child = ChildProcess("act", [text], lambda *_: print(child.pid, flush=True), child_code.run)
 time.sleep(60)
 """
 
@@ -104,6 +106,54 @@ def test_no_child_outlives_a_supervisor_that_was_killed(handler):
         supervisor.kill()
         supervisor.wait()
     assert gone(pid)
+
+
+FORKED = """
+import os, signal
+from abs_service.supervision import forked
+from abs_service.supervision.child_process import ChildProcess
+from tests.abs_service.supervision import child_code
+from tests.waiting import eventually
+
+def servers():
+    listed = open(f"/proc/{os.getpid()}/task/{os.getpid()}/children").read().split()
+    return {int(pid) for pid in listed if b"forkserver" in open(f"/proc/{pid}/cmdline", "rb").read()}
+
+forked.preload("json")
+text = "import os, sys; os.read(0, 1); sys.exit(7)"
+before = ChildProcess("act", [text], print, child_code.run)
+(first,) = servers()
+os.kill(first, signal.SIGKILL)
+assert eventually(lambda: not servers())
+assert before.poll() is None
+forked.ensure_running()
+assert eventually(servers)
+after = ChildProcess("act", ["print('works')"], lambda *_: None, child_code.run)
+assert after.output_tail() == "works"
+before.wake()
+before.output_tail()
+print(before.poll(), after.poll(), flush=True)
+"""
+
+
+def test_children_outlive_the_process_that_they_were_forked_from():
+    done = subprocess.run(
+        [sys.executable, "-c", FORKED],
+        capture_output=True,
+        text=True,
+        timeout=30,
+        check=False,
+        env=os.environ | {"PYTHONPATH": PATH},
+    )
+    assert done.stdout == "7 0\n", done.stderr
+
+
+def test_a_child_is_known_by_its_command_line(child):
+    ready = threading.Event()
+    process = child("import os; print('ready'); os.read(0, 1)", lambda *_: ready.set())
+    assert ready.wait(10)
+    with open(f"/proc/{process.pid}/cmdline") as told:
+        assert told.read().rstrip("\0") == "abs-service import os; print('ready'); os.read(0, 1)"
 
 
 def gone(pid, seconds=5.0):

@@ -83,12 +83,11 @@ def test_usage_of_nobody():
 
 
 def test_children_by_their_command():
-    # Whatever the program is, its words look like those of the service.
-    words = ["-c", "input()", "-m", "abs_service", "capture", "rig.toml"]
+    words = ["-c", "from setproctitle import setproctitle; setproctitle('abs-service capture x.toml'); input()"]
     with subprocess.Popen([sys.executable, *words], stdin=subprocess.PIPE) as child:
         deadline_s = time.monotonic() + 10
         while not (found := proc.children(os.getpid())) and time.monotonic() < deadline_s:
-            time.sleep(0.01)  # between fork and exec its words are ours
+            time.sleep(0.01)
         child.communicate(b"\n")
     assert found == {"capture": child.pid}
 

@@ -1,6 +1,7 @@
 """After the warm-up nothing is left to be compiled or loaded when the first frames come."""
 
 import json
+import os
 import subprocess
 import sys
 from dataclasses import replace
@@ -12,6 +13,7 @@ from abs_service import config, wiring
 from abs_service.tracking.warmup import board as warmup
 from abs_service.tracking.warmup.board import warm_up
 from calib.camera import Camera
+from calib.lenses.lens import Lens
 from calib.noise.pixel_polynomial import PixelPolynomial
 
 CAMERA = Camera(2, 2, 2.0, 2.0, 0.5, 0.5)
@@ -97,3 +99,43 @@ def test_a_noise_map_that_is_smaller_than_the_nominal_image_does_no_harm(monkeyp
     rig = wiring.rig(settings, "sheet", dict.fromkeys(("tof", "color"), CAMERA))
     warm_up(replace(rig, sensors=dict(rig.sensors) | {"tof": replace(rig.sensors["tof"], noise=tof)}), plan)
     assert statuses[:2] == 2 * ["TRACKING"]
+
+
+#: Loads what the cache has, compiles the rest, and loads again, each as a process that has just begun.
+LOADING = """
+import sys
+from abs_service import config, wiring
+from abs_service.tracking.warmup.board import load_cached, warm_up
+from calib.camera import Camera
+from calib.lenses.lens import Lens
+
+settings = config.load_default()
+plan, noises = wiring.plan(settings, "sheet"), wiring.noises(settings, "sheet")
+loaded = load_cached(noises, plan)
+if "compile" in sys.argv:
+    cameras = dict.fromkeys(("tof", "color"), Camera(64, 48, 60.0, 60.0, 31.5, 23.5))
+    warm_up(wiring.rig(settings, "sheet", cameras), plan)
+print(loaded)
+"""
+
+
+@pytest.mark.slow
+def test_cached_kernels_are_loaded_before_the_cameras_are_known_and_none_is_compiled(tmp_path):
+    def run(*arguments):
+        environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
+        command = [sys.executable, "-c", LOADING, *arguments]
+        return subprocess.run(command, check=True, capture_output=True, text=True, env=environment).stdout.strip()
+
+    assert run() == "False"
+    assert not list(tmp_path.rglob("*.nbc"))
+    assert run("compile") == "False"
+    compiled = list(tmp_path.rglob("*.nbc"))
+    assert run() == "True"
+    assert list(tmp_path.rglob("*.nbc")) == compiled != []
+
+
+@pytest.mark.parametrize(("lenses", "expected"), [([Lens(), Lens()], True), ([Lens(), Lens(np.array([0.1]))], False)])
+def test_a_lens_that_distorts_needs_other_kernels(lenses, expected):
+    settings = config.load_default()
+    cameras = {name: replace(CAMERA, lens=lens) for name, lens in zip(("tof", "color"), lenses, strict=True)}
+    assert warmup.is_undistorted(wiring.rig(settings, "sheet", cameras)) == expected
