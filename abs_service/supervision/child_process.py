@@ -185,7 +185,7 @@ class ChildProcess:
 
 
 def _end_of(process: ForkServerProcess) -> Connection | int:
-    """What can be read when a process has ended, also if the one that it was forked from has ended before."""
+    """A descriptor that can be read when a process has ended, also if the one that it was forked from is gone."""
     try:
         return Connection(os.pidfd_open(process.pid or 0), writable=False)  # which closes itself
     except ProcessLookupError:  # already

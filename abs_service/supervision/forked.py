@@ -4,13 +4,15 @@ Python takes seconds to import what tracks, and each process of a rig would take
 forked from is the fork server of `multiprocessing`: it has no threads, and does nothing but import and fork.
 """
 
+import atexit
 import ctypes
 import multiprocessing
 import os
+import shutil
 import sys
 from collections.abc import Callable, Sequence
 from importlib import import_module
-from multiprocessing import forkserver
+from multiprocessing import forkserver, util
 from multiprocessing.connection import Connection
 
 from setproctitle import setproctitle
@@ -21,6 +23,8 @@ from abs_service.supervision import parent_watchdog
 CONTEXT = multiprocessing.get_context("forkserver")
 
 _PR_SET_CHILD_SUBREAPER = 36
+#: Environment variable with the folder of its socket.
+_FOLDER = "ABS_SERVICE_FORK_FOLDER"
 
 
 def preload(module: str) -> None:
@@ -29,6 +33,7 @@ def preload(module: str) -> None:
     Should it die, this process becomes the parent of its children: prctl(2), PR_SET_CHILD_SUBREAPER.
     """
     ctypes.CDLL(None).prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
+    os.environ[_FOLDER] = util.get_temp_dir()
     CONTEXT.set_forkserver_preload([module])
     forkserver.ensure_running()
 
@@ -39,8 +44,12 @@ def ensure_running() -> None:
 
 
 def detach() -> None:
-    """In the process that others are forked from: leaves the terminal, or whoever reads our output, to `run`."""
+    """In the process that others are forked from: leaves the terminal, or whoever reads our output, to `run`.
+
+    It ends when `run` has ended, and removes what `run` cannot if it was killed.
+    """
     setproctitle("abs-service preloaded")
+    atexit.register(shutil.rmtree, os.environ.pop(_FOLDER), ignore_errors=True)
     with open(os.devnull, "r+b", buffering=0) as null:
         for descriptor in (0, 1, 2):
             os.dup2(null.fileno(), descriptor)

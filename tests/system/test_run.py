@@ -33,7 +33,7 @@ FOXGLOVE = {
 
 def end(process, send):
     """Asks a rig to end; returns how long it took [s]. Nothing is left over, and nothing is complained about."""
-    alive = children(process.pid)
+    alive = dict(children(process.pid))
     assert alive.keys() == {"preloaded", "capture", "track", "record"}
     begin_s = time.monotonic()
     send()

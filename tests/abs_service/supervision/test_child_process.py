@@ -148,6 +148,29 @@ def test_children_outlive_the_process_that_they_were_forked_from():
     assert done.stdout == "7 0\n", done.stderr
 
 
+PRELOADING = """
+import time
+from abs_service.supervision import forked
+from abs_service.supervision.child_process import ChildProcess
+from tests.abs_service.supervision import child_code
+
+forked.preload("abs_service.commands.processes.preloaded")
+child = ChildProcess("act", ["print('works')"], lambda _, line: print(line, flush=True), child_code.run)
+time.sleep(60)
+"""
+
+
+def test_a_killed_supervisor_leaves_nothing_in_the_temporary_folder(tmp_path):
+    environment = os.environ | {"PYTHONPATH": PATH, "TMPDIR": str(tmp_path)}
+    command = [sys.executable, "-c", PRELOADING]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as supervisor:
+        assert supervisor.stdout is not None
+        assert supervisor.stdout.readline() == "works\n"
+        assert list(tmp_path.iterdir())
+        supervisor.kill()
+    assert eventually(lambda: not list(tmp_path.iterdir()))
+
+
 def test_a_child_is_known_by_its_command_line(child):
     ready = threading.Event()
     process = child("import os; print('ready'); os.read(0, 1)", lambda *_: ready.set())
