@@ -53,7 +53,7 @@ MODULES = {
     **{name: f"recordings.{name}" for name in ("export", "info", "recover", "replay", "stiffness")},
 }
 
-#: Modules that a command's processes have in common; imported by another process while this one imports the command.
+#: Modules that a command's processes have in common, by its whole name; another process imports them meanwhile.
 PRELOADED = {"run": "abs_service.commands.processes.preloaded"}
 
 #: Threads of the libraries that compute, read when they are first imported. Arrays are small here, so that more threads
@@ -107,8 +107,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             return Exit.USER
         chosen = parser.parse_args(given[:1]).command
         name, given = f"{name} {chosen}".strip(), given[1:]
-        if chosen in PRELOADED and not {"-h", "--help"} & set(given):
-            _preload(PRELOADED[chosen])
+        if name in PRELOADED and not {"-h", "--help"} & set(given):
+            _preload(PRELOADED[name])
         module = import_module(f"{module.__name__}.{MODULES.get(name, chosen)}")
         commands = getattr(module, "COMMANDS", {})
     from abs_service.commands.parts import logs  # noqa: PLC0415 - `logging` takes a third of the time of --help

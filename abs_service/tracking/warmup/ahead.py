@@ -6,7 +6,7 @@ Python computes these slowly, but at once, so that all kernels are known, and be
 
 import os
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from functools import partial
 from math import ceil, isfinite
@@ -54,21 +54,10 @@ def compiled_ahead(report: Callable[[Progress], None] = ignore) -> Iterator[Pool
     Yields:
         The compilation; its `total` is the number of missing kernels.
     """
-    taken: list[Kernel] = []
-
-    def stand_in(kernel: Kernel) -> Callable[..., Any]:
-        taken.append(kernel)
-        return StandIn(kernel, pool)
-
     workers = min(MAX_WORKERS, len(os.sched_getaffinity(0)))
     with Pool(workers) as pool:
-        Kernel.stand_in = stand_in
-        try:
+        with _stood_in_for(lambda kernel: StandIn(kernel, pool)):
             yield pool
-        finally:
-            Kernel.stand_in = None
-            for kernel in taken:
-                kernel.forget()
         while not pool.wait(PERIOD_S):
             report(Progress(pool.done, pool.total, pool.left_s))
 
@@ -77,14 +66,19 @@ class NotCachedError(Exception):
     """A kernel would have to be compiled."""
 
 
-@contextmanager
-def cached_only() -> Iterator[None]:
+def cached_only() -> AbstractContextManager[None]:
     """Within it, a kernel that is not in the cache raises NotCachedError instead of being compiled."""
+    return _stood_in_for(lambda kernel: partial(_call_cached, kernel))
+
+
+@contextmanager
+def _stood_in_for(by: Callable[[Kernel], Callable[..., Any]]) -> Iterator[None]:
+    """Within it, something else takes the calls of kernels that have not been called before."""
     taken: list[Kernel] = []
 
     def stand_in(kernel: Kernel) -> Callable[..., Any]:
         taken.append(kernel)
-        return partial(_call_cached, kernel)
+        return by(kernel)
 
     Kernel.stand_in = stand_in
     try:
