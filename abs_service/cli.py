@@ -53,7 +53,7 @@ MODULES = {
     **{name: f"recordings.{name}" for name in ("export", "info", "recover", "replay", "stiffness")},
 }
 
-#: Modules that a command's processes have in common, by its whole name; another process imports them meanwhile.
+#: Modules that import what the processes of a command have in common, by its name.
 PRELOADED = {"run": "abs_service.commands.processes.preloaded"}
 
 #: Threads of the libraries that compute, read when they are first imported. Arrays are small here, so that more threads
@@ -77,6 +77,7 @@ abs-service COMMAND --help describes each command.
 
 def program() -> None:
     """Runs the command line as a process, which ends even if a thread does not, such as a callback that waits."""
+    _preload(sys.argv[1:])
     try:
         code = main()
     except Exception as error:
@@ -95,8 +96,7 @@ def program() -> None:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs one command and returns its exit code; see `Exit`."""
-    for variable in THREADS:
-        os.environ.setdefault(variable, "1")
+    _compute_with_one_thread()
     parent_watchdog.start()
     name, commands, given = "", COMMANDS, list(sys.argv[1:] if argv is None else argv)
     module = import_module("abs_service.commands")
@@ -107,8 +107,6 @@ def main(argv: Sequence[str] | None = None) -> int:
             return Exit.USER
         chosen = parser.parse_args(given[:1]).command
         name, given = f"{name} {chosen}".strip(), given[1:]
-        if name in PRELOADED and not {"-h", "--help"} & set(given):
-            _preload(PRELOADED[name])
         module = import_module(f"{module.__name__}.{MODULES.get(name, chosen)}")
         commands = getattr(module, "COMMANDS", {})
     from abs_service.commands.parts import logs  # noqa: PLC0415 - `logging` takes a third of the time of --help
@@ -131,10 +129,18 @@ def main(argv: Sequence[str] | None = None) -> int:
         return logs.end_with(error, arguments)
 
 
-def _preload(module: str) -> None:
-    from abs_service.supervision import forked  # noqa: PLC0415 - `multiprocessing` is for those that have processes
+def _compute_with_one_thread() -> None:
+    for variable in THREADS:
+        os.environ.setdefault(variable, "1")
 
-    forked.preload(module)
+
+def _preload(given: Sequence[str]) -> None:
+    """Starts to import what the processes of a command have in common, while this process imports the command."""
+    if set(given[:1]) & PRELOADED.keys() and not {"-h", "--help"} & set(given):
+        _compute_with_one_thread()
+        from abs_service.supervision import forked  # noqa: PLC0415 - `multiprocessing` is for those that have processes
+
+        forked.preload(PRELOADED[given[0]])
 
 
 def _parser() -> argparse.ArgumentParser:
