@@ -237,10 +237,10 @@ class Recorder:
             self._health.report("record", Level.OK)
 
     def _fail(self, reason: str) -> None:
-        if not self._failed:
-            self.failures += 1
+        is_new, self._failed = not self._failed, reason
+        if is_new:
+            self.failures += 1  # last, so that who sees it also finds the reason
             _log.error("RECORD_FAILED %s", reason)
-        self._failed = reason
         self._health.count_up_to({"failures": self.failures})
         self._health.label("last_failure", reason)
         self._health.report("record", Level.ERROR, f"RECORD_FAILED {reason}")

@@ -16,6 +16,7 @@ from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import DeformationModel, ModelError
 from abs_service.tracker.tracker import Tracker
 from abs_service.tracking.monitors import loss_monitor
+from abs_service.tracking.monitors.appearance_monitor import AppearanceMonitor
 from abs_service.tracking.monitors.growth_monitor import LEAST_GROWTH, GrowthMonitor
 from abs_service.tracking.observer import Observer
 from abs_service.tracking.offsets.vertex_offsets import FixedOffsets, VertexOffsets
@@ -30,7 +31,8 @@ class _Cause(Enum):
 
     START = auto()  # there is no object yet
     REQUEST = auto()  # a user asked for it
-    LOSS = auto()  # the object is lost, or its appearance in a camera is still unknown
+    LOSS = auto()
+    APPEARANCE = auto()  # a camera that had no image when the mesh was built has one now
     GROWTH = auto()  # much more of the object is in sight than the mesh has
 
 
@@ -81,7 +83,7 @@ class TrackingSession:
         self._growth_monitor = GrowthMonitor(plan.reinitialization.grow_s)
         self._growth_due = False
         self._requested: Region | None = None
-        self._without_appearance: frozenset[str] = frozenset()
+        self._appearance_monitor = AppearanceMonitor((), plan.reinitialization.every_s)
         self._warnings: tuple[str, ...] = ()
 
     @property
@@ -116,11 +118,12 @@ class TrackingSession:
         if self._tracker is None:
             return initializing(observation, failure.reasons, failure.warnings)
         estimate = self._loss_monitor.with_hysteresis(self._tracker.track(observation, in_time))
+        warned = (*self._warnings, *self._appearance_monitor.warnings)
         if estimate.status == Status.TRACKING:
             self._learn(self._tracker, estimate, observation)
-            return replace(estimate, reasons=(), warnings=self._warnings)
+            return replace(estimate, reasons=(), warnings=warned)
         reasons = (*estimate.reasons, *(f"looked for the object again: {reason}" for reason in failure.reasons))
-        return replace(estimate, reasons=reasons, warnings=self._warnings)
+        return replace(estimate, reasons=reasons, warnings=warned)
 
     def reinitialize(self, region: Region | None = None) -> None:
         """Requests a new detection in the next frame set; thread-safe.
@@ -146,9 +149,12 @@ class TrackingSession:
             return _Due(_Cause.REQUEST, requested)
         if self._tracker is None:
             return _Due(_Cause.START, self._region)
-        appears = self._without_appearance.difference(observation.missing)
-        if self._loss_monitor.attempt_due(observation.t_host_ns) or appears:
+        if self._loss_monitor.take_attempt(observation.t_host_ns):
             return _Due(_Cause.LOSS, self._region)
+        if not self._loss_monitor.is_lost and self._appearance_monitor.take_attempt(
+            observation.missing, observation.t_host_ns
+        ):
+            return _Due(_Cause.APPEARANCE, self._region)
         return _Due(_Cause.GROWTH, self._region) if grow else None
 
     def _attempt(self, due: _Due, observation: Observation) -> _Failure:
@@ -163,6 +169,8 @@ class TrackingSession:
         except ExtentError as error:
             return _Failure((str(error),), (str(error),))
         except (DetectionError, ModelError) as error:
+            if due.cause == _Cause.APPEARANCE:
+                self._appearance_monitor.failed(str(error))
             return _Failure((str(error),))
         return _Failure()
 
@@ -170,6 +178,8 @@ class TrackingSession:
         """Detects the object for a cause; DetectionError or ModelError if that fails."""
         if self._tracker is not None and due.cause == _Cause.LOSS:
             self._recover(self._tracker, observation)
+        elif self._tracker is not None and due.cause == _Cause.APPEARANCE:
+            self._renew(self._tracker.model.mesh, observation)
         elif self._tracker is not None and due.cause == _Cause.GROWTH:
             self._grow(self._tracker.model.mesh, observation)
         else:
@@ -181,10 +191,13 @@ class TrackingSession:
         if self._loss_monitor.keeps_mesh(observation.t_host_ns):
             tracker.relocate(self._detection(observation, self._region).points)
             return
-        lost = tracker.model.mesh
+        self._renew(tracker.model.mesh, observation)
+
+    def _renew(self, old: Mesh, observation: Observation) -> None:
+        """Replaces the mesh by a new one of about the same size."""
         built = self._build(observation, self._region)
-        if self._loss_monitor.differs_in_size(built.mesh, lost):
-            raise DetectionError(f"what is in sight has {built.mesh.area * 1e4:.0f} cm², not {lost.area * 1e4:.0f} cm²")
+        if self._loss_monitor.differs_in_size(built.mesh, old):
+            raise DetectionError(f"what is in sight has {built.mesh.area * 1e4:.0f} cm², not {old.area * 1e4:.0f} cm²")
         self._adopt(built, observation)
 
     def _grow(self, old: Mesh, observation: Observation) -> None:
@@ -196,7 +209,7 @@ class TrackingSession:
 
     def _learn(self, tracker: Tracker, estimate: Estimate, observation: Observation) -> None:
         """Learns from an estimate that can be trusted: vertex offsets, and whether the object continues beyond it."""
-        if self._growth_monitor.due(estimate.fits, observation.t_host_ns):
+        if self._growth_monitor.take_attempt(estimate.fits, observation.t_host_ns):
             self._growth_due = True
         surface = tracker.model.deform(estimate.theta[None])
         self._vertex_offsets.update(observation.images.get(self._plan.reference), surface, observation.t_host_ns)
@@ -207,9 +220,8 @@ class TrackingSession:
         self._vertex_offsets = self._plan.vertex_offsets.build(
             built.tracker.model, self._rig.sensors[self._plan.reference]
         )
-        # Their appearance is unknown: once one of them delivers images, mesh and appearance are built again.
-        sensors = self._rig.sensors
-        self._without_appearance = frozenset(n for n in observation.missing if isinstance(sensors[n].noise, ImageNoise))
+        unknown = [n for n in observation.missing if isinstance(self._rig.sensors[n].noise, ImageNoise)]
+        self._appearance_monitor = AppearanceMonitor(unknown, self._plan.reinitialization.every_s)
         self._growth_monitor = GrowthMonitor(self._plan.reinitialization.grow_s)
         self.mesh_version += 1
 

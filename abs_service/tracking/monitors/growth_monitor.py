@@ -23,7 +23,7 @@ class GrowthMonitor:
         self._since_ns: int | None = None
         self._tried = False
 
-    def due(self, fits: Sequence[SensorFit], t_ns: int) -> bool:
+    def take_attempt(self, fits: Sequence[SensorFit], t_ns: int) -> bool:
         """True, once, when the object has continued beyond covered edges of the mesh for long enough at `t_ns` [ns]."""
         covered = sum(fit.rim.covered for fit in fits)
         uncovered = sum(fit.rim.uncovered for fit in fits)

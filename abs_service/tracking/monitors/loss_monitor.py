@@ -55,7 +55,12 @@ class LossMonitor:
         self._good = settings.confirm
         self._event = "found again"
 
-    def attempt_due(self, t_ns: int) -> bool:
+    @property
+    def is_lost(self) -> bool:
+        """True from the first LOST estimate to the next one that is not."""
+        return self._lost_ns is not None
+
+    def take_attempt(self, t_ns: int) -> bool:
         """True if an attempt is due at `t_ns` [ns]; it then counts as made."""
         if self._off_ns is not None and t_ns - self._off_ns >= self._settings.misfit_s * 1e9:
             self._off_ns = None

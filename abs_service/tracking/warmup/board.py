@@ -70,10 +70,6 @@ def _track_board(sensors: Mapping[str, Sensor], plan: Plan) -> None:
         tracking.track(FrameSet(seq, round(seq * 33e6), {frame.key: frame for frame in seen}), lambda: False)
 
 
-def _seen(sensors: Mapping[str, Sensor]) -> Rig:
-    return Rig("warm-up", {name: _sensor(sensor) for name, sensor in sensors.items()})
-
-
 def _sensor(sensor: Sensor) -> Sensor:
     noise = _NOISE if isinstance(sensor.noise, DepthNoise) else sensor.noise
     return Sensor(sensor.name, replace(_CAMERA, lens=sensor.camera.lens), noise)

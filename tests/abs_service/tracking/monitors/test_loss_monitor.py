@@ -29,14 +29,14 @@ def estimate(k: int, status: Status, reasons: tuple[str, ...] = ()) -> Estimate:
 def test_a_tracked_object_needs_no_attempt():
     monitor = LossMonitor(Settings(), LIMITS)
     assert [monitor.with_hysteresis(estimate(k, Status.TRACKING)).status for k in range(3)] == [Status.TRACKING] * 3
-    assert not monitor.attempt_due(10**12)
+    assert not monitor.take_attempt(10**12)
 
 
 def test_attempts_are_due_after_a_delay_and_then_periodically():
     monitor = LossMonitor(Settings(after_s=0.2, every_s=0.1), LIMITS)
     tries = []
     for k in range(1, 16):
-        if monitor.attempt_due(k * FRAME_NS):
+        if monitor.take_attempt(k * FRAME_NS):
             tries.append(k)
         monitor.with_hysteresis(estimate(k, Status.LOST))
     assert tries == [8, 12]  # 0.2 s after frame 1, then every 0.1 s
@@ -47,8 +47,8 @@ def test_a_good_estimate_restarts_the_delay():
     monitor.with_hysteresis(estimate(0, Status.LOST))
     monitor.with_hysteresis(estimate(1, Status.DEGRADED, ("no frame from color",)))
     monitor.with_hysteresis(estimate(9, Status.LOST))
-    assert not monitor.attempt_due(10 * FRAME_NS)
-    assert monitor.attempt_due(13 * FRAME_NS)
+    assert not monitor.take_attempt(10 * FRAME_NS)
+    assert monitor.take_attempt(13 * FRAME_NS)
 
 
 @pytest.mark.parametrize("rim", [RimFit(visible=60, outside=12, inside=12), RimFit(visible=60, inside=6, off_m=0.01)])
@@ -56,7 +56,7 @@ def test_a_mesh_that_stays_off_its_outline_is_made_anew(rim):
     monitor, tries = LossMonitor(Settings(misfit_s=0.2), LIMITS), []
     off = (SensorFit("tof", 300, 0, 300, 300, 0.0, 1.0, rim),)
     for k in range(1, 20):
-        if monitor.attempt_due(k * FRAME_NS):
+        if monitor.take_attempt(k * FRAME_NS):
             tries.append(k)
         monitor.with_hysteresis(dataclasses.replace(estimate(k, Status.DEGRADED), fits=off if k != 3 else ()))
     assert tries == [11, 18]  # 0.2 s after frame 4, and again as long after the next one
