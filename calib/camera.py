@@ -18,17 +18,19 @@ class CameraError(ValueError):
     """Invalid camera parameters; names parameter, value and what is allowed."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Camera:
     """Projection `P_s` of one sensor s: camera matrix, lens and pose in the rig.
 
-    Pixel centres lie at integer coordinates: the image covers [-0.5, width - 0.5] × [-0.5, height - 0.5].
+    Pixel centres lie at integer coordinates: the image covers [-0.5, width - 0.5] × [-0.5, height - 0.5]. Cameras with
+    the same parameters are equal.
 
     Attributes:
         width, height: image size [px].
         fx, fy, cx, cy: camera matrix `K_s` [px].
         lens: distortion `D_s`.
-        T_rs: pose that maps sensor coordinates (z forward, x right, y down) to rig coordinates, shape (4, 4) [m].
+        T_rs: pose that maps sensor coordinates (z forward, x right, y down) to rig coordinates, shape (4, 4) [m]; a
+            read-only copy.
     """
 
     width: int
@@ -50,6 +52,17 @@ class Camera:
         if not isinstance(self.lens, LensModel):
             raise CameraError(f"lens = {self.lens!r}: must be a lens model, such as Lens(…) or Fisheye(…)")
         object.__setattr__(self, "T_rs", _pose(self.T_rs))
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Camera) and self._parameters == other._parameters
+
+    def __hash__(self) -> int:
+        return hash(self._parameters)
+
+    @property
+    def _parameters(self) -> tuple[object, ...]:
+        matrix = self.width, self.height, self.fx, self.fy, self.cx, self.cy
+        return (*matrix, self.lens, *self.T_rs.ravel())
 
     @property
     def center(self) -> NDArray[np.float64]:
@@ -147,10 +160,11 @@ def _check_number(name: str, value: object, *, positive: bool) -> None:
 def _pose(given: object) -> Pose:
     """The pose as an array; CameraError if it is none."""
     try:
-        T_rs = np.asarray(given, np.float64)
+        T_rs = np.array(given, np.float64)
     except (TypeError, ValueError):
         T_rs = np.zeros(0)
     if not pose.is_pose(T_rs):
         shown = np.array2string(T_rs, separator=", ") if T_rs.ndim == 2 else repr(given)
         raise CameraError(f"T_rs = {shown}: must be a rigid 4 × 4 pose (orthonormal rotation, last row 0 0 0 1)")
+    T_rs.setflags(write=False)
     return T_rs

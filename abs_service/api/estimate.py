@@ -54,15 +54,15 @@ class Estimate:
 
 def with_mesh(found: tracker_estimate.Estimate, mesh: Mesh | None, version: int) -> Estimate:
     """The estimate of a tracker with its mesh; None before the first object was found."""
-    unknown = np.nan if found.status == Status.LOST else 1.0
+    is_lost = found.status == Status.LOST
     return Estimate(
         time_s=found.t_host_ns * 1e-9,
         status=found.status,
         reasons=found.reasons,
         theta=found.theta,
-        covariance=found.covariance * unknown,
+        covariance=_nan_if(is_lost, found.covariance),
         vertices=found.vertices,
-        vertex_covariance=found.vertex_covariance * unknown,
+        vertex_covariance=_nan_if(is_lost, found.vertex_covariance),
         faces=np.zeros((0, 3), np.int32) if mesh is None else _read_only(mesh.faces),
         undeformed=np.zeros((0, 3)) if mesh is None else _read_only(mesh.vertices),
         mesh_version=version,
@@ -72,6 +72,10 @@ def with_mesh(found: tracker_estimate.Estimate, mesh: Mesh | None, version: int)
         missing=found.missing,
         warnings=found.warnings,
     )
+
+
+def _nan_if(is_unknown: bool, covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.full_like(covariance, np.nan) if is_unknown else covariance
 
 
 def _read_only(array: NDArray[Any]) -> NDArray[Any]:

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from abs_service.pairing.observation import Observation
 from abs_service.tracker import status
 from abs_service.tracker.estimate import Estimate, Status
-from abs_service.tracker.models.base import DeformationModel
 from abs_service.tracker.optimizers.base import Budget, Optimizer, Outcome, Search
 from abs_service.tracker.posterior.covariance.observability import single_frame_deviation
 from abs_service.tracker.posterior.covariance.theta_covariance import ThetaCovariance
@@ -28,24 +27,22 @@ from abs_service.tracker.terms.base import inlier_share
 
 
 class Tracker:
-    """Finds the parameters Θ that maximise the posterior density of every observation.
+    """For each observation, finds the parameters Θ of the largest posterior density.
 
     Args:
-        model: the deformation model.
-        posterior: likelihood and priors.
+        posterior: likelihood and priors of a deformation model.
         optimizer: proposes candidates.
         evaluations: maximum number of cost evaluations per frame.
         limits: thresholds of the status.
         registration_m: standard deviation of the pose of a template's mesh; 0 if the first frame defines it [m].
-        centers: of the cameras that the appearance is taken with, each (3,) [m].
+        centers: centres of the imaging sensors, each (3,) [m].
 
     Attributes:
-        model: see above.
+        model: the deformation model.
     """
 
     def __init__(
         self,
-        model: DeformationModel,
         posterior: Posterior,
         optimizer: Optimizer,
         evaluations: int,
@@ -53,7 +50,7 @@ class Tracker:
         registration_m: float = 0.0,
         centers: Sequence[NDArray[np.float64]] = (),
     ):
-        self.model = model
+        self.model = model = posterior.model
         self._posterior = posterior
         self._optimizer = optimizer
         self._evaluations = evaluations
@@ -94,7 +91,9 @@ class Tracker:
         thetas = next(search)  # ask: candidates (population, dim)
         while True:
             surface = self.model.deform(thetas)  # eqs. 2–8
-            costs = frame.cost(thetas, surface)  # synthesised into every sensor (eqs. 10–12) and scored (eqs. 16–22)
+            costs = frame.cost(
+                thetas, surface
+            )  # synthesised into every sensor (eqs. 10, 11, 20) and scored (eqs. 16–22)
             budget.evaluations += len(thetas)
             try:
                 thetas = search.send(costs)  # tell, and ask again

@@ -170,4 +170,4 @@ def make_tracker(
     posterior, mesh = make_posterior(plan, rig, model, observation, sight)
     optimizer = plan.optimizer.build(posterior.dimension, np.random.default_rng(plan.seed))
     centers = [sensor.camera.center for sensor in rig.sensors.values() if isinstance(sensor.noise, ImageNoise)]
-    return Tracker(model, posterior, optimizer, plan.evaluations, plan.status, sight.registration_m, centers), mesh
+    return Tracker(posterior, optimizer, plan.evaluations, plan.status, sight.registration_m, centers), mesh

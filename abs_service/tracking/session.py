@@ -1,5 +1,6 @@
 """A tracker over time: initial detection, tracking, loss and renewed detection."""
 
+from collections import deque
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import replace
 from enum import Enum, auto
@@ -82,7 +83,7 @@ class TrackingSession:
         self._loss_monitor = loss_monitor.LossMonitor(plan.reinitialization, plan.status)
         self._growth_monitor = GrowthMonitor(plan.reinitialization.grow_s)
         self._growth_due = False
-        self._requested: Region | None = None
+        self._requested: deque[Region] = deque()  # the latest counts; other threads add to it
         self._appearance_monitor = AppearanceMonitor((), plan.reinitialization.every_s)
         self._warnings: tuple[str, ...] = ()
 
@@ -131,7 +132,7 @@ class TrackingSession:
         Args:
             region: where the object is; once it is found, used for later detections as well. None: that of the plan.
         """
-        self._requested = region or self._configured
+        self._requested.append(region or self._configured)
 
     def _forget(self, host_clock: str) -> None:
         """Forgets the object: on another clock, nobody knows how much time has passed since the last frame."""
@@ -143,7 +144,9 @@ class TrackingSession:
 
     def _due(self, observation: Observation) -> _Due | None:
         """The detection that is due in this frame, which then counts as made; None if the object is just tracked."""
-        requested, self._requested = self._requested, None
+        requested = None
+        while self._requested:
+            requested = self._requested.popleft()
         grow, self._growth_due = self._growth_due, False
         if requested is not None:
             return _Due(_Cause.REQUEST, requested)
@@ -163,7 +166,7 @@ class TrackingSession:
             self._detect(due, observation)
         except UndecidedError as error:  # what was asked for is asked again, with more images
             if due.cause == _Cause.REQUEST:
-                self._requested = self._requested or due.region
+                self._requested.appendleft(due.region)
             self._growth_due = due.cause == _Cause.GROWTH
             return _Failure((str(error),))
         except ExtentError as error:

@@ -14,7 +14,7 @@ COEFFICIENTS = ("k1", "k2", "k3", "k4")
 _ON_AXIS = 1e-8
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class KannalaBrandt:
     """r_d = θ (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸) at the angle θ from the axis; OpenCV's fisheye model.
 
@@ -33,6 +33,12 @@ class KannalaBrandt:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "coefficients", padded(self.coefficients, COEFFICIENTS))
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, KannalaBrandt) and np.array_equal(self.coefficients, other.coefficients)
+
+    def __hash__(self) -> int:
+        return hash(tuple(self.coefficients))
 
     @property
     def is_pinhole(self) -> bool:

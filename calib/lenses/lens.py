@@ -96,7 +96,7 @@ def require_inverse(lens: LensModel, xy: NDArray[np.floating], ideal: NDArray[np
     return ideal
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Lens:
     """Brown–Conrady distortion with an optional rational part; OpenCV's first eight coefficients, in its order.
 
@@ -112,6 +112,12 @@ class Lens:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "coefficients", padded(self.coefficients, COEFFICIENTS))
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Lens) and np.array_equal(self.coefficients, other.coefficients)
+
+    def __hash__(self) -> int:
+        return hash(tuple(self.coefficients))
 
     @property
     def is_pinhole(self) -> bool:

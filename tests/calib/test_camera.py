@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from calib import pose
 from calib.camera import Camera, CameraError
+from calib.lenses.fisheye import KannalaBrandt
 from calib.lenses.lens import Lens
 from tests import reference
 
@@ -135,3 +136,23 @@ def test_numbers_that_describe_no_camera_are_named(change, message):
 def test_a_pose_may_be_nested_lists():
     camera = dataclasses.replace(CAMERA, T_rs=CAMERA.T_rs.tolist())
     assert camera.calib_id == CAMERA.calib_id
+
+
+@pytest.mark.parametrize("lens", [Lens(np.array([0.1, -0.2])), KannalaBrandt(np.array([0.1]))])
+def test_cameras_of_the_same_parameters_are_equal(lens):
+    camera, same = (Camera(640, 480, 500.0, 500.0, 320.0, 240.0, type(lens)(lens.coefficients)) for _ in range(2))
+    assert camera == same
+    assert hash(camera) == hash(same)
+    assert {camera.lens: 1}[lens] == 1
+    assert camera != dataclasses.replace(camera, fx=501.0)
+    assert camera != dataclasses.replace(camera, lens=type(lens)())
+    assert Lens() != KannalaBrandt()
+
+
+def test_a_camera_keeps_a_pose_of_its_own():
+    given = np.eye(4)
+    camera = Camera(640, 480, 500.0, 500.0, 320.0, 240.0, T_rs=given)
+    given[0, 3] = 1.0
+    assert camera.center[0] == 0.0
+    with pytest.raises(ValueError, match="read-only"):
+        camera.T_rs[0, 3] = 1.0

@@ -16,6 +16,10 @@ class Posterior:
         model: the deformation model.
         objective: sum of the sensors' terms.
         stretch, shape, motion: the priors.
+
+    Attributes:
+        dimension: of Θ.
+        model, objective, stretch, shape, motion: see above.
     """
 
     def __init__(
