@@ -52,6 +52,17 @@ class DepthImage:
         image.shape, image._convert, image._last = shape, convert, ((0, 0, 0, 0), (empty, empty))
         return image
 
+    def cropped(self, window: Window) -> "DepthImage":
+        """The part of the image in rows and columns that have a beginning and an end."""
+        (top, bottom), (left, right) = ((axis.start, axis.stop) for axis in window)
+        shape = bottom - top, right - left
+
+        def convert(part: Window) -> Parts:
+            first, last, begin, end = _limits(part, shape)
+            return self.within((slice(top + first, top + last), slice(left + begin, left + end)))
+
+        return DepthImage.deferred(shape, convert)
+
     @property
     def distance(self) -> NDArray[np.float32]:
         """See above."""
@@ -64,13 +75,18 @@ class DepthImage:
 
     def within(self, window: Window) -> Parts:
         """Distances and amplitudes (rows, columns) in a window; parts of the last one are converted only once."""
-        (top, bottom, _), (left, right, _) = (axis.indices(size) for axis, size in zip(window, self.shape))
+        top, bottom, left, right = _limits(window, self.shape)
         (first, last, begin, end), parts = self._last
         if not (first <= top and bottom <= last and begin <= left and right <= end):
             first, begin, parts = top, left, self._convert(window)
             self._last = ((top, bottom, left, right), parts)
         inside = slice(top - first, bottom - first), slice(left - begin, right - begin)
         return parts[0][inside], parts[1][inside]
+
+
+def _limits(window: Window, shape: tuple[int, ...]) -> Limits:
+    (top, bottom, _), (left, right, _) = (axis.indices(size) for axis, size in zip(window, shape))
+    return top, bottom, left, right
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -10,6 +10,8 @@ and the simulator's ray casting.
 - **Dropouts.** The same while the sensor loses three of ten returns, pixel by pixel, and the tracker is not told.
 - **Creeps.** A flat sheet on a table is drawn along itself by 2 mm a frame; no edge is free, and nothing is printed
   on it.
+- **Cut.** A flat sheet is cut by the end of the sensor's field of view, before the end of the image, and is drawn out
+  of it or into it by 5 mm a frame. Added on 2026-11-26.
 - **Coverage.** Share of the vertices' material points inside their 95 % regions, by quarters of a sequence, of a sheet,
   a rigid board and a hanging strip: with colour and without, with the outline and without.
 
@@ -18,7 +20,7 @@ Goals: at most ten in a row; none; 0.90 to 0.99. Board and strip are measured, u
 Seeds: 21, 22 and 23, each added to the context's.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -31,20 +33,14 @@ from abs_service.tracker.objectives import likelihood
 from abs_service.tracking.plan import ModelSettings
 from evaluation.coverage import inside_region
 from evaluation.experiment import Context, Findings, at_least, at_most
-from evaluation.scenes.bent_sheet import CAMERA, INTERVAL_S, SheetFrame, SheetScene, SheetState, render_frames, swing
-from evaluation.scenes.surfaces import Wall
+from evaluation.method.slid_sheets import FRAMES_AFTER, SLIDE_FRAME, sequences
+from evaluation.scenes.bent_sheet import CAMERA, SheetFrame, SheetState, render_frames
 from evaluation.sequences import TrackedSequence, demo_plan, demo_rig, expose, simulate, track
 
 TITLE = "Trust: sheets that slide along themselves, and coverage over time"
 
-#: Frame of the slide, number of frames after it, and what counts as wrong at least [m].
-SLIDE_FRAME, FRAMES_AFTER, WRONG_M = 30, 30, 5e-3
-
-#: The wall behind the table's sheet [m], and how far it is drawn in a frame [m].
-TABLE, CREEP_M = Wall(1.002), 2e-3
-
-#: Share of the returns that single pixels lose, and how far a sheet slides meanwhile [m].
-DROPOUTS, DROPOUT_SLIDE_M = 0.3, 0.04
+#: What counts as wrong at least [m].
+WRONG_M = 5e-3
 
 #: Outlines with which coverage is measured.
 OUTLINES = {"auto": likelihood.Settings(), "none": likelihood.Settings(outline_px=0.0)}
@@ -58,9 +54,6 @@ SCENES: dict[str, ModelSettings] = {
 
 #: Parts of a sequence whose coverage is told.
 QUARTERS = 4
-
-#: Distances beyond are no returns in the scene without a background [m].
-FARTHEST_M = 1.3
 
 
 @dataclass(frozen=True)
@@ -79,31 +72,6 @@ class Settings:
 
 
 QUICK = Settings((0.04,), (21,), 24)
-
-
-@dataclass(frozen=True)
-class Slide:
-    """A swinging sheet that lies farther along itself from one frame on."""
-
-    by_m: float
-
-    def __call__(self, t: float) -> SheetState:
-        """The sheet at a time [s]."""
-        state = swing(t)
-        return _drawn(state, self.by_m) if t > (SLIDE_FRAME - 0.5) * INTERVAL_S else state
-
-
-def creep(t: float) -> SheetState:
-    """A flat sheet that is drawn along itself."""
-    return _drawn(SheetState(0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)), CREEP_M * t / INTERVAL_S)
-
-
-def _drawn(state: SheetState, by_m: float) -> SheetState:
-    """The sheet drawn along its long axis, where that is in its centre [m]."""
-    ends = state.points(np.array([[-1e-3, 0.0], [1e-3, 0.0]]))
-    along = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
-    x, y, z = np.asarray(state.center) + by_m * along
-    return replace(state, center=(float(x), float(y), float(z)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,45 +100,34 @@ class Followed:
 
 
 def follow(frames: Sequence[SheetFrame], sigma: float) -> Followed:
-    """Tracks frames by distance alone; the first is flat, and its mask tells the object."""
+    """Tracks frames by distance alone; those in which a mesh is made are flat, and the mask tells the object."""
     tracker = a.Tracker(CAMERA, a.Nurbs(), noise=a.noise.Constant(sigma), geometry="radial")
-    error, claimed, tracking, places = [], [], [], np.zeros((0, 2))
+    error, claimed, tracking, version, material = [], [], [], 0, np.zeros((0, 2))
     for frame in frames:
         found = tracker.track(frame.distance, time_s=frame.t_ns * 1e-9, mask=frame.sheet)
-        if not len(places):
-            corner, right, down = frame.state.points(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]))
-            places = (found.vertices - corner) @ np.stack([right - corner, down - corner], axis=1)
-        off = np.linalg.norm(found.vertices - frame.state.points(places), axis=1)
+        if found.mesh_version != version:
+            version, material = found.mesh_version, _material(found.vertices, frame.state)
+        off = np.linalg.norm(found.vertices - frame.state.points(material), axis=1)
         error.append(np.median(off))
         claimed.append(np.sqrt(np.median(np.trace(found.vertex_covariance, axis1=1, axis2=2))))
         tracking.append(found.status == a.Status.TRACKING)
     return Followed(np.array(error), np.array(claimed), np.array(tracking))
 
 
-def sequences(settings: Settings, seed: int) -> Iterator[tuple[str, SheetScene, bool]]:
-    """Name, scene, and whether the background gives no return."""
-    for by in settings.slides_m:
-        for empty in (False, True):
-            name = f"slides by {by * 1e3:.0f} mm, {_behind(empty)} behind"
-            yield name, SheetScene(name, Slide(by)), empty
-    for empty in (False, True):
-        name = f"slides by {DROPOUT_SLIDE_M * 1e3:.0f} mm, {DROPOUTS:.0%} dropouts, {_behind(empty)} behind"
-        yield name, SheetScene(name, Slide(DROPOUT_SLIDE_M), dropouts=DROPOUTS), empty
-    yield "creeps on a table", SheetScene("table", creep, wall=TABLE), False
-
-
-def _behind(empty: bool) -> str:
-    return "no return" if empty else "a wall"
+def _material(vertices: NDArray[np.floating], state: SheetState) -> NDArray[np.float64]:
+    """Places (n, 2) [m] on the sheet of vertices (n, 3) [m] of a mesh that was just made, of a flat sheet."""
+    middle, right, down = state.points(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]))
+    return (vertices - middle) @ np.stack([right - middle, down - middle], axis=1)
 
 
 def run(settings: Settings, context: Context) -> Findings:
     """Runs all sequences."""
     rows, longest = [], []
     for seed in (context.seed + one for one in settings.seeds):
-        for name, scene, empty in sequences(settings, seed):
+        for name, scene, measured in sequences(settings.slides_m):
             context.progress(f"seed {seed}: {name}")
             frames = render_frames(scene, range(SLIDE_FRAME + FRAMES_AFTER), np.random.default_rng(seed))
-            found = follow([_without_background(one) if empty else one for one in frames], scene.sigma)
+            found = follow([measured(one) for one in frames], scene.sigma)
             after = slice(SLIDE_FRAME, None)
             longest.append(found.longest_wrong)
             rows.append((
@@ -187,10 +144,6 @@ def run(settings: Settings, context: Context) -> Findings:
     )
     quarters = _quarters([(*labels, *numbers) for labels, numbers in coverage])
     return Findings(goals, (_slides(rows), quarters), {"slides": rows, "coverage": coverage})
-
-
-def _without_background(frame: SheetFrame) -> SheetFrame:
-    return replace(frame, distance=np.where(frame.distance > FARTHEST_M, np.float32(np.nan), frame.distance))
 
 
 def _coverage(settings: Settings, context: Context) -> list[tuple[tuple[str, str, str, int], list[float]]]:

@@ -97,42 +97,6 @@ def test_without_a_color_image_it_is_degraded():
     assert [fit.sensor for fit in estimates[2].fits] == ["tof"]
 
 
-def test_a_color_camera_that_starts_late_is_not_ignored_for_ever():
-    """Its first image shows what the vertices look like; until then only depth says where they are."""
-    tracker = tracking()
-    late = only(Kind.DEPTH, Kind.AMPLITUDE)
-    steps = list(drive(tracker, SHEET, range(27, 50), lambda k, f: late(k, f) if k < 30 else f))
-    assert [step.estimate.status for step in steps] == [Status.DEGRADED] * 3 + [Status.TRACKING] * 20
-    assert (tracker.mesh_version, tracker.made_ns) == (2, SHEET.time_ns(30))
-    assert mean_errors(steps[3:])[0] < 2
-
-
-def test_a_camera_that_starts_while_the_object_cannot_be_detected_waits_with_a_warning():
-    """The object stays tracked by what was known of it."""
-    late = only(Kind.DEPTH, Kind.AMPLITUDE)
-
-    def change(k: int, frames: list[Frame]) -> list[Frame]:
-        if k < 30:
-            return late(k, frames)
-        return frames if k >= 40 else [halved(frame) if frame.kind == Kind.DEPTH else frame for frame in frames]
-
-    tracker = tracking()
-    steps = list(drive(tracker, SHEET, range(27, 50), change))
-    (warning,) = steps[5].estimate.warnings
-    assert warning.startswith("not used yet: color (")
-    assert (tracker.mesh_version, tracker.made_ns >= SHEET.time_ns(40)) == (2, True)
-    assert steps[-1].estimate.status == Status.TRACKING
-    assert steps[-1].estimate.warnings == ()
-
-
-def halved(frame: Frame) -> Frame:
-    """The image with every column but those of a strip without return: too little to be the object."""
-    data = frame.data.copy()
-    data[:, : data.shape[1] // 2] = 0
-    data[:, data.shape[1] // 2 + 8 :] = 0
-    return dataclasses.replace(frame, data=data)
-
-
 def test_without_its_amplitude_depth_does_not_count():
     steps = drive(tracking(), SHEET, range(45, 48), lambda k, f: f if k == 45 else only(Kind.DEPTH, Kind.COLOR)(k, f))
     estimates = [step.estimate for step in steps]

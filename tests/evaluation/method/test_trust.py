@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from evaluation.method.trust import FARTHEST_M, SLIDE_FRAME, Followed, Slide, creep, follow
+from evaluation.method.slid_sheets import FARTHEST_M, SLIDE_FRAME, Slide, creep, sequences
+from evaluation.method.trust import Followed, follow
 from evaluation.scenes.bent_sheet import INTERVAL_S, SheetMotion, SheetScene, SheetState, render_frames, swing
 
 
@@ -47,3 +48,14 @@ def test_a_sheet_that_jumps_before_nothing_is_not_said_to_be_tracked_while_the_m
     assert found.error_m[frame] > 0.01
     assert not found.wrong.any()
     assert found.tracking[:frame].all()
+
+
+def test_a_sheet_that_the_end_of_the_view_cuts_is_followed_into_it_and_not_wrong_out_of_it():
+    """The last columns without return are no background beside which the sheet ends."""
+    cut = {name: (scene, measured) for name, scene, measured in sequences(()) if "the view" in name}
+    assert len(cut) == 2
+    for name, (scene, measured) in cut.items():
+        frames = render_frames(scene, range(24), np.random.default_rng(5))
+        found = follow([measured(frame) for frame in frames], scene.sigma)
+        assert not found.wrong.any()
+        assert found.tracking.mean() > (0.9 if "into" in name else 0.5)

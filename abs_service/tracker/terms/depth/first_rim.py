@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from abs_service.tracker.field_of_view import filled
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.synthesis.rasterization.raster import Raster
@@ -25,6 +26,8 @@ def classified_rim(
         surface: the mesh in the image, a population of one.
         distance: radial distances (height, width) [m] without mean offset, NaN without return.
     """
+    if window := filled(np.isfinite(distance)):
+        camera, distance = camera.cropped(*window), distance[window]
     expected = Raster(camera, mesh.faces).render(surface.vertices[0])
     missing = np.isnan(distance)
     single = dropouts(missing)

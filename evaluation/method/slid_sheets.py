@@ -1,0 +1,92 @@
+"""Sequences of a sheet that is slid along itself: by a jump, by little in every frame, or past the end of the view."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from evaluation.scenes.bent_sheet import INTERVAL_S, SheetFrame, SheetScene, SheetState, swing
+from evaluation.scenes.surfaces import Wall
+
+#: Frame of the slide, and number of frames after it.
+SLIDE_FRAME, FRAMES_AFTER = 30, 30
+
+#: The wall behind the table's sheet [m], and how far it is drawn in a frame [m].
+TABLE, CREEP_M = Wall(1.002), 2e-3
+
+#: Share of the returns that single pixels lose, and how far a sheet slides meanwhile [m].
+DROPOUTS, DROPOUT_SLIDE_M = 0.3, 0.04
+
+#: Last columns in which the sensor never measures (8 of 640 in a Kinect v1), where a sheet is that they cut, and
+#: how far it is drawn in a frame [m].
+BLIND_COLUMNS, CUT_X_M, CUT_STEP_M = 3, 0.4, 5e-3
+
+#: Distances beyond are no returns in the scene without a background [m].
+FARTHEST_M = 1.3
+
+#: A sequence: its name, its scene, and what the sensor measures of a frame.
+SlidSheet = tuple[str, SheetScene, Callable[[SheetFrame], SheetFrame]]
+
+
+@dataclass(frozen=True)
+class Slide:
+    """A swinging sheet that lies farther along itself from one frame on."""
+
+    by_m: float
+
+    def __call__(self, t: float) -> SheetState:
+        """The sheet at a time [s]."""
+        state = swing(t)
+        return _drawn(state, self.by_m) if t > (SLIDE_FRAME - 0.5) * INTERVAL_S else state
+
+
+def creep(t: float) -> SheetState:
+    """A flat sheet that is drawn along itself."""
+    return _drawn(SheetState(0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)), CREEP_M * t / INTERVAL_S)
+
+
+def _drawn(state: SheetState, by_m: float) -> SheetState:
+    """The sheet drawn along its long axis, where that is in its centre [m]."""
+    ends = state.points(np.array([[-1e-3, 0.0], [1e-3, 0.0]]))
+    along = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
+    x, y, z = np.asarray(state.center) + by_m * along
+    return replace(state, center=(float(x), float(y), float(z)))
+
+
+@dataclass(frozen=True)
+class Cut:
+    """A flat sheet beside the middle that is drawn along its long axis by some metres a frame."""
+
+    step_m: float
+
+    def __call__(self, t: float) -> SheetState:
+        """The sheet at a time [s]."""
+        return SheetState(0.0, (0.0, 0.0, 0.0), (CUT_X_M + self.step_m * t / INTERVAL_S, 0.0, 1.0))
+
+
+def sequences(slides_m: Sequence[float]) -> Iterator[SlidSheet]:
+    """All sequences, with slides of some lengths [m]."""
+    for by in slides_m:
+        for behind, measured in (("a wall", _as_it_is), ("no return", _without_background)):
+            name = f"slides by {by * 1e3:.0f} mm, {behind} behind"
+            yield name, SheetScene(name, Slide(by)), measured
+    for behind, measured in (("a wall", _as_it_is), ("no return", _without_background)):
+        name = f"slides by {DROPOUT_SLIDE_M * 1e3:.0f} mm, {DROPOUTS:.0%} dropouts, {behind} behind"
+        yield name, SheetScene(name, Slide(DROPOUT_SLIDE_M), dropouts=DROPOUTS), measured
+    yield "creeps on a table", SheetScene("table", creep, wall=TABLE), _as_it_is
+    for name, step_m in (("is drawn out of the view", CUT_STEP_M), ("is drawn into the view", -CUT_STEP_M)):
+        yield name, SheetScene(name, Cut(step_m)), _without_last_columns
+
+
+def _as_it_is(frame: SheetFrame) -> SheetFrame:
+    return frame
+
+
+def _without_background(frame: SheetFrame) -> SheetFrame:
+    return replace(frame, distance=np.where(frame.distance > FARTHEST_M, np.float32(np.nan), frame.distance))
+
+
+def _without_last_columns(frame: SheetFrame) -> SheetFrame:
+    distance = frame.distance.copy()
+    distance[:, -BLIND_COLUMNS:] = np.nan
+    return replace(frame, distance=distance)
