@@ -35,11 +35,12 @@ from abs_service.display.terminal.lines import JsonDisplay, PlainDisplay
 from abs_service.display.terminal.table import TableDisplay
 from abs_service.recording.disk import folder
 from abs_service.supervision import forked, log_lines, metrics, systemd
+from abs_service.supervision.child import Child
 from abs_service.supervision.child_process import ChildProcess, Process, Spawn
 from abs_service.supervision.exit_codes import Exit
 from abs_service.supervision.rig_view import Display
 from abs_service.supervision.run_session import RunSession
-from abs_service.supervision.supervisor import Child, Limits, Supervisor
+from abs_service.supervision.supervisor import Limits, Supervisor
 from abs_service.wire.commands import RefusedError
 
 #: Receives the lines of a child's output, with its name.

@@ -8,8 +8,8 @@ from typing import Protocol, Self
 from absmsg.v1.health_pb2 import Health
 
 from abs_service.bus import keys
+from abs_service.supervision.child import Child, State
 from abs_service.supervision.rig_state import RigState
-from abs_service.supervision.supervisor import Child, State
 from abs_service.tracking.log.tracker_log import EstimateReport
 
 

@@ -13,8 +13,9 @@ from abs_service.bus.health import Health, Level
 from abs_service.bus.queues import LatestQueue
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.supervision import rig_state
+from abs_service.supervision.child import Child, State
 from abs_service.supervision.rig_view import Display, RigView
-from abs_service.supervision.supervisor import Child, State, Supervisor
+from abs_service.supervision.supervisor import Supervisor
 from abs_service.tracking.monitors.silence_monitor import SilenceMonitor
 from abs_service.wire import commands
 from abs_service.wire.checked_bus import CheckedBus

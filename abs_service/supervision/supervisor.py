@@ -4,19 +4,18 @@ A state machine without threads: the caller calls `poll` periodically; clock and
 """
 
 import logging
-from collections import deque
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
-from enum import StrEnum
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 
 from abs_service.supervision import log_lines
-from abs_service.supervision.child_process import NO_PROCESS, Process, Spawn, ThreadTimes, longest_wait_ns
+from abs_service.supervision.child import FIRST_BACKOFF_NS, Child, State
+from abs_service.supervision.child_process import NO_PROCESS, Spawn, longest_wait_ns
 from abs_service.supervision.exit_codes import Exit
 
 _log = logging.getLogger(__name__)
 
-#: Backoff before a restart: doubles with each end of a process soon after its start, up to the longest.
-FIRST_BACKOFF_NS, LONGEST_BACKOFF_NS = 200_000_000, 3_000_000_000
+#: Longest backoff before a restart: it doubles with each end of a process soon after its start [ns].
+LONGEST_BACKOFF_NS = 3_000_000_000
 #: After a run that was longer than this the next backoff is the first one again [ns].
 WORKED_NS = 10_000_000_000
 #: A longer time between two calls of `poll` was a stop of this process, without messages of the children [ns].
@@ -40,50 +39,6 @@ class Limits:
     startup_ns: int = 180_000_000_000
     stall_ns: int = 10_000_000_000
     stop_ns: int = 4_000_000_000
-
-
-class State(StrEnum):
-    """State of a child process."""
-
-    RUNNING = "running"
-    BACKOFF = "backoff"  # not started yet, or ended; starts when its backoff is over
-    STALLED = "stalled"  # sent no health in time and was killed; will be restarted
-    RENEWED = "renewed"  # was told to end, and starts again as soon as it has
-    FINISHED = "finished"  # ended in order by itself
-    FAILED = "failed"  # given up
-    STOPPED = "stopped"
-
-
-@dataclass
-class Child:
-    """One supervised process.
-
-    Attributes:
-        component: its name in health: capture, track/<tracker>, record.
-        arguments: its command line after `abs-service`.
-        stage: children of lower stages are stopped first.
-        state: its state.
-        reason: of the state, in plain words.
-        restarts: how often it was started again.
-        process: the running one; `NO_PROCESS` if there is none.
-        exit_code: of its last end.
-    """
-
-    component: str
-    arguments: tuple[str, ...]
-    stage: int
-    state: State = State.BACKOFF
-    reason: str = ""
-    restarts: int = 0
-    exit_code: int = 0
-    process: Process = field(default=NO_PROCESS, repr=False)
-    deadline_ns: int = 0
-    started_ns: int = 0
-    backoff_ns: int = FIRST_BACKOFF_NS // 2
-    start_at_ns: int = 0
-    heard_ns: int = 0
-    threads: Mapping[int, ThreadTimes] = field(default_factory=dict, repr=False)
-    exits_ns: deque[int] = field(default_factory=deque, repr=False)
 
 
 class Supervisor:

@@ -10,8 +10,8 @@ from rich.spinner import Spinner
 from rich.table import Table
 from rich.text import Text
 
+from abs_service.supervision.child import State
 from abs_service.supervision.rig_view import RigView, size
-from abs_service.supervision.supervisor import State
 from abs_service.tracking.log.tracker_log import EstimateReport, TrackerLog
 
 REFRESH_HZ = 6

@@ -13,9 +13,9 @@ from abs_service.bus.contract import Sample
 from abs_service.commands import run
 from abs_service.display.terminal import journal
 from abs_service.supervision import log_lines
+from abs_service.supervision.child import Child, State
 from abs_service.supervision.rig_state import RigState
 from abs_service.supervision.rig_view import RigView
-from abs_service.supervision.supervisor import Child, State
 from abs_service.tracking.log.tracker_log import EstimateReport
 
 S = 1_000_000_000

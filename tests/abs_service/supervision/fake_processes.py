@@ -1,6 +1,7 @@
 """Time and processes of a supervisor, under the control of a test."""
 
-from abs_service.supervision.supervisor import Child, Limits, Supervisor
+from abs_service.supervision.child import Child
+from abs_service.supervision.supervisor import Limits, Supervisor
 
 S = 1_000_000_000
 

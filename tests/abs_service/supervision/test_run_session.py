@@ -17,9 +17,10 @@ from abs_service.bus.keys import KeyNameError
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.commands import run
 from abs_service.display.terminal.lines import PlainDisplay
+from abs_service.supervision.child import Child, State
 from abs_service.supervision.exit_codes import Exit
 from abs_service.supervision.run_session import RunSession
-from abs_service.supervision.supervisor import Child, Limits, State, Supervisor
+from abs_service.supervision.supervisor import Limits, Supervisor
 from abs_service.tracking.monitors import silence_monitor
 from abs_service.wire import commands, estimate_messages
 from abs_service.wire.checked_bus import CheckedBus

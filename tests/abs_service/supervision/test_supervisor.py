@@ -1,8 +1,8 @@
 import pytest
 
+from abs_service.supervision.child import State
 from abs_service.supervision.child_process import ThreadTimes
 from abs_service.supervision.exit_codes import Exit
-from abs_service.supervision.supervisor import State
 from tests.abs_service.supervision.fake_processes import S, World
 
 

@@ -1,0 +1,55 @@
+"""One process of a rig as the supervisor sees it."""
+
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from abs_service.supervision.child_process import NO_PROCESS, Process, ThreadTimes
+
+#: First backoff before a restart [ns].
+FIRST_BACKOFF_NS = 200_000_000
+
+
+class State(StrEnum):
+    """State of a child process."""
+
+    RUNNING = "running"
+    BACKOFF = "backoff"  # not started yet, or ended; starts when its backoff is over
+    STALLED = "stalled"  # sent no health in time and was killed; will be restarted
+    RENEWED = "renewed"  # was told to end, and starts again as soon as it has
+    FINISHED = "finished"  # ended in order by itself
+    FAILED = "failed"  # given up
+    STOPPED = "stopped"
+
+
+@dataclass
+class Child:
+    """One supervised process.
+
+    Attributes:
+        component: its name in health: capture, track/<tracker>, record.
+        arguments: its command line after `abs-service`.
+        stage: children of lower stages are stopped first.
+        state: its state.
+        reason: of the state, in plain words.
+        restarts: how often it was started again.
+        process: the running one; `NO_PROCESS` if there is none.
+        exit_code: of its last end.
+    """
+
+    component: str
+    arguments: tuple[str, ...]
+    stage: int
+    state: State = State.BACKOFF
+    reason: str = ""
+    restarts: int = 0
+    exit_code: int = 0
+    process: Process = field(default=NO_PROCESS, repr=False)
+    deadline_ns: int = 0
+    started_ns: int = 0
+    backoff_ns: int = FIRST_BACKOFF_NS // 2
+    start_at_ns: int = 0
+    heard_ns: int = 0
+    threads: Mapping[int, ThreadTimes] = field(default_factory=dict, repr=False)
+    exits_ns: deque[int] = field(default_factory=deque, repr=False)
