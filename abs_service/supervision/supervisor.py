@@ -83,6 +83,8 @@ class Supervisor:
     def renew(self, component: str) -> None:
         """Ends a process in order, and starts it again, which is no failure; also one that was given up."""
         child = self.children[component]
+        if child.state is State.RENEWED:
+            return  # it has been told, and a second SIGTERM would end it on the spot
         child.process.terminate()
         child.exits_ns.clear()
         child.state, child.reason = State.RENEWED, "starts again with the configuration that was read"
@@ -119,7 +121,8 @@ class Supervisor:
         for number, stage in enumerate(stages):
             children = [child for child in self.children.values() if child.stage == stage]
             for child in children:
-                child.process.terminate()
+                if child.state is not State.RENEWED:  # which has been told
+                    child.process.terminate()
             # Equal time for each of the earlier stages; the last one, which drains to disk, has all that is left.
             share = (number + 1) / (len(stages) + 1) if number + 1 < len(stages) else 1.0
             deadline_ns = begin_ns + int(share * self._limits.stop_ns)

@@ -1,5 +1,7 @@
 """Time and processes of a supervisor, under the control of a test."""
 
+import signal
+
 from abs_service.supervision.child import Child
 from abs_service.supervision.supervisor import Limits, Supervisor
 
@@ -7,11 +9,15 @@ S = 1_000_000_000
 
 
 class FakeProcess:
-    """A process that ends when the test says so; obeys SIGTERM unless it is stubborn."""
+    """A process that ends when the test says so.
+
+    It obeys SIGTERM, unless it is stubborn or takes its time; a second one ends it on the spot, as every real one.
+    """
 
     def __init__(self, world, component, pid):
         self.world, self.component, self.pid = world, component, pid
         self.code = None
+        self.told = False
         self.its_threads = {}
 
     def threads(self):
@@ -22,8 +28,11 @@ class FakeProcess:
 
     def terminate(self):
         self.world.events.append(("terminate", self.component))
-        if self.component not in self.world.stubborn:
+        if self.told and self.code is None:
+            self.code = 128 + signal.SIGTERM
+        elif self.component not in self.world.stubborn:
             self.code = 0
+        self.told = True
 
     def kill(self):
         if self.code is None:

@@ -243,6 +243,28 @@ def test_a_rig_that_is_stopped_does_not_start_what_was_to_be_renewed(world):
     assert (supervisor.children["capture"].state, len(world.started)) == (State.STOPPED, 1)
 
 
+def test_a_process_that_finalises_its_file_is_not_told_twice_to_end(world):
+    supervisor = world.supervisor("capture", "record")
+    world.stubborn = {"record"}
+    supervisor.renew("record")
+    passes(world, supervisor, 1)
+    supervisor.renew("record")
+    passes(world, supervisor, 1)
+    assert world.started[1].code is None, "by a second reload"
+    supervisor.stop(world.wait)
+    assert world.events.count(("terminate", "record")) == 1, "nor by the end of the run"
+
+
+def test_a_second_reload_gives_a_process_no_more_time(world):
+    supervisor = world.supervisor("record", stop_ns=4 * S)
+    world.stubborn = {"record"}
+    for _ in range(4):
+        supervisor.renew("record")
+        passes(world, supervisor, 1)
+    assert world.events[-1] == ("kill", "record")
+    assert supervisor.children["record"].state is State.RUNNING
+
+
 def test_stopping_twice_or_without_children_is_harmless(world):
     supervisor = world.supervisor("capture")
     supervisor.stop(world.wait)
