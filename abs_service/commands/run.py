@@ -195,7 +195,7 @@ def spawn(pass_on: PassOn, log_options: Sequence[str], component: str, arguments
 
 def recording_code(ended: Iterable[Child]) -> Exit:
     """FAILED if the recorder says that something is missing, though all else went well."""
-    return Exit.FAILED if any(child.component == "record" and child.exit_code for child in ended) else Exit.OK
+    return Exit.FAILED if any(child.component == "record" and child.worst_code for child in ended) else Exit.OK
 
 
 def _pass_on(display: Display, as_json: bool, component: str, line: str) -> None:

@@ -36,6 +36,8 @@ class Child:
         restarts: how often it was started again.
         process: the running one; `NO_PROCESS` if there is none.
         exit_code: of its last end.
+        worst_code: the highest with which it ended by itself or because it was told; 128 + N for signal N that ended it
+            after it was told. A crash counts as a restart only.
     """
 
     component: str
@@ -45,6 +47,7 @@ class Child:
     reason: str = ""
     restarts: int = 0
     exit_code: int = 0
+    worst_code: int = 0
     process: Process = field(default=NO_PROCESS, repr=False)
     deadline_ns: int = 0
     started_ns: int = 0

@@ -4,6 +4,7 @@ A state machine without threads: the caller calls `poll` periodically; clock and
 """
 
 import logging
+import signal
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
@@ -148,7 +149,7 @@ class Supervisor:
         return True
 
     def _start(self, child: Child, now_ns: int) -> None:
-        child.process.kill()  # no effect unless it was told to end, and has not
+        _end(child)
         child.process = self._spawn(child.component, child.arguments)
         started = {"component": child.component, "child": child.process.pid, "restarts": child.restarts}
         _log.info("%s is started", child.component, extra={"fields": started})
@@ -164,7 +165,7 @@ class Supervisor:
             child.process.kill()
             self._schedule_restart(child, now_ns, "sent no health in time", State.STALLED)
             return
-        child.exit_code = code
+        child.exit_code, child.worst_code = code, max(child.worst_code, code)
         if code == Exit.OK:
             child.state, child.process = State.FINISHED, NO_PROCESS
         elif code == Exit.USER:
@@ -194,11 +195,23 @@ class Supervisor:
 
     def _finalize(self, child: Child) -> None:
         if child.process.poll() is None:
-            child.process.kill()
             child.reason = "did not end in time and was killed"
         if child.state in (State.RUNNING, State.BACKOFF, State.STALLED, State.RENEWED):
-            child.state, child.exit_code = State.STOPPED, child.process.poll() or 0
-        child.process = NO_PROCESS
+            child.state = State.STOPPED
+            _end(child)
+
+
+def _end(child: Child) -> None:
+    """Keeps the exit code of a process that was told to end, and kills it if it has not; no effect without one."""
+    if child.process is NO_PROCESS:
+        return
+    child.process.kill()
+    code = child.process.poll()
+    child.exit_code = -signal.SIGKILL if code is None else code  # None: it is stuck in the kernel
+    # Processes end in order by SIGTERM, unless they have not begun.
+    counted = 0 if child.exit_code == -signal.SIGTERM else child.exit_code
+    child.worst_code = max(child.worst_code, counted if counted >= 0 else 128 - counted)
+    child.process = NO_PROCESS
 
 
 def _exit_reason(code: int, output_tail: str) -> str:

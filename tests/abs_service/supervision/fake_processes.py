@@ -71,3 +71,18 @@ class World:
         made = Supervisor(children, self.spawn, lambda: self.now_ns, Limits(**limits))
         made.poll()
         return made
+
+
+def ends(world, supervisor, component, code):
+    """The process ends with this code, and its pause passes."""
+    world.latest(component).code = code
+    supervisor.poll()
+    world.now_ns += 4 * S
+    supervisor.poll()
+
+
+def passes(world, supervisor, seconds):
+    """So much time, in which the supervisor works."""
+    for _ in range(2 * seconds):
+        world.now_ns += S // 2
+        supervisor.poll()

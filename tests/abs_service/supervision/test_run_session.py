@@ -94,9 +94,9 @@ def test_a_rig_has_one_process_per_tracker_and_stops_its_recorder_last(tmp_path)
     assert "record" not in [child.component for child in run.children(off, tmp_path / "x.toml")]
 
 
-@pytest.mark.parametrize(("code", "expected"), [(0, Exit.OK), (1, Exit.FAILED), (-9, Exit.FAILED)])
+@pytest.mark.parametrize(("code", "expected"), [(0, Exit.OK), (1, Exit.FAILED), (137, Exit.FAILED)])
 def test_a_run_says_by_its_exit_code_whether_the_recording_is_complete(code, expected):
-    ended = Child("record", (), 0, State.STOPPED, exit_code=code)
+    ended = Child("record", (), 0, State.STOPPED, worst_code=code)
     assert run.recording_code([ended]) is expected
     assert run.recording_code([]) is Exit.OK
 

@@ -3,27 +3,12 @@ import pytest
 from abs_service.supervision.child import State
 from abs_service.supervision.child_process import ThreadTimes
 from abs_service.supervision.exit_codes import Exit
-from tests.abs_service.supervision.fake_processes import S, World
+from tests.abs_service.supervision.fake_processes import S, World, ends, passes
 
 
 @pytest.fixture
 def world():
     return World()
-
-
-def ends(world, supervisor, component, code):
-    """The process ends with this code, and its pause passes."""
-    world.latest(component).code = code
-    supervisor.poll()
-    world.now_ns += 4 * S
-    supervisor.poll()
-
-
-def passes(world, supervisor, seconds):
-    """So much time, in which the supervisor works."""
-    for _ in range(2 * seconds):
-        world.now_ns += S // 2
-        supervisor.poll()
 
 
 def test_all_children_are_started_at_once(world):
@@ -184,89 +169,3 @@ def test_health_of_unknown_components_is_ignored(world):
     supervisor.heartbeat("track/elsewhere")
     assert list(supervisor.children) == ["capture"]
     assert world.events == []
-
-
-def test_the_recorder_is_stopped_last(world):
-    supervisor = world.supervisor("capture", "track/a", "record")
-    supervisor.stop(world.wait)
-    assert world.events == [("terminate", "capture"), ("terminate", "track/a"), ("terminate", "record")]
-    assert {child.state for child in supervisor.children.values()} == {State.STOPPED}
-    assert world.now_ns == 0
-
-
-def test_processes_that_do_not_end_in_time_are_killed_and_the_recorder_has_the_most_time(world):
-    supervisor = world.supervisor("capture", "track/a", "record", stop_ns=4 * S)
-    world.stubborn = {"capture", "track/a", "record"}
-    times = {}
-    supervisor.stop(lambda seconds: (world.wait(seconds), times.setdefault(len(world.events), world.now_ns)))
-    assert [event for event in world.events if event[0] == "kill"] == [
-        ("kill", "capture"),
-        ("kill", "track/a"),
-        ("kill", "record"),
-    ]
-    assert 4 * S <= world.now_ns < 4.1 * S
-    assert supervisor.children["record"].reason == "did not end in time and was killed"
-
-
-def test_a_renewed_process_ends_in_order_and_starts_again_which_counts_as_no_failure(world):
-    supervisor = world.supervisor("capture", "track/a", restarts=0)
-    for _ in range(3):
-        supervisor.renew("track/a")
-        assert supervisor.exit_code() is None
-        supervisor.poll()
-    track = supervisor.children["track/a"]
-    assert (track.state, track.restarts, track.reason) == (State.RUNNING, 0, "")
-    assert world.events == 3 * [("terminate", "track/a")]
-    assert [process.component for process in world.started] == ["capture", *4 * ["track/a"]]
-
-
-def test_a_renewed_process_that_does_not_end_is_killed_and_one_that_was_given_up_begins_again(world):
-    supervisor = world.supervisor("capture", "record", stop_ns=4 * S)
-    ends(world, supervisor, "record", 2)
-    assert supervisor.exit_code() == Exit.USER
-    supervisor.renew("record")
-    supervisor.poll()
-    assert (supervisor.children["record"].state, supervisor.exit_code()) == (State.RUNNING, None)
-    world.stubborn = {"record"}
-    supervisor.renew("record")
-    passes(world, supervisor, 3)
-    assert supervisor.children["record"].state == State.RENEWED
-    passes(world, supervisor, 1)
-    assert world.events[-1] == ("kill", "record")
-    assert supervisor.children["record"].state == State.RUNNING
-
-
-def test_a_rig_that_is_stopped_does_not_start_what_was_to_be_renewed(world):
-    supervisor = world.supervisor("capture")
-    supervisor.renew("capture")
-    supervisor.stop(world.wait)
-    assert (supervisor.children["capture"].state, len(world.started)) == (State.STOPPED, 1)
-
-
-def test_a_process_that_finalises_its_file_is_not_told_twice_to_end(world):
-    supervisor = world.supervisor("capture", "record")
-    world.stubborn = {"record"}
-    supervisor.renew("record")
-    passes(world, supervisor, 1)
-    supervisor.renew("record")
-    passes(world, supervisor, 1)
-    assert world.started[1].code is None, "by a second reload"
-    supervisor.stop(world.wait)
-    assert world.events.count(("terminate", "record")) == 1, "nor by the end of the run"
-
-
-def test_a_second_reload_gives_a_process_no_more_time(world):
-    supervisor = world.supervisor("record", stop_ns=4 * S)
-    world.stubborn = {"record"}
-    for _ in range(4):
-        supervisor.renew("record")
-        passes(world, supervisor, 1)
-    assert world.events[-1] == ("kill", "record")
-    assert supervisor.children["record"].state is State.RUNNING
-
-
-def test_stopping_twice_or_without_children_is_harmless(world):
-    supervisor = world.supervisor("capture")
-    supervisor.stop(world.wait)
-    supervisor.stop(world.wait)
-    assert world.events == [("terminate", "capture")]
