@@ -18,7 +18,7 @@ class State(StrEnum):
     BACKOFF = "backoff"  # not started yet, or ended; starts when its backoff is over
     STALLED = "stalled"  # sent no health in time and was killed; will be restarted
     RENEWED = "renewed"  # was told to end, and starts again as soon as it has
-    FINISHED = "finished"  # ended in order by itself
+    FINISHED = "finished"  # there is nothing left for it to do
     FAILED = "failed"  # given up
     STOPPED = "stopped"
 

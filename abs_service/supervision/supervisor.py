@@ -166,7 +166,7 @@ class Supervisor:
             self._schedule_restart(child, now_ns, "sent no health in time", State.STALLED)
             return
         child.exit_code, child.worst_code = code, max(child.worst_code, code)
-        if code == Exit.OK:
+        if code == Exit.ENDED:
             child.state, child.process = State.FINISHED, NO_PROCESS
         elif code == Exit.USER:
             self._give_up(child, child.process.output_tail())

@@ -1,4 +1,4 @@
-"""Publishes the images of a rig's devices, until SIGTERM or Ctrl-C or until all devices have ended.
+"""Publishes the images of a rig's devices, until SIGTERM or Ctrl-C or until all devices have ended (exit code 4).
 
   abs-service capture rig.toml                                 for the rig that `abs-service run` hosts elsewhere
   abs-service capture rig.toml --listen tcp/0.0.0.0:7447       alone; the others connect to this process
@@ -75,7 +75,7 @@ def run(arguments: argparse.Namespace) -> int:
         rig_devices.check_addresses(rig, source)  # those of the devices that were not opened any more, too
     if errors:
         raise errors[0]
-    return Exit.OK
+    return Exit.ENDED if all(supervisor.finished for supervisor in supervisors) else Exit.OK
 
 
 def _supervisor(

@@ -24,6 +24,19 @@ def killed(component: str, rig: RunningRig) -> Made:
     return Made(begin_ns, begin_ns)
 
 
+def asked(component: str, rig: RunningRig) -> Made:
+    """SIGTERM to a process of `run`, of which `run` knows nothing."""
+    process = rig.processes()[component]
+    begin_ns = rig.signal(component, signal.SIGTERM)
+    return Made(begin_ns, _await_end(process, rig, begin_ns, END_S))
+
+
+def _await_end(process: int, rig: RunningRig, begin_ns: int, longest_s: float) -> int:
+    while is_running(process) and rig.now_ns() < begin_ns + longest_s * 1e9:
+        time.sleep(0.01)
+    return rig.now_ns()
+
+
 def run_killed(rig: RunningRig) -> Made:
     """`kill -9` of `run`, which is started again when its processes have ended."""
     processes = rig.processes().values()
@@ -60,9 +73,7 @@ def hangs(component: str, rig: RunningRig) -> Made:
     """SIGSTOP for good: the process has to be killed and started again."""
     hanging = rig.processes()[component]
     begin_ns = rig.signal(component, signal.SIGSTOP)
-    while is_running(hanging) and rig.now_ns() < begin_ns + 3 * STALL_S * 1e9:
-        time.sleep(0.01)
-    return Made(begin_ns, rig.now_ns())
+    return Made(begin_ns, _await_end(hanging, rig, begin_ns, 3 * STALL_S))
 
 
 _BACK = "restarted; the others go on"
@@ -78,6 +89,9 @@ FAULTS = (
     Fault(
         "kill -9 of `record`", "nothing older than 1 s is lost", partial(killed, "record"), 0.5, 1.5, restarted=_RECORD
     ),
+    Fault("SIGTERM of `capture`", _BACK, partial(asked, "capture"), 3.0, 3.0, restarted=_CAPTURE),
+    Fault("SIGTERM of `track`", _BACK, partial(asked, "track"), 3.0, restarted=_TRACK),
+    Fault("SIGTERM of `record`", _BACK, partial(asked, "record"), 0.5, 1.5, restarted=_RECORD),
     Fault(
         "kill -9 of the process that the others are forked from",
         "nothing is lost; another one is ready",

@@ -91,9 +91,17 @@ def test_exit_code_2_of_anyone_stops_everything_and_keeps_the_message(world):
 
 def test_when_the_devices_have_no_more_images_the_run_is_over(world):
     supervisor = world.supervisor("capture", "track/a")
-    ends(world, supervisor, "capture", 0)
+    ends(world, supervisor, "capture", Exit.ENDED)
     assert supervisor.exit_code() is Exit.OK
     assert supervisor.children["capture"].restarts == 0
+
+
+@pytest.mark.parametrize("component", ["capture", "track/a", "record"])
+def test_a_process_that_ends_in_order_though_nobody_here_told_it_is_started_again(world, component):
+    supervisor = world.supervisor("capture", "track/a", "record")
+    ends(world, supervisor, component, Exit.OK)
+    child = supervisor.children[component]
+    assert (child.state, child.restarts, supervisor.exit_code()) == (State.RUNNING, 1, None)
 
 
 def test_a_silent_child_is_killed_and_started_again(world):

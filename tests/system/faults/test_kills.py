@@ -1,6 +1,7 @@
-"""`kill -9` on a running rig: the process is restarted, the others go on, and no recording is lost."""
+"""`kill -9` and SIGTERM on a running rig: the process is restarted, the others go on, and no recording is lost."""
 
 import itertools
+import os
 import signal
 import time
 from collections.abc import Sequence
@@ -98,6 +99,26 @@ def test_a_killed_recorder_leaves_a_gap_of_a_second_and_a_half_at_most(run, tmp_
     gap_s = max(b - a for a, b in itertools.pairwise(times))
     print(f"kill -9 of the recorder left a gap of {gap_s:.2f} s")
     assert gap_s < 1.5
+
+
+def replaced(run, command):
+    """Tells a process of `run` to end; returns the moment when there is another one [ns]."""
+    told = children(run)[command]
+    os.kill(told, signal.SIGTERM)
+    wait_until(lambda: children(run).get(command, told) != told, 10, f"another {command}")
+    return time.monotonic_ns()
+
+
+def test_processes_that_somebody_tells_to_end_are_started_again(run, tmp_path):
+    process, listener = run
+    for command in ("capture", "track", "record"):
+        wait_until(listener.tracks_since(replaced(process.pid, command)), 30, "TRACKING again")
+    takes = [path for path in (tmp_path / "takes").iterdir() if path.suffix == ".mcap"]
+    assert len(takes) == 1, "the file of the first recorder is complete"
+    counters = listener.health("run")[-1].counters
+    assert [counters[f"restarts.{one}"] for one in ("capture", "track/sheet", "record")] == [1, 1, 1]
+    process.send_signal(signal.SIGTERM)
+    assert process.wait(10) == 0
 
 
 def test_a_folder_that_cannot_be_written_ends_neither_tracking_nor_recording_for_good(run, tmp_path):

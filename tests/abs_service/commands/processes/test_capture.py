@@ -1,0 +1,52 @@
+"""`abs-service capture` in this process, with devices that do what a test says."""
+
+import threading
+
+import pytest
+
+from abs_service import cli
+from abs_service.commands.processes import capture
+from abs_service.supervision.exit_codes import Exit
+from drivers.contract.device import DeviceState
+from tests.abs_service.capture.fake_device import FakeDevice, frame
+
+RIG = """
+version = 1
+name = "demo"
+devices.cam.uri = "replay://any.mcap"
+sensors.head.device = "cam"
+"""
+
+
+@pytest.fixture
+def captured(tmp_path, endpoint, monkeypatch):
+    """Runs it with a device that does `start`, until `stop` or its end; returns the exit code."""
+    (tmp_path / "rig.toml").write_text(RIG)
+
+    def captured(start, stop):
+        monkeypatch.setattr(capture.rig_process, "stop_on_signals", lambda: stop)
+        monkeypatch.setattr(capture, "open_device", lambda *_: FakeDevice(start=start))
+        monkeypatch.setattr(capture.gc_tuning, "freeze_loaded_objects", lambda: None)
+        return cli.main(["capture", str(tmp_path / "rig.toml"), "--listen", endpoint])
+
+    return captured
+
+
+def test_the_exit_code_says_that_the_devices_have_ended(captured):
+    def ends(sink):
+        sink.on_state(DeviceState.STREAMING, "")
+        sink.on_frame(frame())
+        sink.on_state(DeviceState.CLOSED, "the recording has ended")
+
+    assert captured(ends, threading.Event()) == Exit.ENDED
+
+
+def test_the_exit_code_says_that_it_was_told_to_end(captured):
+    stop = threading.Event()
+
+    def works(sink):
+        sink.on_state(DeviceState.STREAMING, "")
+        sink.on_frame(frame())
+        stop.set()
+
+    assert captured(works, stop) == Exit.OK
