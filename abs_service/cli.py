@@ -97,7 +97,7 @@ def program() -> None:
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs one command and returns its exit code; see `Exit`."""
     _compute_with_one_thread()
-    parent_watchdog.start()
+    reconfigured = parent_watchdog.start()
     name, commands, given = "", COMMANDS, list(sys.argv[1:] if argv is None else argv)
     module = import_module("abs_service.commands")
     while commands:
@@ -113,7 +113,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     parser = command_parser(name, module)
     logs.add_arguments(parser)
-    arguments = parser.parse_args(given, argparse.Namespace(commands=COMMANDS, modules=MODULES))
+    context = argparse.Namespace(commands=COMMANDS, modules=MODULES, reconfigured=reconfigured)
+    arguments = parser.parse_args(given, context)
     try:
         logs.set_up(arguments, name, given)
         code = module.run(arguments)

@@ -16,28 +16,27 @@ VARIABLE = "ABS_SERVICE_PARENT_WATCHDOG"
 #: Descriptor of the standard input: the pipe, also where Python's own object for it is another one.
 STDIN = 0
 
-_woken = threading.Event()
-
 #: Time from SIGTERM to SIGKILL for an orphan [s].
 GRACE_S = 3.0
 
 
-def start() -> None:
-    """If a supervisor started this process, ends it when the supervisor is gone: in order first, then by force."""
+def start() -> threading.Event:
+    """If a supervisor started this process, ends it when the supervisor is gone: in order first, then by force.
+
+    Returns:
+        An event that is set whenever the supervisor says that the configuration has changed; it is for the caller to
+        clear, before the configuration is read.
+    """
+    woken = threading.Event()
     if os.environ.pop(VARIABLE, ""):
-        threading.Thread(target=_watch, args=(STDIN, GRACE_S), name="parent watchdog", daemon=True).start()
-
-
-def was_woken() -> bool:
-    """True if the supervisor has written a line since the last call, because the configuration has changed."""
-    woken = _woken.is_set()
-    _woken.clear()
+        watch = threading.Thread(target=_watch, args=(STDIN, GRACE_S, woken), name="parent watchdog", daemon=True)
+        watch.start()
     return woken
 
 
-def _watch(descriptor: int, grace_s: float) -> None:
+def _watch(descriptor: int, grace_s: float, woken: threading.Event) -> None:
     while os.read(descriptor, 64):
-        _woken.set()
+        woken.set()
     os.kill(os.getpid(), signal.SIGTERM)
     time.sleep(grace_s)
     os.kill(os.getpid(), signal.SIGKILL)

@@ -23,7 +23,7 @@ from abs_service.capture.device_supervisor import DeviceSupervisor
 from abs_service.capture.point_clouds import PointCloudPublisher
 from abs_service.commands.parts import rig_devices, rig_process
 from abs_service.config import plugins
-from abs_service.supervision import gc_tuning, parent_watchdog
+from abs_service.supervision import gc_tuning
 from abs_service.supervision.exit_codes import Exit
 from abs_service.wire.message_header import CALIBRATION, CONFIG, MODEL, TRANSFORMS
 from calib.camera import Camera
@@ -62,8 +62,8 @@ def run(arguments: argparse.Namespace) -> int:
         supervisors = [_supervisor(name, rig, source, metadata, points[name], health) for name in rig.devices]
         for supervisor in supervisors:
             supervisor.start()
-        follow = partial(_follow, arguments, metadata)
-        _watch(stop, supervisors, follow, lambda: tick(metadata, publishers, points, health, clock))
+        configure = partial(follow, arguments.reconfigured, partial(_configure, metadata, arguments))
+        _watch(stop, supervisors, configure, lambda: tick(metadata, publishers, points, health, clock))
         for supervisor in supervisors:
             supervisor.close(CLOSE_S)
         for publisher in (*publishers.values(), *points.values()):
@@ -103,9 +103,15 @@ def _supervisor(
     )
 
 
-def _follow(arguments: argparse.Namespace, metadata: "MetadataPublisher") -> None:
-    if parent_watchdog.was_woken():
-        metadata.configure(rig_process.load_config(arguments))
+def follow(reconfigured: threading.Event, configure: Callable[[], None]) -> None:
+    """Calls `configure` if the configuration has changed."""
+    if reconfigured.is_set():
+        reconfigured.clear()  # first: what changes while it is read will be read again
+        configure()
+
+
+def _configure(metadata: "MetadataPublisher", arguments: argparse.Namespace) -> None:
+    metadata.configure(rig_process.load_config(arguments))
 
 
 def _watch(stop: threading.Event, supervisors: list[DeviceSupervisor], *ticks: Callable[[], None]) -> None:

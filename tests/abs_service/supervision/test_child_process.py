@@ -148,6 +148,26 @@ def test_children_outlive_the_process_that_they_were_forked_from():
     assert done.stdout == "7 0\n", done.stderr
 
 
+WOKEN = """
+from abs_service.supervision import parent_watchdog
+woken = parent_watchdog.start()
+for number in range(2):
+    print(woken.is_set(), flush=True)
+    print(woken.wait(10), flush=True)
+    woken.clear()
+"""
+
+
+def test_a_child_that_is_woken_sees_it_each_time(child):
+    lines = []
+    process = child(WOKEN, lambda _, line: lines.append(line))
+    for waits in (["False"], ["False", "True", "False"]):
+        assert eventually(lambda waits=waits: lines == waits)
+        process.wake()
+    assert wait_for_end(process) == 0
+    assert process.output_tail() == "False\nTrue\nFalse\nTrue"
+
+
 PRELOADING = """
 import time
 from abs_service.supervision import forked

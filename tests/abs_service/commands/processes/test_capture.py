@@ -50,3 +50,35 @@ def test_the_exit_code_says_that_it_was_told_to_end(captured):
         stop.set()
 
     assert captured(works, stop) == Exit.OK
+
+
+class SetAfterTheFirstLook(threading.Event):
+    looks = 0
+
+    def is_set(self):
+        was = super().is_set()
+        self.looks += 1
+        if self.looks == 1:
+            self.set()
+        return was
+
+
+def test_a_change_of_the_configuration_just_after_a_look_is_not_missed():
+    reconfigured, read = SetAfterTheFirstLook(), []
+    for _ in range(3):
+        capture.follow(reconfigured, lambda: read.append("rig.toml"))
+    assert len(read) == 1
+
+
+def test_a_configuration_that_changes_while_it_is_read_is_read_again():
+    reconfigured, read = threading.Event(), []
+    reconfigured.set()
+
+    def configure():
+        read.append("rig.toml")
+        if len(read) == 1:
+            reconfigured.set()
+
+    for _ in range(3):
+        capture.follow(reconfigured, configure)
+    assert len(read) == 2
