@@ -1,9 +1,10 @@
-"""The opened devices of a rig as its configuration wants them: their controls, and the cameras of their sensors."""
+"""The devices of a rig as its configuration wants them: controls, and cameras and noise models of their sensors."""
 
 from collections.abc import Mapping
 
 from abs_service import config
-from abs_service.config import addresses
+from abs_service.capture.metadata_publisher import Described
+from abs_service.config import addresses, plugins
 from abs_service.config.errors import error_of
 from calib.camera import Camera
 from drivers.contract.controls import Value
@@ -61,3 +62,12 @@ def cameras(rig: config.ServiceConfig, name: str, device: Device) -> dict[str, C
             raise HeadError(f'sensors.{sensor}: device "{name}" has no head "{head}"; it has: {there_are}')
         found[sensor] = rig.sensors[sensor].camera.applied_to(device.cameras[head])
     return found
+
+
+def described(rig: config.ServiceConfig) -> Described:
+    """The configuration itself, and the noise models of its sensors with their outliers."""
+    noises = {}
+    for sensor, table in rig.sensors.items():
+        outliers = table.model_dump(include={"outlier_share", "range_m"}, exclude_none=True)
+        noises[sensor] = {} if table.noise is None else plugins.table(table.noise) | outliers
+    return Described(config.to_toml(rig), noises)

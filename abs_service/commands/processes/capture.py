@@ -14,19 +14,16 @@ from functools import partial
 
 from abs_service import config
 from abs_service.bus import clock_offsets, keys
-from abs_service.bus.contract import Bus, Publisher
 from abs_service.bus.frames import FramePublisher
 from abs_service.bus.health import Health, Level
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.capture import sensor_metadata
 from abs_service.capture.device_supervisor import DeviceSupervisor
+from abs_service.capture.metadata_publisher import MetadataPublisher
 from abs_service.capture.point_clouds import PointCloudPublisher
 from abs_service.commands.parts import rig_devices, rig_process
-from abs_service.config import plugins
 from abs_service.supervision import gc_tuning
 from abs_service.supervision.exit_codes import Exit
-from abs_service.wire.message_header import CALIBRATION, CONFIG, MODEL, TRANSFORMS
-from calib.camera import Camera
 from drivers.contract.device import AddressError, Device, Sink
 from drivers.opening import open_device
 
@@ -51,7 +48,7 @@ def run(arguments: argparse.Namespace) -> int:
         bus.answer_queries(keys.SCHEMA, sensor_metadata.SCHEMA_MESSAGE, sensor_metadata.schema)
         if headers.host_clock:
             clock_offsets.answer(bus, headers)
-        metadata = MetadataPublisher(bus, headers, rig)
+        metadata = MetadataPublisher(bus, headers, rig_devices.described(rig))
         publishers = {name: FramePublisher(bus, headers, name) for name in rig.devices}
         view_hz = {name: table.view_hz for name, table in rig.sensors.items()}
         points = {
@@ -82,13 +79,13 @@ def _supervisor(
     name: str,
     rig: config.ServiceConfig,
     source: str,
-    metadata: "MetadataPublisher",
+    metadata: MetadataPublisher,
     sink: Sink,
     health: Health,
 ) -> DeviceSupervisor:
     def on_open(device: Device) -> None:
         rig_devices.set_controls(device, rig.devices[name].controls, f"{source}: devices.{name}.controls")
-        metadata.add_device(name, device)
+        metadata.add(rig_devices.cameras(rig, name, device))
         gc_tuning.freeze_loaded_objects()
 
     return DeviceSupervisor(
@@ -110,8 +107,8 @@ def follow(reconfigured: threading.Event, configure: Callable[[], None]) -> None
         configure()
 
 
-def _configure(metadata: "MetadataPublisher", arguments: argparse.Namespace) -> None:
-    metadata.configure(rig_process.load_config(arguments))
+def _configure(metadata: MetadataPublisher, arguments: argparse.Namespace) -> None:
+    metadata.configure(rig_devices.described(rig_process.load_config(arguments)))
 
 
 def _watch(stop: threading.Event, supervisors: list[DeviceSupervisor], *ticks: Callable[[], None]) -> None:
@@ -125,7 +122,7 @@ def _watch(stop: threading.Event, supervisors: list[DeviceSupervisor], *ticks: C
 
 
 def tick(
-    metadata: "MetadataPublisher",
+    metadata: MetadataPublisher,
     publishers: Mapping[str, FramePublisher],
     points: Mapping[str, PointCloudPublisher],
     health: Health,
@@ -154,66 +151,3 @@ def _count(publishers: Mapping[str, FramePublisher], points: Mapping[str, PointC
         health.count_up_to(publisher.published, "published.")
         for topic, number in publisher.published.items():
             health.rate(f"rate_hz.{topic}", number)
-
-
-class MetadataPublisher:
-    """Publishes the configuration, and calibration, noise model and pose of every sensor whose device is open.
-
-    Args:
-        bus: of the rig.
-        headers: makes the message headers.
-        rig: the configuration.
-    """
-
-    def __init__(self, bus: Bus, headers: HeaderFactory, rig: config.ServiceConfig) -> None:
-        self._bus = bus
-        self._headers = headers
-        self.configure(rig)
-        self._cameras: dict[str, Camera] = {}
-        self._publishers: dict[str, Publisher] = {}
-        self._seq = 0
-        self._lock = threading.Lock()
-
-    def configure(self, rig: config.ServiceConfig) -> None:
-        """Publishes another configuration from now on, with the same devices and cameras."""
-        self._rig, self._toml = rig, config.to_toml(rig)
-
-    def add_device(self, name: str, device: Device) -> None:
-        """Adds the sensors of an opened device and publishes their metadata.
-
-        Raises:
-            HeadError: the configuration names a head that the device does not have.
-        """
-        cameras = rig_devices.cameras(self._rig, name, device)
-        with self._lock:
-            self._cameras |= cameras
-        self.publish()
-
-    def camera(self, sensor: str) -> Camera:
-        """Camera of a sensor whose device was opened."""
-        with self._lock:
-            return self._cameras[sensor]
-
-    def publish(self) -> None:
-        """Publishes all metadata, stamped now."""
-        with self._lock:
-            header = self._headers.now(self._seq)
-            self._seq += 1
-            wall_ns = header.stamp.ToNanoseconds()
-            self._put(keys.CONFIG, CONFIG, sensor_metadata.config(header, self._toml).SerializeToString())
-            for sensor, camera in self._cameras.items():
-                table = self._rig.sensors[sensor]
-                outliers = table.model_dump(include={"outlier_share", "range_m"}, exclude_none=True)
-                noise = {} if table.noise is None else plugins.table(table.noise) | outliers
-                model = sensor_metadata.sensor_model(header, sensor, camera, noise)
-                calibration = sensor_metadata.calibration(sensor, camera, wall_ns)
-                self._put(keys.model(sensor), MODEL, model.SerializeToString())
-                self._put(keys.calibration(sensor), CALIBRATION, calibration.SerializeToString())
-            if self._cameras:
-                poses = sensor_metadata.transforms(self._cameras, wall_ns)
-                self._put(keys.TRANSFORMS, TRANSFORMS, poses.SerializeToString())
-
-    def _put(self, topic: str, message: str, payload: bytes) -> None:
-        if topic not in self._publishers:
-            self._publishers[topic] = self._bus.latched_publisher(topic, message)
-        self._publishers[topic].put(payload)

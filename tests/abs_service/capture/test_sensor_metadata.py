@@ -1,6 +1,7 @@
 """Cameras, noise models and poses of the sensors are published with the configuration."""
 
 import dataclasses
+import threading
 
 import numpy as np
 import pytest
@@ -17,9 +18,10 @@ from abs_service.bus import keys
 from abs_service.bus.health import Health, Level
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.capture import sensor_metadata
+from abs_service.capture.metadata_publisher import MetadataPublisher
+from abs_service.commands.parts import rig_devices
 from abs_service.commands.parts.rig_devices import HeadError
 from abs_service.commands.processes import capture as command
-from abs_service.commands.processes.capture import MetadataPublisher
 from abs_service.wire.message_header import MESSAGES
 from calib import pose
 from calib.lenses.fisheye import KannalaBrandt
@@ -46,14 +48,19 @@ head = "other"
 
 
 @pytest.fixture
-def metadata(tmp_path):
+def rig(tmp_path):
+    return config.loads(RIG, "rig.toml", tmp_path)
+
+
+@pytest.fixture
+def metadata(rig):
     bus = LoopbackBus()
-    return bus, MetadataPublisher(bus, HeaderFactory("demo", WallClock()), config.loads(RIG, "rig.toml", tmp_path))
+    return bus, MetadataPublisher(bus, HeaderFactory("demo", WallClock()), rig_devices.described(rig))
 
 
-def test_what_the_sensors_are_is_announced_with_the_calibration_of_the_configuration(metadata):
+def test_what_the_sensors_are_is_announced_with_the_calibration_of_the_configuration(rig, metadata):
     bus, metadata = metadata
-    metadata.add_device("cam", FakeDevice())
+    metadata.add(rig_devices.cameras(rig, "cam", FakeDevice()))
     published = {sample.topic: sample.payload for sample in bus.query("**", 1)}
     assert set(published) == {"config", "tf", "tof/model", "tof/calibration", "color/model", "color/calibration"}
     model = SensorModel.FromString(published["tof/model"])
@@ -88,10 +95,34 @@ def test_a_fisheye_camera_is_published_and_restored_from_recordings():
         decode_camera(model)
 
 
-def test_a_head_that_the_device_does_not_have_is_explained(metadata):
-    _, metadata = metadata
+def test_another_configuration_while_all_is_published_comes_with_the_next_time(rig, metadata, tmp_path):
+    bus, metadata = metadata
+    metadata.add(rig_devices.cameras(rig, "cam", FakeDevice()))
+    other = rig_devices.described(config.loads(RIG.replace("1e-2", "5e-2"), "rig.toml", tmp_path))
+    threads = []
+
+    def reload(_):
+        if not threads:
+            threads.append(threading.Thread(target=metadata.configure, args=(other,)))
+            threads[0].start()
+            threads[0].join(0.2)
+
+    bus.subscribe("config", reload)
+
+    def sigma():
+        metadata.publish()
+        published = {sample.topic: sample.payload for sample in bus.query("**", 1)}
+        values = SensorModel.FromString(published["tof/model"]).noise_parameters["sigma"].values
+        return values[0], str(values[0]) in Config.FromString(published["config"]).toml
+
+    assert sigma() == (1e-2, True)
+    threads[0].join()
+    assert sigma() == (5e-2, True)
+
+
+def test_a_head_that_the_device_does_not_have_is_explained(rig):
     with pytest.raises(HeadError, match=r'sensors\.color: device "cam" has no head "other"; it has: head'):
-        metadata.add_device("cam", FakeDevice(heads=["head"]))
+        rig_devices.cameras(rig, "cam", FakeDevice(heads=["head"]))
 
 
 def test_a_step_of_the_wall_clock_is_reported_once(metadata):
