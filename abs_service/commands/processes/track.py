@@ -9,7 +9,8 @@ Without CONFIG TRACKER it is the only tracker of the simulated demo rig.
 import argparse
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future, wait
 from contextlib import suppress
 from functools import partial
 from queue import SimpleQueue
@@ -64,8 +65,7 @@ def run(arguments: argparse.Namespace) -> int:
         health = Health(bus, f"track/{name}", headers)
         bus.declare_liveliness(f"track/{name}")
         rigs: SimpleQueue[Rig] = SimpleQueue()
-        preparing = threading.Thread(target=_prepare, args=(rigs, noises, plan, health), daemon=True)
-        preparing.start()
+        preparing = _begin(partial(_prepare, rigs, noises, plan, health))
         cameras = await_cameras(bus, settings.trackers[name].sensors, health, stop)
         if stop.is_set():
             return Exit.OK
@@ -93,11 +93,28 @@ def run(arguments: argparse.Namespace) -> int:
     return Exit.OK
 
 
-def _await(preparing: threading.Thread, health: Health, stop: threading.Event) -> None:
-    while preparing.is_alive() and not stop.is_set():
-        preparing.join(0.05)
+def _begin(prepare: Callable[[], None]) -> Future[None]:
+    """Prepares in a thread, which no end of the process waits for: an executor's would keep it while it compiles."""
+    preparing: Future[None] = Future()
+
+    def run() -> None:
+        try:
+            preparing.set_result(prepare())
+        except BaseException as error:
+            preparing.set_exception(error)
+
+    threading.Thread(target=run, name="preparing", daemon=True).start()
+    return preparing
+
+
+def _await(preparing: Future[None], health: Health, stop: threading.Event) -> None:
+    """Waits for the end of the preparation, or for `stop`; raises the error with which the preparation ended."""
+    while not (preparing.done() or stop.is_set()):
+        wait([preparing], 0.05)
         health.tick()
     health.publish()
+    if preparing.done():
+        preparing.result()
 
 
 def _report(tracker_health: TrackerHealth, bus: CheckedBus, health: Health) -> None:
