@@ -77,11 +77,11 @@ class RigState:
 
     def preparing(self) -> bool:
         """True if a tracker is compiling its kernels, or loading them from the cache."""
-        return any(self.prepares(name) for name in self.trackers)
+        return any(self.prepares(f"track/{name}") for name in self.trackers)
 
-    def prepares(self, tracker: str) -> bool:
-        """`preparing` of one tracker."""
-        return self.health(f"track/{tracker}").labels.get("phase") == "preparing"
+    def prepares(self, component: str) -> bool:
+        """`preparing` of one component."""
+        return self.health(component).labels.get("phase") == "preparing"
 
     def compiled(self) -> str:
         """Progress of the compilation of kernels, by tracker; "" if none has to be compiled."""

@@ -163,7 +163,7 @@ class Display(Protocol):
     def __exit__(self, *error: object) -> None: ...
 
     def update(self, view: RigView) -> None:
-        """Shows the current state; called some ten times a second."""
+        """Shows the current state; called some twenty times a second."""
         ...
 
     def estimate(self, report: EstimateReport) -> None:

@@ -175,8 +175,7 @@ class RunSession:
             self._silence_monitors[topic].add()
         if topic.startswith("health/"):
             component = topic.removeprefix("health/")
-            busy = self._live.health(component).labels.get("phase") == "preparing"
-            self._supervisor.heartbeat(component, busy)
+            self._supervisor.heartbeat(component, busy=self._live.prepares(component))
 
     def _report_silence(self) -> None:
         for topic, monitor in self._silence_monitors.items():

@@ -19,7 +19,7 @@ _log = logging.getLogger(__name__)
 LONGEST_BACKOFF_NS = 3_000_000_000
 #: After a run that was longer than this the next backoff is the first one again [ns].
 WORKED_NS = 10_000_000_000
-#: A longer time between two calls of `poll` was a stop of this process, without messages of the children [ns].
+#: If `poll` was not called for longer than this, the supervisor itself was suspended, and heard no child [ns].
 PAUSE_NS = 1_000_000_000
 
 
@@ -143,10 +143,7 @@ class Supervisor:
         """True if a child that is late has waited for a processor in the meantime, instead of hanging."""
         silent_ns = now_ns - child.heard_ns
         waited_ns = longest_wait_ns(child.threads, child.process.threads(), silent_ns)
-        if now_ns >= child.deadline_ns + min(waited_ns, self._limits.startup_ns):
-            return False
-        child.reason = f"no health for {silent_ns / 1e9:.0f} s, because it waits for a processor"
-        return True
+        return now_ns < child.deadline_ns + min(waited_ns, self._limits.startup_ns)
 
     def _start(self, child: Child, now_ns: int) -> None:
         _end(child)
@@ -159,11 +156,9 @@ class Supervisor:
 
     def _check(self, child: Child, now_ns: int) -> None:
         code = child.process.poll()
-        if code is None and (now_ns < child.deadline_ns or self._is_starved(child, now_ns)):
-            return
         if code is None:
-            child.process.kill()
-            self._schedule_restart(child, now_ns, "sent no health in time", State.STALLED)
+            if now_ns >= child.deadline_ns:
+                self._treat_silence(child, now_ns)
             return
         child.exit_code, child.worst_code = code, max(child.worst_code, code)
         if code == Exit.ENDED:
@@ -172,6 +167,14 @@ class Supervisor:
             self._give_up(child, child.process.output_tail())
         else:
             self._schedule_restart(child, now_ns, _exit_reason(code, child.process.output_tail()), State.BACKOFF)
+
+    def _treat_silence(self, child: Child, now_ns: int) -> None:
+        if self._is_starved(child, now_ns):
+            silent_s = (now_ns - child.heard_ns) / 1e9
+            child.reason = f"no health for {silent_s:.0f} s, because it waits for a processor"
+            return
+        child.process.kill()
+        self._schedule_restart(child, now_ns, "sent no health in time", State.STALLED)
 
     def _schedule_restart(self, child: Child, now_ns: int, reason: str, state: State) -> None:
         while child.exits_ns and child.exits_ns[0] <= now_ns - self._limits.window_ns:

@@ -55,7 +55,9 @@ class Notifier:
         due = self._watchdog_ns and view.now_ns - self._proven_ns >= self._watchdog_ns // 4
         # Each tracker by itself: one that works does not hide another one that does not. One that was started again for
         # another configuration may compile kernels for longer than systemd waits; the supervisor limits that.
-        if due and all(view.live.prepares(name) or count != self._proven.get(name) for name, count in counts.items()):
+        if due and all(
+            view.live.prepares(f"track/{name}") or count != self._proven.get(name) for name, count in counts.items()
+        ):
             self._proven, self._proven_ns = counts, view.now_ns
             self._send("WATCHDOG=1")
 
