@@ -15,7 +15,7 @@ from calib.camera import Camera
 
 @dataclass(frozen=True)
 class Described:
-    """What a configuration says of its sensors.
+    """Sensors as a configuration describes them.
 
     Attributes:
         toml: the whole configuration.

@@ -94,7 +94,7 @@ Spawn = Callable[[str, Sequence[str]], Process]
 
 
 class ChildProcess:
-    """`abs-service ARGUMENTS` as a child, forked from a process that has imported what it needs; see `preload`.
+    """`abs-service ARGUMENTS` as a child of the fork server, which has imported what it needs; see `forked.preload`.
 
     Args:
         component: its name.
@@ -166,7 +166,7 @@ class ChildProcess:
     def _exit_code(self) -> int | None:
         try:
             return os.waitstatus_to_exitcode(os.waitpid(self.pid, 0)[1])
-        except ChildProcessError:  # as long as the process that it was forked from lives, that one is its parent
+        except ChildProcessError:  # as long as the fork server lives, it is the parent
             return self._process.exitcode
 
     def _send(self, send: Callable[[int, int], None], number: signal.Signals) -> None:
@@ -185,7 +185,7 @@ class ChildProcess:
 
 
 def _end_of(process: ForkServerProcess) -> Connection | int:
-    """A descriptor that can be read when a process has ended, also if the one that it was forked from is gone."""
+    """A descriptor that can be read when a process has ended, also if the fork server is gone."""
     try:
         return Connection(os.pidfd_open(process.pid or 0), writable=False)  # which closes itself
     except ProcessLookupError:  # already

@@ -1,7 +1,7 @@
-"""Processes that are forked from one that has imported everything, so that a start, or a start after a fault, is short.
+"""Processes that a fork server forks, which has imported everything: a start, or a start after a fault, is short.
 
-Python takes seconds to import what tracks, and each process of a rig would take them for itself. The one that they are
-forked from is the fork server of `multiprocessing`: it has no threads, and does nothing but import and fork.
+Python takes seconds to import what tracks, and each process of a rig would take them for itself. The fork server is
+that of `multiprocessing`: it has no threads, and does nothing but import and fork.
 """
 
 import atexit
@@ -19,16 +19,16 @@ from setproctitle import setproctitle
 
 from abs_service.supervision import parent_watchdog
 
-#: Makes processes that are forked from the fork server.
+#: Makes processes that the fork server forks.
 CONTEXT = multiprocessing.get_context("forkserver")
 
 _PR_SET_CHILD_SUBREAPER = 36
-#: Environment variable with the folder of its socket.
+#: Environment variable with the folder of the fork server's socket.
 _FOLDER = "ABS_SERVICE_FORK_FOLDER"
 
 
 def preload(module: str) -> None:
-    """Starts the process from which children are forked; it forks as soon as it has imported the module.
+    """Starts the fork server, which forks as soon as it has imported the module.
 
     Should it die, this process becomes the parent of its children: prctl(2), PR_SET_CHILD_SUBREAPER.
     """
@@ -39,16 +39,16 @@ def preload(module: str) -> None:
 
 
 def ensure_running() -> None:
-    """Starts that process anew if it has died, so that it is ready when it is needed; its children live on."""
+    """Starts the fork server anew if it has died, so that it is ready when it is needed; its children live on."""
     forkserver.ensure_running()
 
 
 def detach() -> None:
-    """In the process that others are forked from: leaves the terminal, or whoever reads our output, to `run`.
+    """In the fork server: leaves the terminal, or whoever reads our output, to `run`.
 
     It ends when `run` has ended, and removes what `run` cannot if it was killed.
     """
-    setproctitle("abs-service preloaded")
+    setproctitle("abs-service fork-server")
     atexit.register(shutil.rmtree, os.environ.pop(_FOLDER), ignore_errors=True)
     with open(os.devnull, "r+b", buffering=0) as null:
         for descriptor in (0, 1, 2):

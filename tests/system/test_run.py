@@ -34,14 +34,14 @@ FOXGLOVE = {
 def end(process, send):
     """Asks a rig to end; returns how long it took [s]. Nothing is left over, and nothing is complained about."""
     alive = dict(children(process.pid))
-    assert alive.keys() == {"preloaded", "capture", "track", "record"}
+    assert alive.keys() == {"fork-server", "capture", "track", "record"}
     begin_s = time.monotonic()
     send()
     assert process.wait(10) == 0
     took_s = time.monotonic() - begin_s
-    preloaded = alive.pop("preloaded")
+    fork_server = alive.pop("fork-server")
     assert not any(map(is_running, alive.values()))
-    wait_until(lambda: not is_running(preloaded), 1, "the end of what the others were forked from")
+    wait_until(lambda: not is_running(fork_server), 1, "the end of the fork server")
     complaints = process.stderr.read()
     assert "Traceback" not in complaints
     assert "FATAL" not in complaints

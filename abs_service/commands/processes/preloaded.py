@@ -1,4 +1,4 @@
-"""Imports what the processes of a rig have in common, in the process from which they are forked."""
+"""Imports what the processes of a rig have in common, in the fork server."""
 
 from contextlib import suppress
 from importlib import import_module

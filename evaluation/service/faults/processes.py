@@ -79,7 +79,7 @@ def hangs(component: str, rig: RunningRig) -> Made:
 _BACK = "restarted; the others go on"
 _HANGS = f"hangs (`run.stall_timeout_s = {STALL_S:g}`)"
 _CAPTURE, _TRACK, _RECORD = (frozenset({name}) for name in ("capture", "track", "record"))
-_ALL = frozenset({"run", "preloaded", *_CAPTURE, *_TRACK, *_RECORD})
+_ALL = frozenset({"run", "fork-server", *_CAPTURE, *_TRACK, *_RECORD})
 #: `run` itself is gone, which says so.
 _UNSAID = math.inf
 
@@ -93,11 +93,11 @@ FAULTS = (
     Fault("SIGTERM of `track`", _BACK, partial(asked, "track"), 3.0, restarted=_TRACK),
     Fault("SIGTERM of `record`", _BACK, partial(asked, "record"), 0.5, 1.5, restarted=_RECORD),
     Fault(
-        "kill -9 of the process that the others are forked from",
+        "kill -9 of the fork server",
         "nothing is lost; another one is ready",
-        partial(killed, "preloaded"),
+        partial(killed, "fork-server"),
         noticed_s=_UNSAID,
-        restarted=frozenset({"preloaded"}),
+        restarted=frozenset({"fork-server"}),
     ),
     Fault(
         "kill -9 of `run`, started again",

@@ -62,7 +62,7 @@ def machine() -> Machine:
 def children(pid: int) -> Mapping[str, int]:
     """Process numbers of the commands of `abs-service` that a process has started, by command: the oldest of each.
 
-    A younger one is another tracker. `preloaded` is the process that the others are forked from.
+    A younger one is another tracker. `fork-server` is what has forked the others.
     """
     found: dict[str, int] = {}
     for command, child in every_child(pid):

@@ -136,7 +136,7 @@ print(before.poll(), after.poll(), flush=True)
 """
 
 
-def test_children_outlive_the_process_that_they_were_forked_from():
+def test_children_outlive_the_fork_server():
     done = subprocess.run(
         [sys.executable, "-c", FORKED],
         capture_output=True,

@@ -179,7 +179,7 @@ def test_a_short_run_loses_nothing_unseen_and_says_what_each_process_used():
     assert set(unrecorded) == {"tof/depth/image", "tof/amplitude/image", "color/color/image"}
     assert set(unrecorded.values()) <= set(range(values["losses_from_start"].get("capture: device.sim.late", 0) + 1))
     processes = {row[0]: row[1:] for section in found.sections for row in rows(section, "Processes")}
-    share, held, *_ = processes.pop("preloaded")  # from which the others are forked
+    share, held, *_ = processes.pop("fork-server")
     assert share < 1
     assert 50 < held < 2000
     assert processes.keys() == {"run", "capture", "track", "record"}

@@ -143,7 +143,7 @@ def test_a_folder_that_cannot_be_written_ends_neither_tracking_nor_recording_for
 def test_nothing_survives_a_killed_run(run):
     process, _ = run
     alive = children(process.pid)
-    assert alive.keys() == {"preloaded", "capture", "track", "record"}
+    assert alive.keys() == {"fork-server", "capture", "track", "record"}
     begin_ns = kill(process.pid)
     wait_until(lambda: not any(map(is_running, alive.values())), 5, "the end of the children")
     print(f"the children ended {(time.monotonic_ns() - begin_ns) * 1e-9:.1f} s after kill -9 of run")
