@@ -27,7 +27,7 @@ class SdkMissingError(FinalError):
 
     def __init__(self, package: str, extra: str = "", *, command: str = "") -> None:
         self.reason = f"{package} is not installed"
-        self.remedy = command or f"pip install 'abs-service[{extra}]'"
+        self.remedy = command or f".venv/bin/pip install -e '.[{extra}]'"
         super().__init__(f"{self.reason}:  {self.remedy}")
 
 

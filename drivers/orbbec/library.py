@@ -13,7 +13,7 @@ from drivers.contract.discovery import UDEV_REMEDY
 from drivers.contract.errors import translated_sdk_errors
 
 #: The wheel's requirements are those of its examples: 2 GB, and an older NumPy than ours.
-_INSTALL = "pip install --no-deps pyorbbecsdk2"
+_INSTALL = ".venv/bin/pip install --no-deps pyorbbecsdk2"
 
 
 def load() -> Any:

@@ -10,7 +10,7 @@
 
 Recordings of other programs bring their own calibration: `azure` (Azure Kinect, MKV), `o3r` (ifm O3R, buffers of its
 process interface), `oak` (depthai, MCAP), `realsense` (librealsense, ROS 1 bag), `ros2` (ROS 2 bag of any camera) and
-`sens` (BundleFusion and ScanNet). See docs/how-to/devices.md.
+`sens` (BundleFusion and ScanNet). See docs/how-to/import.md.
 
 Folders hold images. Layout `pairs`: images of one exposure share the last number in their names. They carry no time, so
 the recording begins in 1970. Layout `tum`: the lists depth.txt and rgb.txt of the TUM RGB-D benchmark name the images

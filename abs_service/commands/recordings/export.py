@@ -70,7 +70,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise ExportError(f"--out {path}: its suffix must be one of .mcap, {', '.join([*_WRITERS, *_EXTRAS])}")
     package, extra = _EXTRAS.get(path.suffix, ("", ""))
     if package and find_spec(package) is None:
-        raise ExportError(f"--out {path} needs {package}: pip install 'abs-service[{extra}]'")
+        raise ExportError(f"--out {path} needs {package}: .venv/bin/pip install -e '.[{extra}]' in the clone")
     if not 0 <= arguments.view_hz <= 1000:
         raise ExportError(f"--view-hz {arguments.view_hz:g}: must be 0 to 1000")
     if path.exists():

@@ -47,7 +47,7 @@ def check() -> None:
         ViewError: it is not installed.
     """
     if find_spec("viser") is None:
-        raise ViewError("the page needs viser: pip install 'abs-service[view]'")
+        raise ViewError("the page needs viser: .venv/bin/pip install -e '.[view]' in the clone")
 
 
 def run(arguments: argparse.Namespace) -> int:

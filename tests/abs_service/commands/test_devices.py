@@ -27,7 +27,7 @@ NO_SDK = Found(
     DeviceInfo("realsense://", "RealSense", ""),
     Availability.SDK_MISSING,
     "pyrealsense2 is not installed",
-    "pip install 'abs-service[realsense]'",
+    ".venv/bin/pip install -e '.[realsense]'",
 )
 
 
@@ -51,7 +51,7 @@ def test_every_device_is_listed_with_what_to_do_about_it(listed):
     assert lines[2].rstrip().endswith("no permission")
     text = "\n".join(lines)
     assert "kinect1://A0036: you may not open it\n  abs-service devices --udev" in text
-    assert "realsense://  pyrealsense2 is not installed:  pip install 'abs-service[realsense]'" in text
+    assert "realsense://  pyrealsense2 is not installed:  .venv/bin/pip install -e '.[realsense]'" in text
 
 
 def test_an_empty_table_shows_what_works_without_a_camera(listed):

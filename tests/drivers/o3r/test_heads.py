@@ -60,7 +60,7 @@ def test_a_port_that_lacks_something_is_named() -> None:
 
 def test_without_the_library_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "ifm3dpy", None)
-    with pytest.raises(SdkMissingError, match=r"pip install 'abs-service\[ifm\]'"):
+    with pytest.raises(SdkMissingError, match=r"pip install -e '\.\[ifm\]'"):
         open_device("o3r://", lambda: 0)
     (found,) = discover(0.1)
-    assert (found.availability, found.remedy) == (Availability.SDK_MISSING, "pip install 'abs-service[ifm]'")
+    assert (found.availability, found.remedy) == (Availability.SDK_MISSING, ".venv/bin/pip install -e '.[ifm]'")

@@ -87,7 +87,9 @@ def _read(path: Path) -> _Content:
     try:
         trimesh = import_module("trimesh")
     except ImportError:
-        raise DetectionError("template type \"mesh\" needs a library: pip install 'abs-service[mesh]'") from None
+        raise DetectionError(
+            "template type \"mesh\" needs a library: .venv/bin/pip install -e '.[mesh]' in the clone"
+        ) from None
     try:
         found = trimesh.load_mesh(path, process=False)
     except Exception as error:  # each of its readers has errors of its own

@@ -182,5 +182,5 @@ def test_options_say_what_is_allowed(recording, capsys, arguments, complaint):
 def test_a_package_that_is_missing_is_named_with_its_extra(recording, tmp_path, capsys, monkeypatch, name, extra):
     monkeypatch.setattr(export, "find_spec", lambda name: None)
     assert cli.main(["export", str(recording), "--out", str(tmp_path / name)]) == Exit.USER
-    assert f"pip install 'abs-service[{extra}]'" in capsys.readouterr().err
+    assert f"pip install -e '.[{extra}]'" in capsys.readouterr().err
     assert not (tmp_path / name).exists()

@@ -47,4 +47,4 @@ def test_a_recording_that_cannot_be_shown_is_a_mistake_of_the_user(capsys, argum
 def test_without_viser_the_extra_is_named(monkeypatch, capsys, command):
     monkeypatch.setattr(view, "find_spec", lambda _: None)
     assert main([command, *(["--view"] if command == "run" else [])]) == 2
-    assert "pip install 'abs-service[view]'" in capsys.readouterr().err
+    assert ".venv/bin/pip install -e '.[view]'" in capsys.readouterr().err

@@ -174,5 +174,5 @@ def test_files_that_are_no_surface_are_refused_by_name(tmp_path):
 def test_the_extra_is_named_where_it_is_missing(tmp_path, monkeypatch):
     box().export(tmp_path / "box.obj")
     monkeypatch.setitem(sys.modules, "trimesh", None)
-    with pytest.raises(DetectionError, match=r"pip install 'abs-service\[mesh\]'"):
+    with pytest.raises(DetectionError, match=r"pip install -e '\.\[mesh\]'"):
         mesh.Settings(tmp_path / "box.obj").build(300)
