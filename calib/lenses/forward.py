@@ -64,7 +64,7 @@ def fisheye_coefficients(lens: NDArray[np.float32]) -> tuple[np.float32, ...]:
 def distort(
     x: np.float32, y: np.float32, lens: NDArray[np.float32] | tuple[np.float32, ...]
 ) -> tuple[np.float32, np.float32]:
-    """Brown–Conrady distortion of ideal normalised coordinates; brown_conrady_coefficients coefficients."""
+    """Brown–Conrady distortion of ideal normalised coordinates; eight coefficients."""
     one, two = np.float32(1), np.float32(2)
     k1, k2, p1, p2, k3, k4, k5, k6 = lens
     r2 = x * x + y * y
