@@ -6,8 +6,9 @@ for state in abs_client.subscribe("tcp/127.0.0.1:7447", rig="demo", tracker="she
 """
 
 from abs_client.camera import Camera
+from abs_client.errors import ClientError, MalformedError, UnknownNameError, UnreachableError
 from abs_client.images import Image, ImageError
-from abs_client.link import ClientError, Tls, UnknownNameError, UnreachableError
+from abs_client.link import Tls
 from abs_client.rig import RefusedError, Rig, subscribe
 from abs_client.simulated_rig import RigFailedError, RunningRig, SimulatedRig, run_rig
 from abs_client.state import State, Status
@@ -18,6 +19,7 @@ __all__ = [
     "ClientError",
     "Image",
     "ImageError",
+    "MalformedError",
     "NothingReceivedError",
     "RefusedError",
     "Rig",

@@ -1,5 +1,6 @@
 """Images of a rig as arrays, with what is needed to interpret them."""
 
+import math
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,7 +11,9 @@ from absmsg.v1.frame_info_pb2 import FrameInfo
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 from numpy.typing import NDArray
 
-from abs_client.link import ClientError, Link, Received
+from abs_client.errors import MalformedError
+from abs_client.link import Link
+from abs_client.received import Received, decoded, decoded_bytes
 from abs_client.stream import Stream
 from abs_client.wake import Wake
 
@@ -28,8 +31,8 @@ _PIXELS = {
 }
 
 
-class ImageError(ClientError, ValueError):
-    """An image that cannot be read."""
+class ImageError(MalformedError):
+    """An image whose pixels cannot be read."""
 
 
 @dataclass(frozen=True)
@@ -70,19 +73,21 @@ class _ImageSource:
     def __init__(self, wake: Wake) -> None:
         self._wake = wake
         self._lock = threading.Lock()
-        self._newest: Received | None = None
+        self._newest: Image | None = None
         self.skipped = 0
 
     def put(self, one: Received) -> None:
+        # Read here, where a malformed one is counted: in `take` it would end the reader's loop.
+        image = read(one)
         with self._lock:
             self.skipped += self._newest is not None
-            self._newest = one
+            self._newest = image
         self._wake.signal()
 
     def take(self) -> Image | None:
         with self._lock:
             newest, self._newest = self._newest, None
-        return None if newest is None else read(newest)
+            return newest
 
     def due_s(self) -> float:
         return LOOK_S
@@ -100,14 +105,14 @@ def read(one: Received) -> Image:
     """The image in a message.
 
     Raises:
+        MalformedError: there is no image in it, or no description of one.
         ImageError: its pixels are not as many as it says, or in an unknown encoding.
     """
-    image, info = RawImage.FromString(one.payload), FrameInfo.FromString(one.attachment)
+    image, info = decoded(RawImage, one), decoded_bytes(FrameInfo, one.attachment, one.key)
     if image.encoding not in _PIXELS:
         raise ImageError(f"{one.key}: encoding {image.encoding!r} is none of {', '.join(_PIXELS)}")
     dtype, channels = _PIXELS[image.encoding]
     shape = (image.height, image.width) if channels == 1 else (image.height, image.width, channels)
-    pixels = np.frombuffer(image.data, dtype)
-    if pixels.size != np.prod(shape):
-        raise ImageError(f"{one.key}: {pixels.size} values are no image of {shape} pixels")
-    return Image(pixels.reshape(shape), image.encoding, info)
+    if len(image.data) != math.prod(shape) * np.dtype(dtype).itemsize:
+        raise ImageError(f"{one.key}: {len(image.data)} bytes are no image {image.encoding} of {shape} pixels")
+    return Image(np.frombuffer(image.data, dtype).reshape(shape), image.encoding, info)

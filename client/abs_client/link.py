@@ -14,8 +14,9 @@ from types import TracebackType
 from typing import Any, Self
 
 import zenoh
-from google.protobuf.message import DecodeError
 
+from abs_client.errors import MalformedError, UnknownNameError, UnreachableError
+from abs_client.received import Received
 from abs_client.wake import Wake
 
 #: Where a rig listens unless its file says otherwise.
@@ -33,18 +34,6 @@ _ENDPOINT = re.compile(r"(tcp|tls|quic|udp|ws)/.+:\d{1,5}([?#]\S*)?")
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
 
 
-class ClientError(Exception):
-    """Anything that this package complains about."""
-
-
-class UnreachableError(ClientError, ConnectionError):
-    """Nothing answers at an endpoint, or it refuses this program."""
-
-
-class UnknownNameError(ClientError, ValueError):
-    """A name or an endpoint that cannot be one."""
-
-
 @dataclass(frozen=True)
 class Tls:
     """The files by which this program proves who it is, as `abs-service keys` makes them.
@@ -57,20 +46,6 @@ class Tls:
     authority: str | PathLike[str]
     certificate: str | PathLike[str]
     key: str | PathLike[str]
-
-
-@dataclass(frozen=True)
-class Received:
-    """A message as it arrived.
-
-    Attributes:
-        key: zenoh's key, `abs/<rig>/<topic>`.
-        payload, attachment: the bytes; b"" if there is no attachment.
-    """
-
-    key: str
-    payload: bytes
-    attachment: bytes = b""
 
 
 class Link:
@@ -232,7 +207,7 @@ def _receive_answers(ask: Callable[[], Any], on_message: Callable[[Received], No
 def _take(on_message: Callable[[Received], None], malformed: Counter[str], one: Received) -> None:
     try:
         on_message(one)
-    except DecodeError:
+    except MalformedError:
         malformed[one.key] += 1
 
 

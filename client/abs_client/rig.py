@@ -10,8 +10,10 @@ from absmsg.v1.sensor_model_pb2 import SensorModel
 
 from abs_client import images, states
 from abs_client.camera import Camera, camera
+from abs_client.errors import ClientError
 from abs_client.images import Image
-from abs_client.link import DEFAULT_ENDPOINT, ClientError, Link, Tls, checked
+from abs_client.link import DEFAULT_ENDPOINT, Link, Tls, checked
+from abs_client.received import decoded
 from abs_client.state import State
 from abs_client.stream import NothingReceivedError, Stream
 
@@ -87,9 +89,10 @@ class Rig:
 
         Raises:
             NothingReceivedError: nobody tells it.
+            MalformedError: the answer cannot be read.
         """
         for answer in self._link.query(f"{checked(sensor)}/model"):
-            return camera(SensorModel.FromString(answer.payload))
+            return camera(decoded(SensorModel, answer))
         raise NothingReceivedError(f"nobody tells the calibration of sensor {sensor!r}")
 
     def processes(self) -> tuple[str, ...]:
@@ -112,8 +115,9 @@ class Rig:
             The lines of the rig file that make a seed or a polygon last; "" without them.
 
         Raises:
-            RefusedError: the tracker refuses, or this program's certificate does not allow it.
-            NothingReceivedError: there is no answer.
+            RefusedError: the tracker refuses.
+            NothingReceivedError: there is no answer, as where this program's certificate does not allow the command.
+            MalformedError: the answer cannot be read; the tracker may have done it.
         """
         command = Reinitialize(header=self._header(), tracker=checked(tracker))
         if seed is not None:
@@ -144,7 +148,7 @@ class Rig:
 
     def _command(self, topic: str, command: Reinitialize | Record) -> CommandAnswer:
         for one in self._link.query(topic, command.SerializeToString(), command.DESCRIPTOR.full_name):
-            answer = CommandAnswer.FromString(one.payload)
+            answer = decoded(CommandAnswer, one)
             if not answer.accepted:
                 raise RefusedError(answer.reason)
             return answer

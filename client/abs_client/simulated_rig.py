@@ -15,7 +15,7 @@ from pathlib import Path
 from time import monotonic
 from urllib.parse import urlencode
 
-from abs_client.link import ClientError, UnreachableError
+from abs_client.errors import ClientError, UnreachableError
 from abs_client.rig import subscribe
 from abs_client.state import Status
 from abs_client.stream import Stream

@@ -10,7 +10,8 @@ from absmsg.v1.deformed_mesh_pb2 import DeformedMesh, MeshTopology
 
 from abs_client.ages import Ages
 from abs_client.assembly import Assembly
-from abs_client.link import Link, Received
+from abs_client.link import Link
+from abs_client.received import Received, decoded
 from abs_client.state import State, Status, received
 from abs_client.stream import Stream
 from abs_client.wake import Wake
@@ -110,16 +111,16 @@ class StateSource:
 
     def _ask_clock(self, host_clock: str) -> None:
         ages = self._ages
-        self._link.ask(f"clock/{host_clock}", lambda one: ages.add(Header.FromString(one.payload)))
+        self._link.ask(f"clock/{host_clock}", lambda one: ages.add(decoded(Header, one)))
 
 
 def _subscribe(link: Link, tracker: str, assembly: Assembly, wake: Wake) -> list[Callable[[], None]]:
     def on_state(one: Received) -> None:
-        assembly.add_state(DeformationState.FromString(one.payload))
+        assembly.add_state(decoded(DeformationState, one))
         wake.signal()
 
     def on_mesh(one: Received) -> None:
-        assembly.add_mesh(DeformedMesh.FromString(one.payload))
+        assembly.add_mesh(decoded(DeformedMesh, one))
         wake.signal()
 
     topics = {"topology": _topology_into(assembly, wake), "state": on_state, "mesh": on_mesh}
@@ -128,7 +129,7 @@ def _subscribe(link: Link, tracker: str, assembly: Assembly, wake: Wake) -> list
 
 def _topology_into(assembly: Assembly, wake: Wake) -> Callable[[Received], None]:
     def on_topology(one: Received) -> None:
-        assembly.add_topology(MeshTopology.FromString(one.payload))
+        assembly.add_topology(decoded(MeshTopology, one))
         wake.signal()
 
     return on_topology

@@ -7,7 +7,8 @@ from time import monotonic
 from types import TracebackType
 from typing import Generic, Protocol, Self, TypeVar
 
-from abs_client.link import ClientError, Link
+from abs_client.errors import ClientError
+from abs_client.link import Link
 from abs_client.wake import Wake
 
 T = TypeVar("T")

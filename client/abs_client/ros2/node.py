@@ -10,7 +10,8 @@ from typing import Any, Self
 import zenoh
 from zenoh import ext
 
-from abs_client.link import CONNECT_S, UnreachableError, client_settings
+from abs_client.errors import UnreachableError
+from abs_client.link import CONNECT_S, client_settings
 from abs_client.ros2 import cdr, layout
 from abs_client.ros2.layout import Qos
 

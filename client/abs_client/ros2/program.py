@@ -5,7 +5,7 @@ import os
 from collections.abc import Sequence
 
 from abs_client import programs
-from abs_client.link import ClientError
+from abs_client.errors import ClientError
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

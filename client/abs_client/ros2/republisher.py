@@ -16,7 +16,8 @@ from abs_client import images as received_images
 from abs_client import states
 from abs_client.camera import Camera, camera
 from abs_client.images import Image, ImageError
-from abs_client.link import Link, Received
+from abs_client.link import Link
+from abs_client.received import Received, decoded
 from abs_client.ros2 import cameras, cdr, diagnostics, estimates, images, rays
 from abs_client.ros2.layout import Qos, ros_name
 from abs_client.ros2.node import RosNode
@@ -92,7 +93,7 @@ class Republisher:
             publish(f"{topic}/theta", "std_msgs/msg/Float64MultiArray", lambda: estimates.theta(state))
 
     def _on_model(self, one: Received) -> None:
-        model = SensorModel.FromString(one.payload)
+        model = decoded(SensorModel, one)
         content = _content(model)
         if self._models.get(model.sensor) == content:
             return
@@ -130,12 +131,12 @@ class Republisher:
         return self._shares[known]
 
     def _on_points(self, one: Received) -> None:
-        cloud = PointCloud.FromString(one.payload)
+        cloud = decoded(PointCloud, one)
         frame = f"{self._link.rig}/{cloud.frame_id}"
         self._node.publish(self._topic(one), "sensor_msgs/msg/PointCloud2", lambda: images.points(cloud, frame))
 
     def _on_health(self, one: Received) -> None:
-        health = Health.FromString(one.payload)
+        health = decoded(Health, one)
         self._count(self._topic(one), health.header)
         array = partial(diagnostics.health, health, self._link.rig)
         self._node.publish("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", array)

@@ -5,7 +5,7 @@ import threading
 from collections.abc import Sequence
 
 from abs_client import programs
-from abs_client.link import ClientError
+from abs_client.errors import ClientError
 from abs_client.web.server import EstimateServer
 
 

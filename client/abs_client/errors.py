@@ -1,0 +1,17 @@
+"""What this package raises."""
+
+
+class ClientError(Exception):
+    """Base class of this package's errors."""
+
+
+class UnreachableError(ClientError, ConnectionError):
+    """Nothing answers at an endpoint, or it refuses this program."""
+
+
+class UnknownNameError(ClientError, ValueError):
+    """A name or an endpoint that cannot be one."""
+
+
+class MalformedError(ClientError, ValueError):
+    """A message that cannot be read."""
