@@ -5,8 +5,8 @@ import re
 import threading
 import weakref
 from collections import Counter
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from os import PathLike
@@ -70,13 +70,15 @@ class Link:
             raise UnknownNameError(f"{endpoint!r} is no endpoint: write PROTOCOL/HOST:PORT, such as {DEFAULT_ENDPOINT}")
         self.rig = checked(rig)
         self.malformed: Counter[str] = Counter()
+        # Reentrant: the collector may end the link in a thread that holds it, and so may a signal's handler.
+        self._lock = threading.RLock()
         self._threads: list[threading.Thread] = []
         self._waiting: weakref.WeakSet[Wake] = weakref.WeakSet()
         try:
             self._session = zenoh.open(zenoh.Config.from_json5(json.dumps(client_settings(endpoint, tls))))
         except zenoh.ZError as error:
             raise UnreachableError(f"nothing answers at {endpoint} within {CONNECT_S:g} s: is it running?") from error
-        self._end = weakref.finalize(self, _end, self._session, self._threads)
+        self._end = weakref.finalize(self, _end, self._session, self._lock, self._threads)
 
     @property
     def closed(self) -> bool:
@@ -85,7 +87,8 @@ class Link:
 
     def wake_at_end(self, wake: Wake) -> None:
         """Signals `wake` when the link is closed, so that nobody waits for it any more."""
-        self._waiting.add(wake)
+        with self._lock:
+            self._waiting.add(wake)
 
     def subscribe(self, topic: str, on_message: Callable[[Received], None]) -> Callable[[], None]:
         """Calls `on_message`, which must not hold this link, from a thread of its own for the messages of a topic.
@@ -93,9 +96,9 @@ class Link:
         Returns:
             What ends it; to be called once.
         """
-        self._check_open()
-        channel = zenoh.handlers.RingChannel(WAITING)
-        subscriber = self._session.declare_subscriber(self.key(topic), channel)
+        with self._opened():
+            channel = zenoh.handlers.RingChannel(WAITING)
+            subscriber = self._session.declare_subscriber(self.key(topic), channel)
         self._start(_receive, subscriber, on_message)
         return partial(_undeclare, subscriber)
 
@@ -111,16 +114,16 @@ class Link:
             topic: what is asked for.
             payload, message: of a command: the message and its full name.
         """
-        self._check_open()
         details: dict[str, Any] = {"payload": payload, "encoding": f"application/protobuf;{message}"} if message else {}
-        answers = self._session.get(self.key(topic), target=zenoh.QueryTarget.ALL, timeout=QUERY_S, **details)
-        return [_received(answer.ok) for answer in answers if answer.ok is not None]
+        with self._opened():
+            answers = self._session.get(self.key(topic), target=zenoh.QueryTarget.ALL, timeout=QUERY_S, **details)
+            return [_received(answer.ok) for answer in answers if answer.ok is not None]
 
     def tokens(self, topic: str) -> list[str]:
         """Keys of the liveliness tokens there are."""
-        self._check_open()
-        answers = self._session.liveliness().get(self.key(topic), timeout=QUERY_S)
-        return [str(answer.ok.key_expr) for answer in answers if answer.ok is not None]
+        with self._opened():
+            answers = self._session.liveliness().get(self.key(topic), timeout=QUERY_S)
+            return [str(answer.ok.key_expr) for answer in answers if answer.ok is not None]
 
     def trackers(self) -> set[str]:
         """Names of the trackers that live."""
@@ -134,7 +137,9 @@ class Link:
     def close(self) -> None:
         """Ends the session and all that receives on it; may be called again."""
         self._end()
-        for wake in list(self._waiting):
+        with self._lock:
+            waiting = list(self._waiting)
+        for wake in waiting:
             wake.signal()
 
     def __enter__(self) -> Self:
@@ -145,17 +150,27 @@ class Link:
     ) -> None:
         self.close()
 
-    def _check_open(self) -> None:
-        if self.closed:
-            raise UnreachableError("the connection to the rig was closed")
+    @contextmanager
+    def _opened(self) -> Iterator[None]:
+        # Looked at afterwards: a question that the end cuts off has no answers, as if nobody had any.
+        error = None
+        if not self.closed:
+            try:
+                yield
+            except zenoh.ZError as raised:
+                error = raised
+        if self.closed or error is not None:
+            raise UnreachableError("the connection to the rig was closed") from error
 
     def _start(self, receive: Callable[..., None], source: Any, on_message: Callable[[Received], None]) -> None:
         # A daemon, because the interpreter waits for all others before it calls what would end them.
-        take = partial(_take, on_message, self.malformed)
+        take = partial(_take, on_message, self.malformed, self._lock)
         thread = threading.Thread(target=receive, args=(source, take), name="abs_client", daemon=True)
-        self._threads[:] = [one for one in self._threads if one.is_alive()]
-        self._threads.append(thread)
-        thread.start()
+        with self._lock:
+            if self.closed:  # nobody would wait for its end
+                return
+            thread.start()
+            self._threads[:] = [*filter(threading.Thread.is_alive, self._threads), thread]
 
 
 def checked(name: str) -> str:
@@ -204,11 +219,14 @@ def _receive_answers(ask: Callable[[], Any], on_message: Callable[[Received], No
                 on_message(_received(answer.ok))
 
 
-def _take(on_message: Callable[[Received], None], malformed: Counter[str], one: Received) -> None:
+def _take(
+    on_message: Callable[[Received], None], malformed: Counter[str], lock: threading.RLock, one: Received
+) -> None:
     try:
         on_message(one)
     except MalformedError:
-        malformed[one.key] += 1
+        with lock:
+            malformed[one.key] += 1
 
 
 def _received(sample: zenoh.Sample) -> Received:
@@ -216,9 +234,11 @@ def _received(sample: zenoh.Sample) -> Received:
     return Received(str(sample.key_expr), sample.payload.to_bytes(), attachment.to_bytes() if attachment else b"")
 
 
-def _end(session: zenoh.Session, threads: list[threading.Thread]) -> None:
+def _end(session: zenoh.Session, lock: threading.RLock, threads: list[threading.Thread]) -> None:
     # Threads that return from zenoh into an interpreter that has ended would abort the process.
     session.close()
-    for thread in threads:
+    with lock:
+        running = list(threads)
+    for thread in running:
         if thread is not threading.current_thread():
             thread.join(END_S)
