@@ -14,7 +14,7 @@ from absmsg.v1.deformed_mesh_pb2 import DeformedMesh, MeshTopology
 KEPT = 16
 
 T = TypeVar("T")
-#: A tracker that is started again counts from one again, so every number is only known with its process.
+#: A tracker that is started again counts from 0 again, so every number is only known with its process.
 Numbered = tuple[str, int]
 
 

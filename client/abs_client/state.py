@@ -67,7 +67,7 @@ class State:
 
     @property
     def seq(self) -> int:
-        """Counts the tracker's estimates; gaps are those that were not given, or lost."""
+        """Counts the tracker's estimates from 0, anew when it is started again; gaps are those not given, or lost."""
         return self.message.header.seq
 
     @property

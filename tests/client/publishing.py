@@ -35,10 +35,10 @@ class Tracker:
         self._state.put(b"\xff\xff\xff")
 
     def estimate(self, age_s=0.0):
-        self.seq += 1
         stamps = {"t_host_ns": time.monotonic_ns() - round(age_s * 1e9), "host_clock": host_clock()}
         self._state.put(state(self.seq, self.version, self.boot, age_ms=age_s * 1e3, **stamps).SerializeToString())
         self._mesh.put(mesh(self.seq, self.version, self.boot, self.vertices).SerializeToString())
+        self.seq += 1
 
 
 def estimating(tracker, **settings):

@@ -55,8 +55,8 @@ def test_a_restarted_tracker_counts_anew_and_its_first_mesh_is_not_that_of_the_o
     assembly.add_state(state(900, boot="a"))
     assembly.add_mesh(mesh(900, boot="a"))
     assert assembly.take().state.header.seq == 900
-    assembly.add_state(state(1, boot="b"))
-    assembly.add_mesh(mesh(1, boot="b", vertices=FOUR))
+    assembly.add_state(state(0, boot="b"))
+    assembly.add_mesh(mesh(0, boot="b", vertices=FOUR))
     assert assembly.take() is None
     assembly.add_topology(topology(1, "b", FOUR))
     assert (whole := assembly.take()).topology.header.boot_id == "b"
