@@ -1,5 +1,6 @@
 """Iterators over what is newest: with `for`, with `async for`, or one at a time."""
 
+import asyncio
 import threading
 import weakref
 from collections.abc import AsyncIterator, Callable, Iterator
@@ -63,17 +64,19 @@ class Stream(Generic[T]):
         return self._source.skipped
 
     def next(self, timeout_s: float) -> T:
-        """The next item.
+        """The next item; with 0, the one that is there.
 
         Raises:
             NothingReceivedError: there was none within `timeout_s`, or the stream was closed.
         """
         end_s = monotonic() + timeout_s
-        while not self._ended and (left_s := end_s - monotonic()) > 0:
+        while not self._ended:
             if (item := self._source.take()) is not None:
                 return item
+            if (left_s := end_s - monotonic()) <= 0:
+                raise NothingReceivedError(f"nothing came within {timeout_s:g} s")
             self._wake.wait(min(left_s, self._source.due_s()))
-        raise NothingReceivedError(f"nothing came within {timeout_s:g} s")
+        raise NothingReceivedError("the stream, or its connection, was closed")
 
     @property
     def _ended(self) -> bool:
@@ -99,6 +102,8 @@ class Stream(Generic[T]):
         return self
 
     async def __anext__(self) -> T:
+        # Other tasks, and a cancellation of this one, have their turn even if there always is an item.
+        await asyncio.sleep(0)
         while not self._ended:
             if (item := self._source.take()) is not None:
                 return item

@@ -35,7 +35,9 @@ class Wake:
                 woken.set()
             self._task = asyncio.get_running_loop(), woken
         try:
-            await asyncio.wait_for(woken.wait(), timeout_s)
+            # `asyncio.wait_for` of Python 3.11 forgets a cancellation that comes together with the signal.
+            async with asyncio.timeout(timeout_s):
+                await woken.wait()
         except TimeoutError:
             pass
         finally:
