@@ -6,7 +6,7 @@ for state in abs_client.subscribe("tcp/127.0.0.1:7447", rig="demo", tracker="she
 """
 
 from abs_client.camera import Camera
-from abs_client.errors import ClientError, MalformedError, UnknownNameError, UnreachableError
+from abs_client.errors import ClientError, MalformedError, RangeError, UnknownNameError, UnreachableError
 from abs_client.images import Image, ImageError
 from abs_client.link import Tls
 from abs_client.rig import RefusedError, Rig, subscribe
@@ -21,6 +21,7 @@ __all__ = [
     "ImageError",
     "MalformedError",
     "NothingReceivedError",
+    "RangeError",
     "RefusedError",
     "Rig",
     "RigFailedError",

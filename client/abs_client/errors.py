@@ -13,5 +13,9 @@ class UnknownNameError(ClientError, ValueError):
     """A name or an endpoint that cannot be one."""
 
 
+class RangeError(ClientError, ValueError):
+    """A number outside its range."""
+
+
 class MalformedError(ClientError, ValueError):
     """A message that cannot be read."""

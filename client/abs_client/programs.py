@@ -6,6 +6,7 @@ import sys
 import threading
 from pathlib import Path
 
+from abs_client import states
 from abs_client.link import DEFAULT_ENDPOINT, Link, Tls
 from abs_client.rig import LARGEST_AGE_S
 
@@ -18,7 +19,7 @@ def add_rig(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--endpoint", default=DEFAULT_ENDPOINT, help="bus.endpoint of the rig [%(default)s]")
     parser.add_argument("--rig", default="demo", help="its name [%(default)s]")
     parser.add_argument(
-        "--largest-age", type=float, default=LARGEST_AGE_S, metavar="S", help="of estimates, in seconds [%(default)s]"
+        "--largest-age", type=_age, default=LARGEST_AGE_S, metavar="S", help="of estimates, in seconds [%(default)s]"
     )
     parser.add_argument(
         "--tls", type=Path, nargs=3, metavar=("AUTHORITY", "CERTIFICATE", "KEY"), help="for a rig with [bus.tls]"
@@ -42,3 +43,10 @@ def complain(reason: object) -> int:
     """Prints the reason of an error; returns its exit status."""
     print(reason, file=sys.stderr)
     return USER_ERROR
+
+
+def _age(text: str) -> float:
+    try:
+        return states.checked_age(float(text))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is no age: a number of seconds greater than 0") from None

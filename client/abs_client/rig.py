@@ -40,14 +40,16 @@ def subscribe(
     Args:
         endpoint: `bus.endpoint` of the rig.
         rig, tracker: their names.
-        largest_age_s: age beyond which an estimate is not given [s].
+        largest_age_s: age beyond which an estimate is not given [s]; infinite: all are given, silence is not told.
         tls: for a rig with `[bus.tls]`.
 
     Raises:
         UnknownNameError: `endpoint`, `rig` or `tracker` cannot be one.
+        RangeError: `largest_age_s` is not greater than 0.
         UnreachableError: nothing answers at `endpoint`.
     """
     checked(tracker)
+    states.checked_age(largest_age_s)
     link = Link(endpoint, rig, tls)
     return states.states(link, tracker, largest_age_s, link.close)
 

@@ -10,6 +10,7 @@ from absmsg.v1.deformed_mesh_pb2 import DeformedMesh, MeshTopology
 
 from abs_client.ages import Ages
 from abs_client.assembly import Assembly
+from abs_client.errors import RangeError
 from abs_client.link import Link
 from abs_client.received import Received, decoded
 from abs_client.state import State, Status, received
@@ -18,6 +19,8 @@ from abs_client.wake import Wake
 
 #: Pause between two questions for a topology [ns].
 PAUSE_NS = 200_000_000
+#: Time in place of an endless one, 30 years: what waits cannot wait for ever [s].
+FOREVER_S = 1e9
 
 _NOTHING = State(DeformationState(), DeformedMesh(), MeshTopology(), Status.STALE, (), float("nan"))
 
@@ -30,10 +33,24 @@ def states(link: Link, tracker: str, largest_age_s: float, close: Callable[[], N
         tracker: its name.
         largest_age_s: older estimates are left out; when there are no others for so long, a STALE one is given.
         close: what ends the link, if the stream is all that uses it.
+
+    Raises:
+        RangeError: `largest_age_s` is not greater than 0.
     """
     wake = Wake()
-    source = StateSource(link, tracker, largest_age_s, wake, monotonic_ns)
+    source = StateSource(link, tracker, checked_age(largest_age_s), wake, monotonic_ns)
     return Stream(source, wake, link, close or source.close)
+
+
+def checked_age(largest_age_s: float) -> float:
+    """Returns the largest age of estimates [s] if it can be one.
+
+    Raises:
+        RangeError: it cannot.
+    """
+    if not largest_age_s > 0.0:  # NaN is not
+        raise RangeError(f"largest_age_s is {largest_age_s:g}: it must be greater than 0")
+    return largest_age_s
 
 
 class StateSource:
@@ -54,7 +71,7 @@ class StateSource:
         self._assembly = Assembly(clock)
         self._ages = Ages(clock, self._ask_clock)
         self._last, self._arrived_ns = _NOTHING, 0
-        self._stale_ns = clock() + round(largest_age_s * 1e9)
+        self._stale_ns = self._silent_at_ns()
         self._skipped = 0
         # What receives holds neither the source nor the link, so that both end with their stream.
         self._subscriptions = _subscribe(link, tracker, self._assembly, wake)
@@ -75,12 +92,12 @@ class StateSource:
             self._count_between(self._last.message.header, newest.message.header)
             self._last = newest
             if age_s <= self._largest_age_s:
-                self._stale_ns = self._clock() + round(self._largest_age_s * 1e9)
+                self._stale_ns = self._silent_at_ns()
                 return self._last
             self._skipped += 1
         if self._clock() < self._stale_ns:
             return None
-        self._stale_ns = self._clock() + round(self._largest_age_s * 1e9)
+        self._stale_ns = self._silent_at_ns()
         return self._stale()
 
     def due_s(self) -> float:
@@ -91,6 +108,9 @@ class StateSource:
         """Receives nothing any more."""
         for end in self._subscriptions:
             end()
+
+    def _silent_at_ns(self) -> int:
+        return self._clock() + round(min(self._largest_age_s, FOREVER_S) * 1e9)
 
     def _count_between(self, before: Header, newest: Header) -> None:
         if before.boot_id == newest.boot_id:

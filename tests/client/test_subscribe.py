@@ -7,7 +7,7 @@ import threading
 import time
 
 import pytest
-from abs_client import NothingReceivedError, Status, UnknownNameError, UnreachableError, subscribe
+from abs_client import NothingReceivedError, RangeError, Status, UnknownNameError, UnreachableError, subscribe
 
 from tests.client.publishing import PERIOD_S, Tracker, estimating
 
@@ -149,3 +149,17 @@ def test_nobody_there_is_told(endpoint):
 def test_a_name_that_cannot_be_one_is_told(endpoint, wrong):
     with pytest.raises(UnknownNameError, match=r"no endpoint|no name"):
         subscribe(**{"endpoint": endpoint} | wrong)
+
+
+@pytest.mark.parametrize("largest_age_s", [0.0, -1.0, float("nan")])
+def test_an_age_that_no_estimate_has_is_told(endpoint, largest_age_s):
+    with pytest.raises(RangeError, match=f"largest_age_s is {largest_age_s:g}: it must be greater than 0"):
+        subscribe(endpoint, largest_age_s=largest_age_s)
+
+
+def test_without_a_largest_age_silence_is_not_told(endpoint, tracker):
+    with subscribe(endpoint, largest_age_s=float("inf")) as states:
+        with pytest.raises(NothingReceivedError, match=r"within 0\.2 s"):
+            states.next(0.2)
+        with estimating(tracker, age_s=3600.0):
+            assert states.next(LIMIT_S).age_s > 3599.0
