@@ -10,10 +10,14 @@ from absmsg.v1.deformation_state_pb2 import DeformationState
 #: Period in which the clock of the cameras' host is read [ns], and readings of which the best counts.
 PERIOD_NS = 5_000_000_000
 READINGS = 12
+#: Most that the clocks of two hosts drift apart, as the service assumes.
+DRIFT = 500e-6
 
 
 class Ages:
     """Reads the clock of the cameras' host over the bus; the error of a reading is at most half of its round trip.
+
+    The error grows with the reading's age, as the clocks drift: after a long pause, old readings no longer count.
 
     Args:
         clock: this host's monotonic clock [ns].
@@ -26,7 +30,7 @@ class Ages:
         self._lock = threading.Lock()
         self._host_clock = ""
         self._asked_ns = 0
-        self._readings: deque[tuple[int, int]] = deque(maxlen=READINGS)  # round trip, offset [ns]
+        self._readings: deque[tuple[int, int, int]] = deque(maxlen=READINGS)  # when asked, round trip, offset
 
     def age_s(self, state: DeformationState, arrived_ns: int) -> float:
         """Time since the exposure [s]; the least that it can be if the clock is not known yet.
@@ -37,10 +41,8 @@ class Ages:
         """
         now_ns = self._clock()
         self._ask_if_due(state.header.host_clock, now_ns)
-        with self._lock:
-            offsets = sorted(self._readings)
-        if offsets:
-            return max(now_ns - state.header.t_host_ns - offsets[0][1], 0) * 1e-9
+        if (offset_ns := self._offset_ns(now_ns)) is not None:
+            return max(now_ns - state.header.t_host_ns - offset_ns, 0) * 1e-9
         published_s = state.age_ms * 1e-3 if state.age_ms >= 0 else 0.0  # NaN is not
         return published_s + (now_ns - arrived_ns) * 1e-9
 
@@ -50,15 +52,23 @@ class Ages:
         with self._lock:
             if reading.host_clock == self._host_clock:
                 middle_ns = (self._asked_ns + now_ns) // 2
-                self._readings.append((now_ns - self._asked_ns, middle_ns - reading.t_host_ns))
+                self._readings.append((self._asked_ns, now_ns - self._asked_ns, middle_ns - reading.t_host_ns))
+
+    def _offset_ns(self, now_ns: int) -> int | None:
+        with self._lock:
+            errors = [
+                (round_trip_ns / 2 + DRIFT * (now_ns - asked_ns), offset_ns)
+                for asked_ns, round_trip_ns, offset_ns in self._readings
+            ]
+        return min(errors)[1] if errors else None
 
     def _ask_if_due(self, host_clock: str, now_ns: int) -> None:
         with self._lock:
             is_new = host_clock != self._host_clock
-            if not host_clock or not (is_new or now_ns - self._asked_ns > PERIOD_NS):
-                return
             if is_new:
                 self._host_clock = host_clock
                 self._readings.clear()
+            if not host_clock or not (is_new or now_ns - self._asked_ns > PERIOD_NS):
+                return
             self._asked_ns = now_ns
         self._ask(host_clock)
