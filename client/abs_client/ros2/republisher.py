@@ -114,6 +114,10 @@ class Republisher:
         if view not in self._cameras:
             self.left_out[f"{topic}: before the camera was known"] += 1
             return
+        if images.is_radial(image.info) and image.pixels.shape != self._size(view):
+            # Its calibration comes by another thread: for a moment, that of a new resolution is not there yet.
+            self.left_out[f"{topic}: of another size than its camera's"] += 1
+            return
         header = cdr.header(image.info.header, f"{self._link.rig}/{view}")
         self._node.publish(
             topic, "sensor_msgs/msg/Image", lambda: images.message(image, header, self._axial(view, image))
@@ -121,6 +125,9 @@ class Republisher:
         base, distorted = topic.rpartition("/")[0], not image.info.undistorted
         info = partial(cameras.info, self._cameras[view], header, distorted)
         self._node.publish(f"{base}/camera_info", "sensor_msgs/msg/CameraInfo", info)
+
+    def _size(self, view: str) -> tuple[int, int]:
+        return self._cameras[view].height, self._cameras[view].width
 
     def _axial(self, view: str, image: Image) -> NDArray[np.float32] | float:
         if not images.is_radial(image.info):
@@ -132,8 +139,11 @@ class Republisher:
 
     def _on_points(self, one: Received) -> None:
         cloud = decoded(PointCloud, one)
-        frame = f"{self._link.rig}/{cloud.frame_id}"
-        self._node.publish(self._topic(one), "sensor_msgs/msg/PointCloud2", lambda: images.points(cloud, frame))
+        topic, frame = self._topic(one), f"{self._link.rig}/{cloud.frame_id}"
+        if not cloud.point_stride or len(cloud.data) % cloud.point_stride:
+            self.left_out[f"{topic}: unreadable"] += 1
+            return
+        self._node.publish(topic, "sensor_msgs/msg/PointCloud2", lambda: images.points(cloud, frame))
 
     def _on_health(self, one: Received) -> None:
         health = decoded(Health, one)

@@ -5,6 +5,7 @@ import struct
 import threading
 import time
 from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from abs_client.ros2.republisher import Republisher
 from absmsg.v1.common_pb2 import Header
 from absmsg.v1.health_pb2 import Health
 from absmsg.v1.sensor_model_pb2 import SensorModel
+from foxglove_schemas_protobuf.PointCloud_pb2 import PointCloud
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 from rosbags.typesys import Stores, get_typestore
 from zenoh import ext
@@ -178,6 +180,29 @@ def test_health_and_what_was_not_published_arrive_as_diagnostics(bus, in_ros, ro
         assert eventually(lambda: in_ros.left_out["/demo/health/capture: lost on the way"] > 0)
     assert (found["demo/capture"].level, found["demo/capture"].message) == (2, "unplugged")
     assert in_ros.left_out["/demo/tof/depth/image: unreadable"] > 0
+
+
+def test_what_does_not_fit_its_camera_or_itself_is_left_out_and_the_rest_goes_on(bus, in_ros, ros_router):
+    """As for a moment when a camera has a new resolution: its images and its calibration come by different threads."""
+    _, session = ros_router
+    depth = Listener(session, "demo/tof/depth/image", "sensor_msgs/msg/Image")
+    cloud = Listener(session, "demo/tof/depth/points", "sensor_msgs/msg/PointCloud2")
+    images = bus.publisher(topics.image("tof", "depth"), codec.IMAGE_SCHEMA, IMAGES)
+    points = bus.publisher(topics.points(topics.image("tof", "depth")), PointCloud.DESCRIPTOR.full_name, IMAGES)
+    other = sample(replace(FRAME, data=FRAME.data[::2]))
+
+    def publish():
+        images.put(other.payload, other.attachment)
+        points.put(PointCloud(data=b"1234").SerializeToString())
+
+    with repeating(publish, 0.02):
+        assert eventually(lambda: in_ros.left_out["/demo/tof/depth/image: of another size than its camera's"])
+        assert eventually(lambda: in_ros.left_out["/demo/tof/depth/points: unreadable"])
+    whole = PointCloud(point_stride=4, data=b"1234").SerializeToString()
+    with repeating(lambda: points.put(whole), 0.02):
+        assert cloud.next()[0].width == 1
+    with imaging(bus):
+        assert depth.next()[0].height == HEIGHT
 
 
 def test_without_a_subscription_images_are_not_converted(bus, in_ros, ros_router):
