@@ -8,6 +8,7 @@ from absmsg.v1.common_pb2 import Header
 from absmsg.v1.deformation_state_pb2 import DeformationState
 from absmsg.v1.deformed_mesh_pb2 import DeformedMesh, MeshTopology
 
+from abs_client import reading
 from abs_client.ages import Ages
 from abs_client.assembly import Assembly
 from abs_client.errors import RangeError
@@ -136,11 +137,11 @@ class StateSource:
 
 def _subscribe(link: Link, tracker: str, assembly: Assembly, wake: Wake) -> list[Callable[[], None]]:
     def on_state(one: Received) -> None:
-        assembly.add_state(decoded(DeformationState, one))
+        assembly.add_state(reading.state(one))
         wake.signal()
 
     def on_mesh(one: Received) -> None:
-        assembly.add_mesh(decoded(DeformedMesh, one))
+        assembly.add_mesh(reading.mesh(one))
         wake.signal()
 
     topics = {"topology": _topology_into(assembly, wake), "state": on_state, "mesh": on_mesh}
@@ -149,7 +150,7 @@ def _subscribe(link: Link, tracker: str, assembly: Assembly, wake: Wake) -> list
 
 def _topology_into(assembly: Assembly, wake: Wake) -> Callable[[Received], None]:
     def on_topology(one: Received) -> None:
-        assembly.add_topology(decoded(MeshTopology, one))
+        assembly.add_topology(reading.topology(one))
         wake.signal()
 
     return on_topology
