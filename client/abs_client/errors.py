@@ -10,7 +10,7 @@ class UnreachableError(ClientError, ConnectionError):
 
 
 class UnknownNameError(ClientError, ValueError):
-    """A name or an endpoint that cannot be one."""
+    """A name, an endpoint or a file that cannot be one."""
 
 
 class RangeError(ClientError, ValueError):

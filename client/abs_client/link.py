@@ -7,9 +7,7 @@ import weakref
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from functools import partial
-from os import PathLike
 from types import TracebackType
 from typing import Any, Self
 
@@ -17,6 +15,7 @@ import zenoh
 
 from abs_client.errors import MalformedError, UnknownNameError, UnreachableError
 from abs_client.received import Received
+from abs_client.tls import Tls
 from abs_client.wake import Wake
 
 #: Where a rig listens unless its file says otherwise.
@@ -32,20 +31,6 @@ END_S = 2.0
 
 _ENDPOINT = re.compile(r"(tcp|tls|quic|udp|ws)/.+:\d{1,5}([?#]\S*)?")
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
-
-
-@dataclass(frozen=True)
-class Tls:
-    """The files by which this program proves who it is, as `abs-service keys` makes them.
-
-    Attributes:
-        authority: certificate of the lab's authority.
-        certificate, key: of this program, `viewer` or `operator`.
-    """
-
-    authority: str | PathLike[str]
-    certificate: str | PathLike[str]
-    key: str | PathLike[str]
 
 
 class Link:

@@ -7,8 +7,9 @@ import threading
 from pathlib import Path
 
 from abs_client import states
-from abs_client.link import DEFAULT_ENDPOINT, Link, Tls
+from abs_client.link import DEFAULT_ENDPOINT, Link
 from abs_client.rig import LARGEST_AGE_S
+from abs_client.tls import Tls
 
 #: Exit status for what the user can mend.
 USER_ERROR = 2

@@ -12,10 +12,11 @@ from abs_client import images, states
 from abs_client.camera import Camera, camera
 from abs_client.errors import ClientError
 from abs_client.images import Image
-from abs_client.link import DEFAULT_ENDPOINT, Link, Tls, checked
+from abs_client.link import DEFAULT_ENDPOINT, Link, checked
 from abs_client.received import decoded
 from abs_client.state import State
 from abs_client.stream import NothingReceivedError, Stream
+from abs_client.tls import Tls
 
 #: Estimates that are older are left out [s].
 LARGEST_AGE_S = 0.5

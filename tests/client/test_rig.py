@@ -4,7 +4,7 @@ import threading
 
 import numpy as np
 import pytest
-from abs_client import NothingReceivedError, RefusedError, Rig, Tls, UnreachableError
+from abs_client import NothingReceivedError, RefusedError, Rig, Tls, UnknownNameError, UnreachableError
 from abs_client.images import ImageError, read
 from abs_client.received import Received
 from absmsg.v1.common_pb2 import Header
@@ -146,3 +146,8 @@ def test_the_processes_that_live(bus, rig):
     bus.declare_liveliness("capture")
     bus.declare_liveliness("track/sheet")
     assert rig.processes() == ("capture", "track/sheet")
+
+
+def test_a_certificate_that_is_not_there_is_told_without_a_try_to_connect(endpoint, tmp_path):
+    with pytest.raises(UnknownNameError, match=r"viewer\.key is no file"):
+        Rig(encrypted(endpoint), tls=Tls(__file__, __file__, tmp_path / "viewer.key"))
