@@ -5,7 +5,7 @@ def test_x(abs_rig): ...
 """
 
 from collections.abc import Iterator
-from dataclasses import fields, replace
+from dataclasses import fields
 from typing import Any
 
 import pytest
@@ -43,10 +43,9 @@ def pytest_configure(config: pytest.Config) -> None:
 def abs_rig(request: pytest.FixtureRequest) -> Iterator[RunningRig]:
     """A simulated rig that tracks, with the settings of `pytestmark = pytest.mark.abs_rig(…)` and of --abs-rig."""
     options: list[str] = request.config.getoption("--abs-rig") or []
-    given = dict(map(_pair, options))
+    given = {"service": request.config.getoption("--abs-service"), **dict(map(_pair, options))}
     mark = request.node.get_closest_marker("abs_rig")
-    settings = settings_of(given | (dict(mark.kwargs) if mark else {}))
-    with run_rig(replace(settings, service=request.config.getoption("--abs-service"))) as rig:
+    with run_rig(settings_of(given | (dict(mark.kwargs) if mark else {}))) as rig:
         yield rig
 
 

@@ -17,7 +17,7 @@ from urllib.parse import urlencode
 
 from abs_client.errors import ClientError, UnreachableError
 from abs_client.rig import subscribe
-from abs_client.state import Status
+from abs_client.state import State, Status
 from abs_client.stream import Stream
 
 #: By when it must track: the first start on a machine compiles the numerical code [s].
@@ -116,7 +116,7 @@ class RunningRig:
     tracker: str
     process: subprocess.Popen
 
-    def states(self, largest_age_s: float = 0.5) -> Stream:
+    def states(self, largest_age_s: float = 0.5) -> Stream[State]:
         """The estimates of its tracker."""
         return subscribe(self.endpoint, self.name, self.tracker, largest_age_s)
 

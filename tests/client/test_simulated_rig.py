@@ -1,5 +1,8 @@
 """Simulated rigs for tests of other programs: their settings, and how a start that fails is told."""
 
+import subprocess
+import sys
+
 import pytest
 from abs_client import RigFailedError, SimulatedRig, run_rig, simulated_rig
 from abs_client.pytest_plugin import settings_of
@@ -32,3 +35,12 @@ def test_a_rig_that_never_tracks_is_ended(monkeypatch):
     idle = SimulatedRig(service="python -c 'import time; time.sleep(60)'")
     with pytest.raises(RigFailedError, match=r"did not track within 0\.5 s"), run_rig(idle):
         pass
+
+
+def test_a_mark_chooses_the_command_that_starts_the_service(tmp_path):
+    """It was replaced by the option's default."""
+    marked = 'import pytest\n\npytestmark = pytest.mark.abs_rig(service="false")\n\n\ndef test_x(abs_rig): ...\n'
+    (tmp_path / "test_marked.py").write_text(marked, "utf-8")
+    command = [sys.executable, "-m", "pytest", "-p", "abs_client.pytest_plugin", "-p", "no:cacheprovider"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False)
+    assert "RigFailedError: the simulated rig ended with exit code 1" in done.stdout
