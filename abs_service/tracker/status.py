@@ -31,8 +31,8 @@ class Settings:
             the image count against it.
         degraded_occluded: occluded share above which an estimate is DEGRADED, in the sensor that sees most.
         degraded_rim: share of the visible free edges that lie off the outline above which an estimate is DEGRADED.
-        degraded_rim_m: mean distance of the visible free edges from the outline above which an estimate is DEGRADED, if
-            it is above the standard deviation of a vertex as well [m].
+        degraded_rim_m: distance of the visible free edges from the outline, mean of all or of those across a slide,
+            above which an estimate is DEGRADED, if it is above the standard deviation of a vertex as well [m].
         degraded_unexplained: by how much the share of the measured surface beside the mesh may be larger than in the
             first image. Something that touches a square object along one whole side adds 0.2.
         degraded_innovation: distance of an estimate from where the object was expected, in standard deviations of the
@@ -116,8 +116,8 @@ def _placed(fits: Sequence[SensorFit], shape: ShapeQuality, innovation: float, l
     """Reasons by where the mesh lies."""
     if is_misplaced(fits, shape, limits):
         yield (
-            f"{rim_share(fits):.0%} of the free edges lie off the object's outline, all together "
-            f"{rim_distance(fits) * 1e3:.0f} mm on average: the mesh has slid or turned on it – "
+            f"{rim_share(fits):.0%} of the free edges lie off the object's outline, by "
+            f"{rim_distance(fits) * 1e3:.0f} mm together or across a slide: the mesh has slid or turned on it – "
             "it is made anew if that lasts; a print that a colour camera sees would hold it"
         )
     if (gained := unexplained_share(fits)) > limits.degraded_unexplained:
@@ -177,7 +177,7 @@ def rim_share(fits: Sequence[SensorFit]) -> float:
 
 
 def rim_distance(fits: Sequence[SensorFit]) -> float:
-    """Mean distance [m] of the visible free edges from the outline; the smallest of the sensors, 0 without."""
+    """Distance [m] of the visible free edges from the outline, see `RimFit.off_m`; the smallest of the sensors."""
     return min((rim.off_m for rim in _rims(fits)), default=0.0)
 
 

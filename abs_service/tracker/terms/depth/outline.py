@@ -17,7 +17,7 @@ from abs_service.tracker.synthesis.projection import Projection
 from abs_service.tracker.synthesis.window import WHOLE, Window, corner
 from abs_service.tracker.terms.base import RimFit
 from abs_service.tracker.terms.depth.outline_distance import inwards
-from abs_service.tracker.terms.depth.rim import Rim, chain, locate, read, shared_by_side
+from abs_service.tracker.terms.depth.rim import Rim, chain, displacement, locate, read, shared_by_side
 from abs_service.tracker.terms.depth.rim_classes import LARGEST_GAP_STEPS, RimClass, classify_rim
 from abs_service.tracker.terms.depth.rim_cost import FARTHEST, rim_cost
 from abs_service.tracker.terms.depth.visibility import Visibility
@@ -190,14 +190,16 @@ class RimOutline:
         known, off = ~np.isnan(away), np.abs(away) > far
         # Outside, distances are known up to `far`; how much farther, nothing tells.
         pixel_m = np.linalg.norm(points - self._camera.center, axis=1) / self._camera.fx
-        off_m = np.where(off, np.maximum(away, -far), 0.0)[known] * pixel_m[known]
+        off_m = np.where(off, np.maximum(away, -far), 0.0) * pixel_m
+        inner = surface.vertices[0].T[self._ends[1]].astype(np.float64)
+        directions = self._camera.project(points) - self._camera.project(inner)
         covered = np.flatnonzero(self.classes == RimClass.OCCLUDED)
         beyond = self._beyond_by(surface, covered, (LARGEST_GAP_STEPS,))
         return RimFit(
             visible=int(np.count_nonzero(known)),
             outside=int(np.count_nonzero(away < -far)),
             inside=int(np.count_nonzero(away > far)),
-            off_m=float(np.mean(np.abs(off_m))) if known.any() else 0.0,
+            off_m=displacement(off_m[known], directions[known]),
             occluded=self._hidden + int(np.count_nonzero(~known)),
             covered=len(covered),
             uncovered=int(np.count_nonzero(beyond > 0)),
