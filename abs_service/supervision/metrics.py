@@ -36,7 +36,9 @@ def served(port: int) -> Iterator[Callable[[RigView], None]]:
     try:
         from prometheus_client import CollectorRegistry, start_http_server  # noqa: PLC0415 - an extra
     except ImportError as error:
-        missing = f"run.metrics_port = {port}: needs prometheus-client; pip install 'abs-service[metrics]'"
+        missing = (
+            f"run.metrics_port = {port}: needs prometheus-client: .venv/bin/pip install -e '.[metrics]' in the clone"
+        )
         raise MetricsError(missing) from error
     snapshot, registry = _Snapshot(), CollectorRegistry()
     registry.register(snapshot)

@@ -14,7 +14,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         from abs_client.ros2 import layout, node, republisher  # noqa: PLC0415 an extra
     except ModuleNotFoundError as error:
-        return programs.complain(f"{error.name} is not installed: pip install 'abs-service-client[ros2]'")
+        return programs.complain(
+            f"{error.name} is not installed: pip install './client[ros2]' in a clone of abs-service"
+        )
     end = programs.told_to_end()
     name = given.node or f"abs_{layout.ros_name(given.rig)}"
     try:

@@ -114,7 +114,7 @@ def test_a_port_in_use_is_named(read, port):
 
 def test_the_missing_extra_is_named(monkeypatch, port):
     monkeypatch.setitem(sys.modules, "prometheus_client", None)
-    with pytest.raises(metrics.MetricsError, match=r"abs-service\[metrics\]"), metrics.served(port):
+    with pytest.raises(metrics.MetricsError, match=r"'\.\[metrics\]'"), metrics.served(port):
         pass
 
 

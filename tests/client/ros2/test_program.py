@@ -57,4 +57,4 @@ def test_a_missing_extra_is_named(monkeypatch, capsys):
     monkeypatch.delitem(sys.modules, "abs_client.ros2.layout", raising=False)
     monkeypatch.delattr("abs_client.ros2.layout", raising=False)
     assert program.main(["--router", "tcp/127.0.0.1:7447"]) == 2
-    assert "pip install 'abs-service-client[ros2]'" in capsys.readouterr().err
+    assert "pip install './client[ros2]'" in capsys.readouterr().err
