@@ -164,8 +164,9 @@ class DeviceSupervisor:
         return "stopped"
 
     def _measure(self, device: Device, stall_detector: StallDetector) -> None:
-        counters = Counter({**stall_detector.counters, **device.counters})
-        counters.update(self._previous)
+        counters = Counter(self._previous)
+        counters.update(stall_detector.counters)
+        counters.update(device.counters)
         self._health.count_up_to(counters, f"device.{self._name}.")
         for name, value in device.gauges.items():
             self._health.gauge(f"device.{self._name}.{name}", value)

@@ -64,7 +64,9 @@ class StallDetector:
         if sensor is None:
             self._counters["unwanted"] += 1
             return
-        if self._is_repeated(frame, self._is_empty(frame)):
+        empty = is_empty(frame)
+        self._note_content(frame, empty)
+        if self._is_repeated(frame, empty):
             self._counters["repeated"] += 1
             self._repeating.add(frame.key)
             return
@@ -118,18 +120,17 @@ class StallDetector:
                 verdict = DeviceState.STALLED, reason
         return verdict
 
-    def _is_empty(self, frame: Frame) -> bool:
-        """True if an image holds nothing; warns when it has been so for too long."""
+    def _note_content(self, frame: Frame, empty: bool) -> None:
+        """Counts images that hold nothing; warns when a stream has had no others for too long."""
         name = f"{frame.sensor}/{frame.stream}"
-        if not is_empty(frame):
+        if not empty:
             if self._empty_since_ns.pop(frame.key, None) is not None:
                 self.on_warning(f"{name} empty", "")
-            return False
+            return
         self._counters["empty"] += 1
         now_ns = self._clock()
         if now_ns - self._empty_since_ns.setdefault(frame.key, now_ns) > STALL_NS:
             self.on_warning(f"{name} empty", f"{name}: nothing in its images; is it covered, or its light off?")
-        return True
 
     def _is_repeated(self, frame: Frame, empty: bool) -> bool:
         stream = self._streams.get(frame.key)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.mesh import Mesh, area_vectors, edge_lengths
+from abs_service.tracker.mesh import Mesh, area_vectors, edge_lengths, sides_of
 from calib.jit import kernel
 
 #: Neighbouring faces are folded if their normals differ by more than 120°, and by less than 60° at rest.
@@ -123,7 +123,7 @@ def _normals(vertices: NDArray[np.floating], faces: NDArray[np.int32]) -> NDArra
 
 def _neighbors(faces: NDArray[np.int32]) -> NDArray[np.intp]:
     """Pairs of faces (p, 2) that share an edge."""
-    sides = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
+    sides = np.sort(sides_of(faces), axis=1)
     order = np.lexsort(sides.T)
     same = np.flatnonzero(np.all(sides[order[1:]] == sides[order[:-1]], axis=1))
     return np.stack([order[same], order[same + 1]], axis=1) % len(faces)

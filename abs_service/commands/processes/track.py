@@ -151,9 +151,8 @@ def await_cameras(bus: Bus, sensors: tuple[str, ...], health: Health, stop: thre
     while not stop.is_set():
         for sensor in set(sensors) - set(cameras):
             for sample in bus.query(keys.model(sensor), QUERY_S):
-                with suppress(
-                    CodecError
-                ):  # another answer may be right; until there is one, health says what is awaited
+                # Another answer may be right; until there is one, health says what is awaited.
+                with suppress(CodecError):
                     cameras[sensor] = decode_camera(SensorModel.FromString(sample.payload))
         missing = [sensor for sensor in sensors if sensor not in cameras]
         if not missing:

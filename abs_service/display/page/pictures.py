@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.mesh import Mesh
+from abs_service.tracker.mesh import Mesh, edges_of
 from calib.camera import Camera
 from calib.pose import transform
 from drivers.contract.frame import Frame, Geometry, Kind
@@ -142,8 +142,7 @@ def with_colors(
 
 def rim_edges(faces: NDArray[np.int32]) -> NDArray[np.int32]:
     """Vertex indices (k, 2) of the edges that belong to one face only."""
-    sides = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
-    edges, count = np.unique(sides, axis=0, return_counts=True)
+    edges, count = edges_of(faces)
     return edges[count == 1]
 
 

@@ -15,7 +15,7 @@ from abs_service.tracker.detection.shapes.paint import NO_PAINT, PointPaint
 from abs_service.tracker.detection.shapes.resampling import evenly_spread, triangulated
 from abs_service.tracker.detection.shapes.samples import Samples
 from abs_service.tracker.detection.templates.known_object import KnownObject
-from abs_service.tracker.mesh import Mesh, edge_lengths
+from abs_service.tracker.mesh import Mesh, edge_lengths, sides_of
 
 #: Formats that are read, by the ending of the name.
 FORMATS = (".obj", ".ply", ".stl")
@@ -120,8 +120,7 @@ def _divided(content: _Content, longest: float) -> _Content:
     subdivide = import_module("trimesh.remesh").subdivide
     vertices, faces = content.vertices, content.faces
     while len(vertices) < MAX_VERTICES:
-        sides = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-        if edge_lengths(vertices[:, :3], sides).max() <= longest:
+        if edge_lengths(vertices[:, :3], sides_of(faces)).max() <= longest:
             break
         vertices, faces = subdivide(vertices, faces)[:2]
     return replace(content, vertices=vertices, faces=faces)
@@ -155,8 +154,8 @@ def _checked(mesh: Mesh, path: Path) -> Mesh:
             f"path = {str(path)!r}: the object would measure {extents(mesh.vertices)}, {SMALLEST_M:g} m to "
             f'{LARGEST_M:g} m allowed; unit = "m", "cm" or "mm" says what its coordinates are'
         )
-    directed = np.concatenate([mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]])
-    if len(np.unique(directed, axis=0)) < len(directed):
+    directed = sides_of(mesh.faces).astype(np.int64) @ [len(mesh.vertices), 1]
+    if len(np.unique(directed)) < len(directed):
         raise DetectionError(
             f"path = {str(path)!r}: neighbouring faces are oriented against each other, or more than two share an "
             "edge; all must be counter-clockwise seen from outside"

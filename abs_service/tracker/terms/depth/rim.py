@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.mesh import Mesh
+from abs_service.tracker.mesh import Mesh, edges_of
 from abs_service.tracker.synthesis.projection import project
 from calib.jit import kernel
 
@@ -30,8 +30,7 @@ class Rim:
     @classmethod
     def of(cls, mesh: Mesh) -> "Rim":
         """The rim of a mesh: vertices on an edge of one face only."""
-        sides = np.sort(np.concatenate([mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]]), axis=1)
-        edges, count = np.unique(sides, axis=0, return_counts=True)
+        edges, count = edges_of(mesh.faces)
         outside = np.zeros(len(mesh.vertices), np.bool_)
         outside[edges[count == 1]] = True
         across = np.concatenate([edges, edges[:, ::-1]])
