@@ -25,7 +25,7 @@ STRAY_SHARE = 0.01
 #: A margin ends at this share of the returns that rows or columns behind it have; margins may be slightly curved.
 END_SHARE = 0.5
 #: These returns are at least this share of their pixels: less may be an object before a background without return.
-LEAST_FILLED = 0.25
+LEAST_FILLED = 0.5
 
 
 @dataclass(frozen=True)

@@ -37,9 +37,9 @@ def test_more_than_a_margin_is_a_background():
     assert filled(returns(right=20)) is None
 
 
-def test_a_small_object_before_nothing_has_no_margin_beside_it():
+def test_an_object_of_less_than_half_the_height_before_nothing_has_no_margin_beside_it():
     image = np.zeros((HEIGHT, WIDTH), np.bool_)
-    image[50:70, 5:60] = True
+    image[40:95, 5:100] = True
     assert filled(image) is None
 
 
