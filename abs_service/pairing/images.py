@@ -58,7 +58,7 @@ class DepthImage:
         shape = bottom - top, right - left
 
         def convert(part: Window) -> Parts:
-            first, last, begin, end = _limits(part, shape)
+            first, last, begin, end = limits(part, shape)
             return self.within((slice(top + first, top + last), slice(left + begin, left + end)))
 
         return DepthImage.deferred(shape, convert)
@@ -75,7 +75,7 @@ class DepthImage:
 
     def within(self, window: Window) -> Parts:
         """Distances and amplitudes (rows, columns) in a window; parts of the last one are converted only once."""
-        top, bottom, left, right = _limits(window, self.shape)
+        top, bottom, left, right = limits(window, self.shape)
         (first, last, begin, end), parts = self._last
         if not (first <= top and bottom <= last and begin <= left and right <= end):
             first, begin, parts = top, left, self._convert(window)
@@ -84,7 +84,8 @@ class DepthImage:
         return parts[0][inside], parts[1][inside]
 
 
-def _limits(window: Window, shape: tuple[int, ...]) -> Limits:
+def limits(window: Window, shape: tuple[int, ...]) -> Limits:
+    """Limits of a window in an image of a shape."""
     (top, bottom, _), (left, right, _) = (axis.indices(size) for axis, size in zip(window, shape))
     return top, bottom, left, right
 

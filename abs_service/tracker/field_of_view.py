@@ -11,9 +11,9 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.pairing.images import DepthImage, Image
+from abs_service.pairing.images import DepthImage, Image, Window
 from abs_service.pairing.observation import Observation
-from abs_service.tracker.synthesis.window import Window, corner
+from abs_service.tracker.synthesis.window import corner
 from calib.noise.base import DepthNoise, Mapped
 from calib.noise.part_of_image import PartOfImage
 from calib.rig import Rig, Sensor

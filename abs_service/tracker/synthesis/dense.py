@@ -7,6 +7,7 @@ import numpy as np
 from annotated_types import Interval
 from numpy.typing import NDArray
 
+from abs_service.pairing.images import Window
 from abs_service.pairing.observation import Observation
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import SparseJacobian, Surface
@@ -15,7 +16,7 @@ from abs_service.tracker.synthesis.projection import Projection, in_sight
 from abs_service.tracker.synthesis.rasterization.raster import Raster
 from abs_service.tracker.synthesis.rasterization.texturing import lattice, paint
 from abs_service.tracker.synthesis.rasterization.zbuffer import Samples, interpolate, render
-from abs_service.tracker.synthesis.window import Window, around
+from abs_service.tracker.synthesis.window import around
 from calib.camera import Camera
 from calib.rig import Rig
 

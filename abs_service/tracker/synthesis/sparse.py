@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from abs_service.pairing.images import Window
 from abs_service.pairing.observation import Observation
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import SparseJacobian, Surface
@@ -18,7 +19,7 @@ from abs_service.tracker.synthesis.attribute_gradients import (
 from abs_service.tracker.synthesis.base import Synthesis, View
 from abs_service.tracker.synthesis.projection import Projection, optics
 from abs_service.tracker.synthesis.rasterization.raster import Raster
-from abs_service.tracker.synthesis.window import Window, around
+from abs_service.tracker.synthesis.window import around
 from calib.camera import Camera
 from calib.rig import Rig
 

@@ -5,12 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from abs_service.pairing.images import Window
 from abs_service.pairing.observation import Observation
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.synthesis.base import View
 from abs_service.tracker.synthesis.sparse import SparseView
-from abs_service.tracker.synthesis.window import WHOLE, Window
+from abs_service.tracker.synthesis.window import WHOLE
 from calib.camera import Camera
 from calib.rig import Rig
 from calib.warp.pinhole import pinhole_of, resampling

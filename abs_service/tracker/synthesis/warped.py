@@ -5,13 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.pairing.images import DepthImage
+from abs_service.pairing.images import DepthImage, Window
 from abs_service.pairing.observation import Observation
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import ModelError, SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import Synthesis, View
 from abs_service.tracker.synthesis.sparse import SparseView
-from abs_service.tracker.synthesis.window import WHOLE, Window
+from abs_service.tracker.synthesis.window import WHOLE
 from calib.camera import Camera
 from calib.noise.base import DepthNoise, subtract_mean_offset
 from calib.rig import Rig

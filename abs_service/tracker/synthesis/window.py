@@ -5,6 +5,7 @@ from typing import Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from abs_service.pairing.images import Limits, Window, limits
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.synthesis.projection import Projection
 from abs_service.tracker.synthesis.rasterization.zbuffer import extent
@@ -12,12 +13,6 @@ from calib.camera import Camera
 from calib.jit import kernel
 
 Number = TypeVar("Number", bound=np.generic)
-
-#: Rows and columns of an image.
-Window = tuple[slice, slice]
-
-#: First row, end row (exclusive), first column and end column.
-Limits = tuple[int, int, int, int]
 
 WHOLE: Window = (slice(None), slice(None))
 
@@ -52,12 +47,6 @@ def around(camera: Camera, projection: Projection, predicted: Surface, reach_m: 
 def corner(window: Window) -> tuple[int, int]:
     """Row and column of a window's first pixel."""
     return window[0].start or 0, window[1].start or 0
-
-
-def limits(window: Window, shape: tuple[int, ...]) -> Limits:
-    """Limits of a window in an image of a shape."""
-    (top, bottom, _), (left, right, _) = (axis.indices(size) for axis, size in zip(window, shape))
-    return top, bottom, left, right
 
 
 def within(image: NDArray[Number], window: Window) -> NDArray[Number]:

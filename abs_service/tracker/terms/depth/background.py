@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.synthesis.window import Window
+from abs_service.pairing.images import Window
 from calib.jit import kernel
 
 #: A connected area of missing returns is background if it shares so many pixels with that of the first image.

@@ -7,10 +7,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from abs_service.pairing.images import Window, limits
 from abs_service.tracker.mesh import Mesh, edge_lengths
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.synthesis.rasterization.raster import Raster
-from abs_service.tracker.synthesis.window import WHOLE, Window, limits
+from abs_service.tracker.synthesis.window import WHOLE
 from abs_service.tracker.terms.base import Remainder
 from calib.camera import Camera
 

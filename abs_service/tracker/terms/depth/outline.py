@@ -11,10 +11,11 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from abs_service.pairing.images import Window
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.perspective import project_with_jacobian
 from abs_service.tracker.synthesis.projection import Projection
-from abs_service.tracker.synthesis.window import WHOLE, Window, corner
+from abs_service.tracker.synthesis.window import WHOLE, corner
 from abs_service.tracker.terms.base import RimFit
 from abs_service.tracker.terms.depth.outline_distance import inwards
 from abs_service.tracker.terms.depth.rim import Rim, chain, displacement, locate, read, shared_by_side
@@ -191,19 +192,25 @@ class RimOutline:
         # Outside, distances are known up to `far`; how much farther, nothing tells.
         pixel_m = np.linalg.norm(points - self._camera.center, axis=1) / self._camera.fx
         off_m = np.where(off, np.maximum(away, -far), 0.0) * pixel_m
-        inner = surface.vertices[0].T[self._ends[1]].astype(np.float64)
-        directions = self._camera.project(points) - self._camera.project(inner)
         covered = np.flatnonzero(self.classes == RimClass.OCCLUDED)
         beyond = self._beyond_by(surface, covered, (LARGEST_GAP_STEPS,))
         return RimFit(
             visible=int(np.count_nonzero(known)),
             outside=int(np.count_nonzero(away < -far)),
             inside=int(np.count_nonzero(away > far)),
-            off_m=displacement(off_m[known], directions[known]),
+            off_m=self._displacement(surface, points, off_m, known) if off[known].any() else 0.0,
             occluded=self._hidden + int(np.count_nonzero(~known)),
             covered=len(covered),
             uncovered=int(np.count_nonzero(beyond > 0)),
         )
+
+    def _displacement(
+        self, surface: Surface, points: NDArray[np.float64], off_m: NDArray[np.float64], known: NDArray[np.bool_]
+    ) -> float:
+        """See `rim.displacement`, of those of the free edges (k, 3) whose distances (k,) are known [m]."""
+        inner = surface.vertices[0].T[self._ends[1]].astype(np.float64)
+        directions = self._camera.project(points) - self._camera.project(inner)
+        return displacement(off_m[known], directions[known])
 
     def _beyond_by(self, surface: Surface, which: NDArray[np.intp], steps: Sequence[float]) -> NDArray[np.float64]:
         """Distances inside the outline (steps, m) some steps beyond outer vertices (m,), see `_inside_at`."""

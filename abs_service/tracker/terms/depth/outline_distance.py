@@ -4,7 +4,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.synthesis.window import WHOLE, Window
+from abs_service.pairing.images import Window
+from abs_service.tracker.synthesis.window import WHOLE
 from abs_service.tracker.terms.depth.visibility import Visibility
 from calib.jit import kernel
 

@@ -9,9 +9,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.pairing.images import DepthImage
+from abs_service.pairing.images import DepthImage, Window
 from abs_service.tracker.synthesis.base import Synthesizer
-from abs_service.tracker.synthesis.window import Bordered, Window, corner, within
+from abs_service.tracker.synthesis.window import Bordered, corner, within
 from abs_service.tracker.terms.base import Bounds
 from abs_service.tracker.terms.depth.depth_cost import distances, median_inlier_cost, settle, write_constants
 from calib.jit import kernel

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.pairing.images import ChannelImage, Image
+from abs_service.pairing.images import ChannelImage, Image, limits
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import Synthesis, Synthesizer
-from abs_service.tracker.synthesis.window import NOTHING_HAS, Bordered, corner, limits
+from abs_service.tracker.synthesis.window import NOTHING_HAS, Bordered, corner
 from abs_service.tracker.terms.base import Bounds, SensorFit, facing, summarize
 from abs_service.tracker.terms.gradients import channel_gradients
 from abs_service.tracker.terms.linearization import PointLinearization

@@ -3,10 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.pairing.images import ColorImage, Image
+from abs_service.pairing.images import ColorImage, Image, Window
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import Synthesis, Synthesizer
-from abs_service.tracker.synthesis.window import NOTHING_HAS, Bordered, Window
+from abs_service.tracker.synthesis.window import NOTHING_HAS, Bordered
 from abs_service.tracker.terms.base import Bounds, SensorFit, facing, summarize
 from abs_service.tracker.terms.gradients import color_rows
 from abs_service.tracker.terms.linearization import PointLinearization

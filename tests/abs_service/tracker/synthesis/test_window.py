@@ -7,14 +7,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from abs_service.pairing.images import BAYER_ORDERS, ChannelImage, ColorImage
+from abs_service.pairing.images import BAYER_ORDERS, ChannelImage, ColorImage, Window
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.posterior.priors.change_metric import ChangeMetric
 from abs_service.tracker.posterior.priors.motion_prior import MotionPrior
 from abs_service.tracker.posterior.priors.settings import Settings
 from abs_service.tracker.synthesis.projection import Projection
 from abs_service.tracker.synthesis.rasterization.raster import Raster
-from abs_service.tracker.synthesis.window import WHOLE, Bordered, Placed, Window, around
+from abs_service.tracker.synthesis.window import WHOLE, Bordered, Placed, around
 from abs_service.tracker.terms.base import Bounds
 from abs_service.tracker.terms.depth.depth import DepthTerm
 from abs_service.tracker.terms.depth.outline import RimOutline
