@@ -76,7 +76,11 @@ class RigListener:
 
     def health(self, component: str) -> list[Health]:
         """All health messages of a component."""
-        return [Health.FromString(one.sample.payload) for one in self._of(f"health/{component}")]
+        return [health for _, health in self.timed_health(component)]
+
+    def timed_health(self, component: str) -> list[tuple[int, Health]]:
+        """All health messages of a component and when each arrived [ns]."""
+        return [(one.t_ns, Health.FromString(one.sample.payload)) for one in self._of(f"health/{component}")]
 
     def tracks_since(self, t_ns: int, count: int = 3) -> Callable[[], bool]:
         """A condition: so many estimates whose exposure was after `t_ns` say TRACKING."""
