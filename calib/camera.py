@@ -2,7 +2,7 @@
 
 import functools
 import hashlib
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from numbers import Integral, Real
 
 import numpy as np
@@ -75,11 +75,6 @@ class Camera:
         inverse = pose.inverse(self.T_rs)
         inverse.setflags(write=False)
         return inverse
-
-    def cropped(self, rows: slice, columns: slice) -> "Camera":
-        """The camera of a part of the image, given by rows and columns with a beginning and an end."""
-        size = {"width": columns.stop - columns.start, "height": rows.stop - rows.start}
-        return replace(self, **size, cx=self.cx - columns.start, cy=self.cy - rows.start)
 
     @property
     def calib_id(self) -> str:

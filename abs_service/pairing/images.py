@@ -52,17 +52,6 @@ class DepthImage:
         image.shape, image._convert, image._last = shape, convert, ((0, 0, 0, 0), (empty, empty))
         return image
 
-    def cropped(self, window: Window) -> "DepthImage":
-        """The part of the image in rows and columns that have a beginning and an end."""
-        (top, bottom), (left, right) = ((axis.start, axis.stop) for axis in window)
-        shape = bottom - top, right - left
-
-        def convert(part: Window) -> Parts:
-            first, last, begin, end = limits(part, shape)
-            return self.within((slice(top + first, top + last), slice(left + begin, left + end)))
-
-        return DepthImage.deferred(shape, convert)
-
     @property
     def distance(self) -> NDArray[np.float32]:
         """See above."""

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from abs_service.pairing.observation import Observation
 from abs_service.tracker import status
 from abs_service.tracker.estimate import Estimate, Status
-from abs_service.tracker.field_of_view import EVERYTHING, FieldOfView
 from abs_service.tracker.optimizers.base import Budget, Optimizer, Outcome, Search
 from abs_service.tracker.posterior.covariance.observability import single_frame_deviation
 from abs_service.tracker.posterior.covariance.theta_covariance import ThetaCovariance
@@ -37,7 +36,6 @@ class Tracker:
         limits: thresholds of the status.
         registration_m: standard deviation of the pose of a template's mesh; 0 if the first frame defines it [m].
         centers: centres of the imaging sensors, each (3,) [m].
-        field_of_view: parts of the depth images for which the posterior is.
 
     Attributes:
         model: the deformation model.
@@ -51,14 +49,12 @@ class Tracker:
         limits: status.Settings,
         registration_m: float = 0.0,
         centers: Sequence[NDArray[np.float64]] = (),
-        field_of_view: FieldOfView = EVERYTHING,
     ):
         self.model = model = posterior.model
         self._posterior = posterior
         self._optimizer = optimizer
         self._evaluations = evaluations
         self._limits = limits
-        self._field_of_view = field_of_view
         self._theta_covariance = ThetaCovariance(model, registration_m)
         self._vertex_covariance = VertexCovariance(model, registration_m, centers)
         self._shape = ShapeComparison(model.mesh)
@@ -72,7 +68,6 @@ class Tracker:
             observation: the images of all sensors at one moment.
             in_time: False when the time is up; the first frame is searched to the end.
         """
-        observation = self._field_of_view.of_observation(observation)
         frame = self._posterior.observe(observation)  # predicts Θ; renders the noise models per pixel
         budget = Budget(self._evaluations, in_time if self._is_warm else _without_end)
         start = self._optimizer.follow if self._is_warm else self._optimizer.explore  # warm or cold start

@@ -14,7 +14,6 @@ from abs_service.tracker.detection.plausibility import ExtentError, warnings
 from abs_service.tracker.detection.regions.base import Region
 from abs_service.tracker.detection.templates import first_image
 from abs_service.tracker.detection.templates.base import ALL_SEEN, Sight, Template
-from abs_service.tracker.field_of_view import FieldOfView
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import DeformationModel, HasDerived, ModelError
 from abs_service.tracker.objectives.base import Objective
@@ -168,9 +167,7 @@ def make_tracker(
         if doubts := warnings(detection):
             raise ExtentError(f"{', '.join(doubts)} The model cannot be made of it") from error
         raise
-    field = FieldOfView.of(observation.images)
-    rig = field.of_rig(rig)
-    posterior, mesh = make_posterior(plan, rig, model, field.of_observation(observation), sight)
+    posterior, mesh = make_posterior(plan, rig, model, observation, sight)
     optimizer = plan.optimizer.build(posterior.dimension, np.random.default_rng(plan.seed))
     centers = [sensor.camera.center for sensor in rig.sensors.values() if isinstance(sensor.noise, ImageNoise)]
-    return Tracker(posterior, optimizer, plan.evaluations, plan.status, sight.registration_m, centers, field), mesh
+    return Tracker(posterior, optimizer, plan.evaluations, plan.status, sight.registration_m, centers), mesh

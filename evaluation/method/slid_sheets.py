@@ -17,9 +17,15 @@ TABLE, CREEP_M = Wall(1.002), 2e-3
 #: Share of the returns that single pixels lose, and how far a sheet slides meanwhile [m].
 DROPOUTS, DROPOUT_SLIDE_M = 0.3, 0.04
 
-#: Last columns in which the sensor never measures (8 of 640 in a Kinect v1), where a sheet is that they cut, and
-#: how far it is drawn in a frame [m].
-BLIND_COLUMNS, CUT_X_M, CUT_STEP_M = 3, 0.4, 5e-3
+#: Last columns in which the sensor never measures (8 of 640 in a Kinect v1), and where a sheet is that they cut [m].
+BLIND_COLUMNS, CUT_AT_M = 3, (0.4, 0.0)
+
+#: Widths and heights of the corners in which an Azure Kinect's narrow mode never measures, at the top and at the
+#: bottom, as shares of the image's, and where a sheet is that one of them cuts [m].
+BLIND_CORNERS, CORNER_AT_M = ((0.24, 0.48), (0.23, 0.43)), (0.36, -0.2)
+
+#: How far a sheet that is cut is drawn in a frame [m].
+CUT_STEP_M = 5e-3
 
 #: Distances beyond are no returns in the scene without a background [m].
 FARTHEST_M = 1.3
@@ -55,13 +61,20 @@ def _drawn(state: SheetState, by_m: float) -> SheetState:
 
 @dataclass(frozen=True)
 class Cut:
-    """A flat sheet beside the middle that is drawn along its long axis by some metres a frame."""
+    """A flat sheet beside the middle that is drawn along its long axis.
 
+    Attributes:
+        at_m: right and down from the middle at the beginning [m].
+        step_m: how far it is drawn in a frame [m].
+    """
+
+    at_m: tuple[float, float]
     step_m: float
 
     def __call__(self, t: float) -> SheetState:
         """The sheet at a time [s]."""
-        return SheetState(0.0, (0.0, 0.0, 0.0), (CUT_X_M + self.step_m * t / INTERVAL_S, 0.0, 1.0))
+        right, down = self.at_m
+        return SheetState(0.0, (0.0, 0.0, 0.0), (right + self.step_m * t / INTERVAL_S, down, 1.0))
 
 
 def sequences(slides_m: Sequence[float]) -> Iterator[SlidSheet]:
@@ -74,8 +87,13 @@ def sequences(slides_m: Sequence[float]) -> Iterator[SlidSheet]:
         name = f"slides by {DROPOUT_SLIDE_M * 1e3:.0f} mm, {DROPOUTS:.0%} dropouts, {behind} behind"
         yield name, SheetScene(name, Slide(DROPOUT_SLIDE_M), dropouts=DROPOUTS), measured
     yield "creeps on a table", SheetScene("table", creep, wall=TABLE), _as_it_is
-    for name, step_m in (("is drawn out of the view", CUT_STEP_M), ("is drawn into the view", -CUT_STEP_M)):
-        yield name, SheetScene(name, Cut(step_m)), _without_last_columns
+    for view, at_m, measured in (
+        ("the view", CUT_AT_M, _without_last_columns),
+        ("a hexagonal view", CORNER_AT_M, _without_corners),
+    ):
+        for way, step_m in (("out of", CUT_STEP_M), ("into", -CUT_STEP_M)):
+            name = f"is drawn {way} {view}"
+            yield name, SheetScene(name, Cut(at_m, step_m)), measured
 
 
 def _as_it_is(frame: SheetFrame) -> SheetFrame:
@@ -90,3 +108,13 @@ def _without_last_columns(frame: SheetFrame) -> SheetFrame:
     distance = frame.distance.copy()
     distance[:, -BLIND_COLUMNS:] = np.nan
     return replace(frame, distance=distance)
+
+
+def _without_corners(frame: SheetFrame) -> SheetFrame:
+    height, width = frame.distance.shape
+    right, down = (np.arange(size) / (size - 1) for size in (width, height))
+    sideways = np.minimum(right, 1 - right)
+    blind = np.zeros((height, width), np.bool_)
+    for (share, depth), away in zip(BLIND_CORNERS, (down, 1 - down), strict=True):
+        blind |= sideways[None] / share + away[:, None] / depth < 1
+    return replace(frame, distance=np.where(blind, np.float32(np.nan), frame.distance))

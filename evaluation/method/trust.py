@@ -11,7 +11,7 @@ and the simulator's ray casting.
 - **Creeps.** A flat sheet on a table is drawn along itself by 2 mm a frame; no edge is free, and nothing is printed
   on it.
 - **Cut.** A flat sheet is cut by the end of the sensor's field of view, before the end of the image, and is drawn out
-  of it or into it by 5 mm a frame. Added on 2026-11-26.
+  of it or into it by 5 mm a frame. Added on 2026-11-26, before columns without return and in a hexagon's corner.
 - **Coverage.** Share of the vertices' material points inside their 95 % regions, by quarters of a sequence, of a sheet,
   a rigid board and a hanging strip: with colour and without, with the outline and without.
 

@@ -51,8 +51,8 @@ def test_a_sheet_that_jumps_before_nothing_is_not_said_to_be_tracked_while_the_m
 
 
 def test_a_sheet_that_the_end_of_the_view_cuts_is_followed_into_it_and_not_wrong_out_of_it():
-    """The last columns without return are no background beside which the sheet ends."""
-    cut = {name: (scene, measured) for name, scene, measured in sequences(()) if "the view" in name}
+    """A corner without return, beside a hexagon, is no background beside which the sheet ends."""
+    cut = {name: (scene, measured) for name, scene, measured in sequences(()) if "hexagonal view" in name}
     assert len(cut) == 2
     for name, (scene, measured) in cut.items():
         frames = render_frames(scene, range(24), np.random.default_rng(5))

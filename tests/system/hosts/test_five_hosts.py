@@ -179,7 +179,7 @@ def nothing_is_lost_in_silence(listener):
 
 
 def newest_counters(listener, component, after_ns):
-    """What each host with that component has counted, all that still run asked once more."""
+    """Counters of each host with that component; all that still run are awaited once more."""
     running = {one.header.host_clock for one in listener.health(component)[-10:]}
 
     def told():

@@ -12,6 +12,7 @@ from abs_service.tracker.synthesis.base import Synthesis, Synthesizer
 from abs_service.tracker.synthesis.window import WHOLE, Placed, corner
 from abs_service.tracker.terms.base import Bounds, SensorFit, facing, summarize
 from abs_service.tracker.terms.depth.background import Background, dropouts
+from abs_service.tracker.terms.depth.beyond_view import BeyondView
 from abs_service.tracker.terms.depth.continuation import Continuation, NoContinuation
 from abs_service.tracker.terms.depth.depth_cost import (
     FREE_SCALE_M,
@@ -61,10 +62,11 @@ class DepthTerm:
         self._outline = outline(self._view.camera)
         self._continuation = continuation(self._view.camera)
         self._background = Background()
+        self._beyond_view = BeyondView()
         self._missing = np.zeros((1, vertices), np.float32)
         self._texels = texels(sensor, synthesizer, noise, bounds)
-        self._images = Placed(np.bool_), Placed(np.bool_), Placed(np.float32), Placed(np.bool_)
-        self._lost = self._covered = np.zeros(0, np.bool_)
+        self._images = Placed(np.bool_), Placed(np.bool_), Placed(np.float32), Placed(np.bool_), Placed(np.bool_)
+        self._lost = self._covered = self._outside = np.zeros(0, np.bool_)
         self._doubtful = np.zeros(0, np.bool_)
         self._free_m = np.zeros((0, 0), np.float32)
         self._window = WHOLE
@@ -78,24 +80,32 @@ class DepthTerm:
         distance = self._texels.observe(image, window)
         expected = np.ascontiguousarray(self._view.render(predicted)[window])
         self._view.look(predicted)
-        missing = np.isnan(distance)
+        missing, silhouette = np.isnan(distance), np.isfinite(expected)
+        outside = self._beyond_view.observe(missing, silhouette, window)
         single = dropouts(missing)
-        empty = self._background.observe(missing & ~single, np.isfinite(expected), window, self._texels.shape)
-        seen = classify(distance, expected, self._view.camera.fx, empty, single)
+        empty = self._background.observe(missing & ~(single | outside), silhouette, window, self._texels.shape)
+        seen = classify(distance, expected, self._view.camera.fx, empty, single, outside)
         doubtful = self._outline.observe(distance, seen, expected, predicted, window)
         self._continuation.observe(seen.object, window)
         self._window, self._distance, self._foreground = window, distance, seen.foreground
         free_m = where(~doubtful, seen.free_m)
-        self._place(seen, doubtful, free_m)
+        self._place(seen, doubtful, free_m, outside)
         self._explain_pixels(seen, doubtful, free_m, predicted)
 
-    def _place(self, seen: Visibility, doubtful: NDArray[np.bool_], free_m: NDArray[np.float32]) -> None:
+    def _place(
+        self,
+        seen: Visibility,
+        doubtful: NDArray[np.bool_],
+        free_m: NDArray[np.float32],
+        outside: NDArray[np.bool_],
+    ) -> None:
         """Puts what the window shows where samples find it: into images (height + 2, width + 2)."""
         lost, shape = seen.hole | seen.dropout, self._texels.shape
         self._lost = self._images[0].put(self._window, lost, *shape).ravel()
         self._doubtful = self._images[1].put(self._window, doubtful, *shape).ravel()
         self._free_m = self._images[2].put(self._window, free_m, *shape)
         self._covered = self._images[3].put(self._window, seen.foreground, *shape).ravel()
+        self._outside = self._images[4].put(self._window, outside, *shape).ravel()
 
     def foreground(self) -> NDArray[np.float64]:
         """Points (k, 3) [m] of occluders."""
@@ -171,7 +181,7 @@ class DepthTerm:
         """Agreement of the sensor with a population of one."""
         seen = self._view.synthesize(surface)
         residual, _, cost = self._residuals(seen)
-        measured, pixel = cost < np.inf, seen.pixel[0]
+        measured, pixel = cost < np.inf, np.where(self._outside[seen.pixel[0]], 0, seen.pixel[0])
         free = (self._free_m.ravel()[pixel] > 0) & (pixel > 0)
         masks = self._lost[pixel], self._covered[pixel], self._doubtful[pixel]
         sight = Sight.of(pixel, facing(self._view, surface), *masks)

@@ -3,12 +3,12 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.field_of_view import filled
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.synthesis.rasterization.raster import Raster
 from abs_service.tracker.synthesis.window import WHOLE
 from abs_service.tracker.terms.depth.background import Background, dropouts
+from abs_service.tracker.terms.depth.beyond_view import beyond
 from abs_service.tracker.terms.depth.outline import RimOutline
 from abs_service.tracker.terms.depth.rim import Rim
 from abs_service.tracker.terms.depth.visibility import classify
@@ -26,14 +26,13 @@ def classified_rim(
         surface: the mesh in the image, a population of one.
         distance: radial distances (height, width) [m] without mean offset, NaN without return.
     """
-    if window := filled(np.isfinite(distance)):
-        camera, distance = camera.cropped(*window), distance[window]
     expected = Raster(camera, mesh.faces).render(surface.vertices[0])
-    missing = np.isnan(distance)
+    missing, silhouette = np.isnan(distance), np.isfinite(expected)
+    outside = beyond(missing, silhouette) & missing
     single = dropouts(missing)
-    empty = Background().observe(missing & ~single, np.isfinite(expected), WHOLE, distance.shape)
+    empty = Background().observe(missing & ~(single | outside), silhouette, WHOLE, distance.shape)
     rim = Rim.of(mesh)
     # The classes do not depend on the standard deviation, which says how far from the outline distances are known.
     outline = RimOutline(camera, rim, deviation=1.0)
-    outline.observe(distance, classify(distance, expected, camera.fx, empty, single), expected, surface)
+    outline.observe(distance, classify(distance, expected, camera.fx, empty, single, outside), expected, surface)
     return rim, outline.classes

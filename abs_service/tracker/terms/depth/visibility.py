@@ -57,6 +57,7 @@ def classify(
     focal: float,
     empty: NDArray[np.bool_] | np.bool_ = np.False_,
     dropout: NDArray[np.bool_] | np.bool_ = np.False_,
+    beyond: NDArray[np.bool_] | np.bool_ = np.False_,
 ) -> Visibility:
     """Classifies the pixels of one depth image by connected surfaces.
 
@@ -68,6 +69,7 @@ def classify(
         focal: focal length of the camera [px].
         empty: missing returns (height, width) that show the background, see `Background`.
         dropout: missing returns of single pixels, see `dropouts`.
+        beyond: missing returns beyond the field of view, see `BeyondView`; they count as a hole.
     """
     distance, predicted = (np.ascontiguousarray(image, np.float32) for image in (distance, predicted))
     labels, count = connected_surfaces(distance, LARGEST_STEP_M)
@@ -80,9 +82,10 @@ def classify(
     shown, before, solid, behind, missing = (np.empty(distance.shape, np.bool_) for _ in range(5))
     _compare(distance, near, labels, is_object, shown, before, solid, behind, missing)
     foreground = before & (cv2.dilate(solid.view(np.uint8), np.ones((3, 3))) > 0) if solid.any() else nothing
-    hole, past, single = nothing, nothing, missing & dropout
+    hole, past, single = nothing, nothing, missing & dropout & ~beyond
     if missing.any():
-        hole, past = _holes(missing & ~single, np.isfinite(predicted), near / focal, empty)
+        hole, past = _holes(missing & ~(single | beyond), np.isfinite(predicted), near / focal, empty)
+        hole |= beyond
     away = _depth_inside(~shown) * near / np.float32(focal)
     return Visibility(shown, foreground, hole, single, where(behind | past, away))
 

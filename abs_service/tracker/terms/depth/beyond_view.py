@@ -1,0 +1,71 @@
+"""Missing returns beyond a depth sensor's field of view: they show neither a background nor a hole.
+
+A field of view may end before the image does. Structured light finds no match in the last columns at one side; that of
+some time-of-flight sensors is a hexagon or a circle; registration to another camera gives it any convex outline. What
+is cut off there does not end there itself.
+"""
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.pairing.images import Window
+
+#: A field of view fills at least this share of the image: less may be objects before a background without return.
+LEAST_AREA = 0.5
+#: Along its edge it has returns in at least this share of the pixels, and in at least that share of something else
+#: than the object: what is before a background without return ends there by itself.
+LEAST_RETURNS, LEAST_OTHERS = 0.5, 0.25
+#: Its edge is a stripe of this share of the image's width; returns may be missing in it.
+EDGE_SHARE = 0.01
+#: Returns within so many pixels of the predicted mesh may be the object's.
+NEAR_PX = 5
+#: Returns that are fewer in the square of three pixels a side around them are strays.
+LEAST_NEIGHBOURS = 3
+
+
+class BeyondView:
+    """Pixels beyond the field of view, learnt from the first depth image."""
+
+    def __init__(self) -> None:
+        self._beyond = np.zeros((0, 0), np.bool_)
+        self._begun = False
+
+    def observe(self, missing: NDArray[np.bool_], expected: NDArray[np.bool_], window: Window) -> NDArray[np.bool_]:
+        """Missing returns (rows, columns) beyond the field of view; the first call learns.
+
+        Args:
+            missing: pixels without return (rows, columns) in the window.
+            expected: silhouette of the predicted mesh there.
+            window: of the image; the first one has to be the whole image.
+        """
+        if not self._begun:
+            self._begun = True
+            self._beyond = beyond(missing, expected)
+        return missing & self._beyond[window]
+
+
+def beyond(missing: NDArray[np.bool_], expected: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Pixels (height, width) outside the convex hull of the returns, and at its edge, if that is a field of view's.
+
+    Args:
+        missing: pixels without return (height, width).
+        expected: silhouette of the object.
+    """
+    nothing, returns = np.zeros(missing.shape, np.bool_), ~missing
+    neighbours = cv2.boxFilter(returns.view(np.uint8), cv2.CV_8U, (3, 3), normalize=False)
+    corners = cv2.findNonZero((returns & (neighbours >= LEAST_NEIGHBOURS)).view(np.uint8))
+    if corners is None:
+        return nothing
+    hull = cv2.fillConvexPoly(np.zeros(missing.shape, np.uint8), cv2.convexHull(corners), 1)
+    stripe = max(round(EDGE_SHARE * missing.shape[1]), 1)
+    inner = cv2.erode(hull, _square(stripe), borderValue=1) > 0
+    edge = (hull > 0) & ~inner
+    there, ours = edge & returns, cv2.dilate(expected.view(np.uint8), _square(NEAR_PX)) > 0
+    length, measured, of_others = (np.count_nonzero(mask) for mask in (edge, there, there & ~ours))
+    ends = measured >= LEAST_RETURNS * length and of_others >= LEAST_OTHERS * length
+    return ~inner if ends and np.count_nonzero(hull) >= LEAST_AREA * hull.size else nothing
+
+
+def _square(reach: int) -> NDArray[np.uint8]:
+    return np.ones((2 * reach + 1, 2 * reach + 1), np.uint8)
