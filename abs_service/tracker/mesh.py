@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+import scipy  # its parts are imported when they are first used
 from numpy.typing import NDArray
 
 
@@ -82,6 +83,16 @@ def edges_of(faces: NDArray[np.integer]) -> tuple[NDArray[np.int32], NDArray[np.
     count = int(sides.max(initial=0)) + 1
     keys, belongs = np.unique(sides[:, 0] * count + sides[:, 1], return_counts=True)
     return np.stack(np.divmod(keys, count), axis=1).astype(np.int32), belongs
+
+
+def pieces_of(faces: NDArray[np.integer]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Number (m,) of the connected piece of each of the faces (m, 3), and the number of vertices (k,) of each piece."""
+    used, corners = np.unique(faces, return_inverse=True)
+    corners = corners.reshape(-1, 3)
+    links = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]]]).T
+    graph = scipy.sparse.coo_array((np.ones(links.shape[1]), links), shape=(len(used), len(used)))
+    count, piece = scipy.sparse.csgraph.connected_components(graph, directed=False)
+    return piece[corners[:, 0]], np.bincount(piece, minlength=count)
 
 
 def area_vectors(vertices: NDArray[np.floating], faces: NDArray[np.int32]) -> NDArray[np.floating]:

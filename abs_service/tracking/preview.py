@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from abs_service.pairing.images import DepthImage
 from abs_service.pairing.observation import Observation
 from abs_service.tracker.detection.initial_detection import DetectionError
-from abs_service.tracker.detection.plausibility import ExtentError, warnings
+from abs_service.tracker.detection.plausibility import ExtentError, mesh_warnings, warnings
 from abs_service.tracker.detection.regions.base import Region
 from abs_service.tracker.detection.segmentation import detect_object
 from abs_service.tracker.detection.templates.base import Template
@@ -125,5 +125,9 @@ def _look(
     surface = model.deform(model.rest[None])
     rim, classes = classified_rim(camera, model.mesh, surface, detection.surroundings)
     found = FoundMesh(model.mesh, surface.vertices[0].T.astype(np.float64), rim.outer, classes)
-    doubts = warnings(detection) + tuple(f"it would begin {first.status}: {reason}" for reason in first.reasons)
+    doubts = (
+        warnings(detection)
+        + mesh_warnings(model.mesh)
+        + tuple(f"it would begin {first.status}: {reason}" for reason in first.reasons)
+    )
     return Preview(number, camera, image.distance, selected, found, "", doubts, derived(plan, model))

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from abs_service.pairing.observation import Observation
 from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection, UndecidedError
-from abs_service.tracker.detection.plausibility import ExtentError, warnings
+from abs_service.tracker.detection.plausibility import ExtentError, mesh_warnings, warnings
 from abs_service.tracker.detection.regions.base import Region
 from abs_service.tracker.detection.segmentation import detect_object
 from abs_service.tracker.estimate import Estimate, Status, initializing
@@ -233,7 +233,8 @@ class TrackingSession:
 
     def _build(self, observation: Observation, region: Region) -> _Built:
         detection = self._detection(observation, region)
-        return _Built(*make_tracker(self._plan, self._template, self._rig, detection, observation), warnings(detection))
+        tracker, mesh = make_tracker(self._plan, self._template, self._rig, detection, observation)
+        return _Built(tracker, mesh, warnings(detection) + mesh_warnings(mesh))
 
 
 def streams(sensors: Iterable[Sensor]) -> list[tuple[str, str]]:

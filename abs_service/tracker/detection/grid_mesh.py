@@ -4,11 +4,10 @@ from dataclasses import replace
 
 import cv2
 import numpy as np
-import scipy  # its parts are imported when they are first used
 from numpy.typing import NDArray
 
 from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection
-from abs_service.tracker.mesh import Mesh
+from abs_service.tracker.mesh import Mesh, pieces_of
 from calib import pose
 
 #: Minimum number of vertices; fewer do not determine a deformation.
@@ -30,7 +29,7 @@ LONGEST_SIDE = 3.0
 
 #: A connected component with a smaller share of the vertices is an island and removed: the rim of the region often
 #: shows background, which cannot be bound to a smooth surface.
-MIN_PART = 0.1
+MIN_PIECE = 0.1
 
 
 def grid_mesh(detection: InitialDetection) -> Mesh:
@@ -145,10 +144,5 @@ def _without_jumps(positions: NDArray[np.float64], faces: NDArray[np.int64]) -> 
 
 def _without_islands(faces: NDArray[np.int64]) -> NDArray[np.int64]:
     """The triangles (m, 3) of the connected components that are large enough."""
-    used, corners = np.unique(faces, return_inverse=True)
-    corners = corners.reshape(-1, 3)
-    links = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]]]).T
-    graph = scipy.sparse.coo_array((np.ones(links.shape[1]), links), shape=(len(used), len(used)))
-    count, part = scipy.sparse.csgraph.connected_components(graph, directed=False)
-    sizes = np.bincount(part, minlength=count)
-    return faces[sizes[part[corners[:, 0]]] >= MIN_PART * len(used)]
+    piece, sizes = pieces_of(faces)
+    return faces[sizes[piece] >= MIN_PIECE * sizes.sum()]

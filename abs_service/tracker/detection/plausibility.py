@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection
+from abs_service.tracker.mesh import Mesh, pieces_of
 
 #: Range of the extent of an object [m]; outside, the distances have the wrong unit.
 SMALLEST_M, LARGEST_M = 0.005, 20.0
@@ -65,6 +66,18 @@ def is_scene(surface: NDArray[np.bool_], measured: NDArray[np.bool_]) -> bool:
         return False
     rows, columns = np.nonzero(surface)
     return _spans(columns, surface.shape[1]) or _spans(rows, surface.shape[0])
+
+
+def mesh_warnings(mesh: Mesh) -> tuple[str, ...]:
+    """Doubts about a mesh that was made of an object: it should be one piece, unless a file says otherwise."""
+    sizes = pieces_of(mesh.faces)[1]
+    if mesh.is_complete or len(sizes) < 2:
+        return ()
+    shares = " and ".join(f"{size / sizes.sum():.0%}" for size in sorted(sizes, reverse=True))
+    return (
+        f"the mesh has {len(sizes)} pieces, of {shares} of its vertices: is something in front of the object, "
+        "or another one in the region?",
+    )
 
 
 def warnings(detection: InitialDetection) -> tuple[str, ...]:

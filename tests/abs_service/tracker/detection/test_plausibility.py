@@ -1,9 +1,12 @@
 """Doubts about a detected object: a region that selects the scene is told, an object is not."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from abs_service.tracker.detection.plausibility import warnings
+from abs_service.tracker.detection.grid_mesh import grid_mesh
+from abs_service.tracker.detection.plausibility import mesh_warnings, warnings
 from abs_service.tracker.detection.regions import box, nearest, seed
 from tests.abs_service.tracker.detection.test_segmentation import EVERYWHERE, SHEET, detect
 
@@ -24,3 +27,16 @@ def test_a_large_object_that_ends_in_the_image_raises_no_doubts():
     distance = np.full((48, 64), 2.0, np.float32)
     distance[5:43, 6:58] = 1.0  # 64 % of the image
     assert warnings(detect(distance, nearest.Settings().build())) == ()
+
+
+def test_a_mesh_of_two_pieces_is_told_unless_a_file_has_it_so():
+    distance = np.full((48, 64), 2.0, np.float32)
+    distance[5:43, 6:58] = 1.0
+    whole = grid_mesh(detect(distance, EVERYWHERE))
+    distance[:, 40:48] = np.nan
+    distance[distance > 1.5] = np.nan
+    parted = grid_mesh(detect(distance, EVERYWHERE))
+    assert mesh_warnings(whole) == ()
+    (doubt,) = mesh_warnings(parted)
+    assert doubt.startswith("the mesh has 2 pieces, of 82% and 18% of its vertices: ")
+    assert mesh_warnings(replace(parted, is_complete=True)) == ()
