@@ -18,6 +18,9 @@ from abs_service.tracker.terms.vertex_counts import VertexCounts
 #: With fewer visible vertices on the free edges, their shares say nothing.
 MIN_RIM = 8
 
+#: With fewer vertices that agree or disagree with a sensor, their share says nothing.
+MIN_JUDGED = 20
+
 
 @dataclass(frozen=True)
 class Settings:
@@ -90,6 +93,8 @@ def _seen(fits: Sequence[SensorFit], lost: bool, limits: Settings) -> Iterator[s
             f"{occluded:.0%} of the vertices are occluded in the sensor that sees most of them – "
             "take away what hides the object, or add a camera on another side"
         )
+    if not disagree:
+        yield from _contradicted(fits, limits)
     counts = most_agreeing(fits)
     if not (disagree or hidden) and counts.agreeing < limits.degraded_agreeing * counts.expected:
         cause = max(_ABSENT, key=counts.share)
@@ -97,6 +102,14 @@ def _seen(fits: Sequence[SensorFit], lost: bool, limits: Settings) -> Iterator[s
             f"only {counts.agreeing / counts.expected:.0%} of the vertices that should be in sight agree with a "
             f"measurement, {counts.share(cause):.0%} of all {_ABSENT[cause]}"
         )
+
+
+def _contradicted(fits: Sequence[SensorFit], limits: Settings) -> Iterator[str]:
+    """Reasons by sensors of distances that contradict the others: many colours that agree do not outvote them."""
+    for fit in (fit for fit in fits if fit.is_surprised or np.isfinite(fit.remainder.share)):
+        judged = fit.counts.agreeing + fit.counts.disagreeing
+        if judged >= MIN_JUDGED and fit.counts.agreeing < limits.degraded_below * judged:
+            yield f"only {fit.counts.agreeing / judged:.0%} of the distances of {fit.sensor} agree – {_FOLLOW}"
 
 
 #: What to do if the mesh does not agree.
@@ -119,6 +132,11 @@ def _placed(fits: Sequence[SensorFit], shape: ShapeQuality, innovation: float, l
             f"{rim_share(fits):.0%} of the free edges lie off the object's outline, by "
             f"{rim_distance(fits) * 1e3:.0f} mm together or across a slide: the mesh has slid or turned on it – "
             "it is made anew if that lasts; a print that a colour camera sees would hold it"
+        )
+    if any(fit.is_surprised for fit in fits) and not any(np.isfinite(fit.remainder.share) for fit in fits):
+        yield (
+            "nothing was where the object was expected, so neither its outline nor what lies beside it is judged – "
+            "move it more slowly, or raise the camera's rate"
         )
     if (gained := unexplained_share(fits)) > limits.degraded_unexplained:
         yield (

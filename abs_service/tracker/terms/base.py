@@ -95,6 +95,8 @@ class SensorFit:
         rim: agreement of the mesh's edges with the outline; zeros for a sensor that measures no distances.
         counts: the vertices by what the sensor's image shows of them; zeros for a light barrier.
         remainder: measured surface of the object that the mesh leaves unexplained.
+        is_surprised: True for a sensor of distances in whose image nothing was where the object was expected: neither
+            the outline nor what lies beside the mesh is known.
     """
 
     sensor: str
@@ -107,6 +109,7 @@ class SensorFit:
     rim: RimFit = RimFit()
     counts: VertexCounts = field(default_factory=VertexCounts)
     remainder: Remainder = Remainder()
+    is_surprised: bool = False
 
 
 def summarize(

@@ -161,3 +161,29 @@ def test_a_folded_mesh_and_one_that_nothing_holds_are_degraded():
     assert reasons[0].startswith("nothing holds the surface along itself, vertices are known to 20 mm so far")
     alone = ShapeQuality(stretch=0.01, folded_share=0.0, deviation_m=1e-3, single_frame_deviation_m=0.2)
     assert judge([fit(1.0)], (), alone, 0.0, SETTINGS)[0] == Status.DEGRADED
+
+
+def depth(name: str, agreeing: int, disagreeing: int, share: float = 0.0, surprised: bool = False) -> SensorFit:
+    """A sensor of distances with 300 vertices; `share` of its surface is unexplained, NaN if it shows no object."""
+    counts = VertexCounts(facing=300, agreeing=agreeing, disagreeing=disagreeing)
+    return SensorFit(
+        name, 300, 0, 300, agreeing, 0.0, 1.0, counts=counts, remainder=Remainder(share, 0.0), is_surprised=surprised
+    )
+
+
+def test_colors_that_agree_do_not_outvote_distances_that_do_not():
+    colors = replace(fit(0.95), counts=VertexCounts(facing=10_000, agreeing=9_500, disagreeing=500))
+    assert judge([depth("tof", 180, 120), colors], (), SHAPE, 0.0, SETTINGS) == (Status.TRACKING, ())
+    status, reasons = judge([depth("tof", 115, 185), colors], (), SHAPE, 0.0, SETTINGS)
+    assert (status, facts(reasons)) == (Status.DEGRADED, ("only 38% of the distances of tof agree",))
+    assert judge([depth("tof", 5, 14), colors], (), SHAPE, 0.0, SETTINGS)[0] == Status.TRACKING, "too few say nothing"
+    dark = replace(colors, counts=VertexCounts(facing=10_000, agreeing=4_000, disagreeing=6_000))
+    assert judge([depth("tof", 300, 0), dark], (), SHAPE, 0.0, SETTINGS)[0] == Status.TRACKING, "a lamp went out"
+
+
+def test_an_object_that_was_not_where_it_was_expected_is_not_said_to_be_tracked():
+    surprised = depth("a", 300, 0, float("nan"), surprised=True)
+    status, reasons = judge([surprised], (), SHAPE, 0.0, SETTINGS)
+    assert status == Status.DEGRADED
+    assert facts(reasons)[0].startswith("nothing was where the object was expected")
+    assert judge([surprised, depth("b", 300, 0)], (), SHAPE, 0.0, SETTINGS) == (Status.TRACKING, ())

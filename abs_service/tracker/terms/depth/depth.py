@@ -69,7 +69,7 @@ class DepthTerm:
         self._lost = self._covered = self._outside = np.zeros(0, np.bool_)
         self._doubtful = np.zeros(0, np.bool_)
         self._free_m = np.zeros((0, 0), np.float32)
-        self._window = WHOLE
+        self._window, self._is_surprised = WHOLE, False
         self._distance, self._foreground = np.zeros((0, 0), np.float32), np.zeros((0, 0), np.bool_)
 
     def observe(self, image: Image, predicted: Surface, reach_m: float = np.inf) -> None:
@@ -128,7 +128,8 @@ class DepthTerm:
         inlier, so that the cost has no gradient there. In free space it costs an outlier plus a penalty proportional to
         the distance from the object. At other missing returns it costs the more, the less likely they are.
         """
-        if not seen.object.any():
+        self._is_surprised = not seen.object.any()
+        if self._is_surprised:
             return
         agreeing = self._texels.explain(Unusable(seen.foreground | seen.hole | doubtful, free_m, seen.object))
         most = self._bounds.outlier - self._bounds.inlier - agreeing
@@ -191,6 +192,7 @@ class DepthTerm:
             summarize(self.sensor, sight, measured | free, size, mean),
             rim=self._outline.fit(surface),
             remainder=self._continuation.remainder(surface),
+            is_surprised=self._is_surprised,
         )
 
     def misfit(self, surface: Surface) -> NDArray[np.float64]:
