@@ -14,6 +14,7 @@ from mcap.writer import MCAP0_MAGIC
 from abs_service.recording.mcap_scan import find_chunk
 from abs_service.recording.recording_file import ACTIVE, private
 from abs_service.recording.salvage import Salvage
+from calib.files import limited
 
 BROKEN = ".broken"
 RECOVERING = ".recovering"
@@ -117,11 +118,11 @@ def _retire(source: Path, lossless: bool) -> Path | None:
 
 @contextlib.contextmanager
 def _locked(source: Path) -> Iterator[BinaryIO]:
-    try:
-        stream = source.open("rb")
-    except OSError as error:
-        raise RecoveryError(f"{source}: cannot be read: {error.strerror}") from None
-    with stream:
+    with contextlib.ExitStack() as stack:
+        try:
+            stream = stack.enter_context(limited.opened(source))
+        except OSError as error:
+            raise RecoveryError(f"{source}: cannot be read: {error.strerror}") from None
         try:
             fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:

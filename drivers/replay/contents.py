@@ -15,6 +15,7 @@ from mcap.stream_reader import StreamReader
 from mcap.summary import Summary
 from zstandard import ZstdError
 
+from calib.files import limited
 from drivers.contract.device import DeviceError
 from drivers.encoding import mcap_chunk
 
@@ -90,7 +91,7 @@ def scan(path: Path) -> Contents:
         RecordingError: the file cannot be read, is not MCAP, or has a damaged attachment.
     """
     try:
-        with path.open("rb") as stream:
+        with limited.opened(path) as stream:
             summary = _summary(path, stream)
             return _scan_records(stream) if summary is None else _from_index(summary, stream)
     except OSError as error:
@@ -114,7 +115,7 @@ def _summary(path: Path, stream: BinaryIO) -> Summary | None:
         raise RecordingError(f"{path}: this is no MCAP file ({stream.seek(0, 2)} bytes)") from error
     try:
         return reader.get_summary()
-    except DAMAGE:
+    except (*DAMAGE, OSError):  # the latter if the file is shorter than the end of a finished one
         return None
 
 

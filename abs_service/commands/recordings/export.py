@@ -65,7 +65,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Exports one recording."""
     source: Path = arguments.recording
-    path: Path = arguments.out or source.with_name(f"{source.stem}_view.mcap")
+    path: Path = arguments.out or source.parent / f"{source.stem}_view.mcap"
     if path.suffix not in (".mcap", *_WRITERS, *_EXTRAS):
         raise ExportError(f"--out {path}: its suffix must be one of .mcap, {', '.join([*_WRITERS, *_EXTRAS])}")
     package, extra = _EXTRAS.get(path.suffix, ("", ""))

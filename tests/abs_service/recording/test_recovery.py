@@ -1,6 +1,7 @@
 """Recovery saves every sound message of a damaged file and counts the others."""
 
 import fcntl
+import os
 import random
 import stat
 
@@ -207,3 +208,9 @@ def test_the_command_reports_each_file_and_continues_after_an_error(tmp_path, ca
     output = capsys.readouterr()
     assert "No such file" in output.err
     assert "80 messages" in output.out
+
+
+def test_a_pipe_is_refused_instead_of_waited_for(tmp_path):
+    os.mkfifo(path := tmp_path / "x.mcap.active")
+    with pytest.raises(RecoveryError, match="no regular file"):
+        recover(path)

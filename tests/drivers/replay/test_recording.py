@@ -1,6 +1,7 @@
 """Offline reading of recordings, in order, also from truncated and corrupt files."""
 
 import dataclasses
+import os
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -8,12 +9,14 @@ import numpy as np
 import pytest
 from absmsg.v1.common_pb2 import Header
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
+from mcap.writer import MCAP0_MAGIC
 
 from drivers.contract.device import Truth
 from drivers.contract.frame import Frame
 from drivers.encoding import codec
 from drivers.encoding.mcap_file import McapFile
 from drivers.replay import Recording, RecordingError
+from drivers.replay.contents import scan
 from tests.drivers.replay.recordings import (
     BOOT_NS,
     CAMERAS,
@@ -187,3 +190,17 @@ def test_errors_name_the_file_and_the_problem(tmp_path: Path, make, complaint: s
     make(path)
     with pytest.raises(RecordingError, match=rf"broken\.mcap: .*{complaint}|broken\.mcap: {complaint}"):
         list(Recording(path).frames())
+
+
+def test_a_file_that_ends_after_its_first_bytes_is_not_finished(tmp_path: Path) -> None:
+    path = tmp_path / "begun.mcap"
+    path.write_bytes(MCAP0_MAGIC)
+    contents = scan(path)
+    assert contents.truncated
+    assert not contents.chunks
+
+
+def test_a_pipe_is_refused_instead_of_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(path := tmp_path / "pipe.mcap")
+    with pytest.raises(RecordingError, match=r"pipe\.mcap: it is no regular file"):
+        scan(path)
