@@ -16,6 +16,8 @@ from abs_service.supervision.rig_view import RigView
 EXTENSION_NS = 60_000_000_000
 #: Shortest time between two texts for people [ns].
 TEXT_PERIOD_NS = 1_000_000_000
+#: Longest wait for a systemd that does not read: nothing is supervised meanwhile [s].
+TIMEOUT_S = 0.1
 
 
 class Notifier:
@@ -78,9 +80,11 @@ def notifier(environment: Mapping[str, str]) -> Notifier:
 
 def _send(address: str, message: str) -> None:
     # A lost message is sent again in the next period, or was of no use to systemd.
+    path = "\0" + address[1:] if address.startswith("@") else address
     with suppress(OSError), socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC) as client:
-        if address:
-            client.sendto(message.encode(), "\0" + address[1:] if address.startswith("@") else address)
+        if path:
+            client.settimeout(TIMEOUT_S)
+            client.sendto(message.encode(), path)
 
 
 def _counts(view: RigView) -> dict[str, int]:

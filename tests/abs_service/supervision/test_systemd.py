@@ -166,6 +166,15 @@ def test_a_systemd_that_is_not_there_does_no_harm(address):
     assert os.listdir("/proc/self/fd") == before  # no socket is left
 
 
+def test_a_systemd_that_does_not_read_is_not_waited_for(tmp_path, monkeypatch):
+    monkeypatch.setattr(systemd, "TIMEOUT_S", 0.001)
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
+        manager.bind(str(tmp_path / "notify"))
+        notifier = systemd.notifier({"NOTIFY_SOCKET": str(tmp_path / "notify")})
+        for _ in range(1000):
+            notifier.stopping()
+
+
 @pytest.mark.slow
 def test_a_running_rig_tells_systemd_when_it_is_ready_alive_and_ending(launch, endpoint, tmp_path, monkeypatch):
     """A rig that only records, in processes of its own."""
