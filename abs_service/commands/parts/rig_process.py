@@ -84,14 +84,20 @@ def open_bus_at(
 
 
 def stop_on_signals() -> threading.Event:
-    """An event that SIGTERM and SIGINT set. A second signal ends the process on the spot."""
-    stop = threading.Event()
+    """An event that SIGTERM, SIGINT and SIGHUP set. A second SIGTERM or SIGINT ends the process on the spot.
+
+    SIGHUP says that the terminal is gone, often twice: by the kernel and by the shell. `nohup` lets it be ignored.
+    """
+    stop, told = threading.Event(), threading.Event()
 
     def on_signal(number: int, frame: FrameType | None) -> None:
-        if stop.is_set():
+        if told.is_set():
             os._exit(128 + number)
+        told.set()
         stop.set()
 
     signal.signal(signal.SIGTERM, on_signal)
     signal.signal(signal.SIGINT, on_signal)
+    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
+        signal.signal(signal.SIGHUP, lambda number, frame: stop.set())
     return stop

@@ -67,3 +67,17 @@ def test_143_for_a_second_sigterm():
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
     done = subprocess.run([sys.executable, "-c", program], env=environment, check=False)
     assert done.returncode == 128 + signal.SIGTERM
+
+
+@pytest.mark.parametrize(("ignored", "told"), [(False, True), (True, False)])
+def test_a_terminal_that_is_closed_ends_in_order_unless_nohup_is_used(ignored, told):
+    program = (
+        "import os, signal, sys\nfrom abs_service.commands.parts import rig_process\n"
+        f"signal.signal(signal.SIGHUP, signal.{'SIG_IGN' if ignored else 'SIG_DFL'})\n"
+        "stop = rig_process.stop_on_signals()\n"
+        "for _ in range(2):\n    os.kill(os.getpid(), signal.SIGHUP)\n"
+        "sys.exit(10 + stop.is_set())"
+    )
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    done = subprocess.run([sys.executable, "-c", program], env=environment, check=False)
+    assert done.returncode == 10 + told
