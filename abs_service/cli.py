@@ -16,7 +16,7 @@ from importlib import import_module
 from types import ModuleType
 
 import abs_service
-from abs_service.supervision import parent_watchdog
+from abs_service.supervision import parent_watchdog, standard_files
 from abs_service.supervision.exit_codes import Exit
 
 #: One line of help for each command; kept here so that `--help` imports none of them.
@@ -77,6 +77,7 @@ abs-service COMMAND --help describes each command.
 
 def program() -> None:
     """Runs the command line as a process, which ends even if a thread does not, such as a callback that waits."""
+    standard_files.secure()
     _preload(sys.argv[1:])
     try:
         code = main()
@@ -118,16 +119,15 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         logs.set_up(arguments, name, given)
         code = module.run(arguments)
-        sys.stdout.flush()  # here, where a reader that is gone is noticed, and not at the end of the interpreter
+        standard_files.flush()  # here, where an error is noticed, and not at the end of the interpreter
         return code
     except KeyboardInterrupt:
         return Exit.INTERRUPTED
     except BrokenPipeError:
-        # What is still buffered has nowhere to go; without this the interpreter would complain about it when it exits.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        standard_files.discard()
         return Exit.PIPE_CLOSED
     except Exception as error:
-        return logs.end_with(error, arguments)
+        return logs.end_with(standard_files.blamed(error), arguments)
 
 
 def _compute_with_one_thread() -> None:

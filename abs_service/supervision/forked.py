@@ -70,7 +70,9 @@ def begin(
     with stdin, output:
         for descriptor, end in ((0, stdin), (1, output), (2, output)):
             os.dup2(end.fileno(), descriptor)
-    sys.stdout.reconfigure(line_buffering=True)  # pyright: ignore[reportAttributeAccessIssue]
+    # Anew, since they know the encoding and kind of the fork server's; the parent reads UTF-8.
+    sys.stdout = os.fdopen(1, "w", buffering=1, encoding="utf-8", closefd=False)
+    sys.stderr = os.fdopen(2, "w", buffering=1, encoding="utf-8", errors="backslashreplace", closefd=False)
     os.environ |= {parent_watchdog.VARIABLE: "1"}
     setproctitle(" ".join(("abs-service", *arguments)))
     program(arguments)

@@ -1,12 +1,40 @@
 """Displays for output that is no terminal: one line a second for people, one JSON object per estimate for scripts."""
 
 import json
+from contextlib import suppress
 from typing import Self, TextIO
 
 from abs_service.supervision.rig_view import RigView, size
 from abs_service.tracking.log.tracker_log import EstimateReport
 
 PERIOD_NS = 1_000_000_000
+
+
+class _Lines:
+    """Lines of an output whose disk may be full: what cannot be written is counted, and the rig goes on."""
+
+    def __init__(self, out: TextIO) -> None:
+        self._out = out
+        self._lost, self._error = 0, ""
+
+    def write(self, *lines: str) -> None:
+        """Writes lines; raises BrokenPipeError if the reader is gone."""
+        try:
+            print(*lines, sep="\n", file=self._out, flush=True)
+        except BrokenPipeError:
+            raise
+        except OSError as error:
+            self._lost, self._error = self._lost + len(lines), error.strerror
+
+    def losses(self) -> list[str]:
+        """Says what was lost; empty if nothing was."""
+        return [f"up to {self._lost} lines of output are missing: {self._error}"] if self._lost else []
+
+
+def _note(text: str, notes: TextIO) -> None:
+    # Notes come from the log, too, and from the threads that read what children say: none of them may end by it.
+    with suppress(OSError):
+        print(text, file=notes, flush=True)
 
 
 class PlainDisplay:
@@ -18,7 +46,7 @@ class PlainDisplay:
     """
 
     def __init__(self, out: TextIO, notes: TextIO) -> None:
-        self._out = out
+        self._out = _Lines(out)
         self._notes = notes
         self._next_ns = 0
 
@@ -33,18 +61,20 @@ class PlainDisplay:
         if view.now_ns < self._next_ns:
             return
         self._next_ns = view.now_ns + PERIOD_NS
-        print(line(view), file=self._out, flush=True)
+        self._out.write(line(view))
 
     def estimate(self, report: EstimateReport) -> None:
         """Lines show the last estimate only."""
 
     def note(self, text: str) -> None:
         """See `Display`."""
-        print(text, file=self._notes, flush=True)
+        _note(text, self._notes)
 
     def close(self, view: RigView) -> None:
         """See `Display`."""
-        print(*view.summary(), sep="\n", file=self._out, flush=True)
+        self._out.write(*view.summary())
+        for loss in self._out.losses():
+            self.note(loss)
 
 
 class JsonDisplay:
@@ -56,7 +86,7 @@ class JsonDisplay:
     """
 
     def __init__(self, out: TextIO, notes: TextIO) -> None:
-        self._out = out
+        self._out = _Lines(out)
         self._notes = notes
 
     def __enter__(self) -> Self:
@@ -70,15 +100,15 @@ class JsonDisplay:
 
     def estimate(self, report: EstimateReport) -> None:
         """See `Display`."""
-        print(json.dumps(report.as_dict(), ensure_ascii=False), file=self._out, flush=True)
+        self._out.write(json.dumps(report.as_dict(), ensure_ascii=False))
 
     def note(self, text: str) -> None:
         """See `Display`."""
-        print(text, file=self._notes, flush=True)
+        _note(text, self._notes)
 
     def close(self, view: RigView) -> None:
         """See `Display`."""
-        print(*view.summary(), sep="\n", file=self._notes, flush=True)
+        self.note("\n".join([*view.summary(), *self._out.losses()]))
 
 
 def line(view: RigView) -> str:

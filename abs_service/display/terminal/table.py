@@ -1,5 +1,6 @@
 """The live table in a terminal."""
 
+from contextlib import suppress
 from typing import Self
 
 from absmsg.v1.health_pb2 import Health
@@ -38,8 +39,9 @@ class TableDisplay:
         return self
 
     def __exit__(self, *error: object) -> None:
-        """Gives the terminal back."""
-        self._region.stop()
+        """Gives the terminal back, if it is still there."""
+        with suppress(OSError):
+            self._region.stop()
 
     def update(self, view: RigView) -> None:
         """See `Display`; the region redraws its last content by itself."""
@@ -50,13 +52,15 @@ class TableDisplay:
 
     def note(self, text: str) -> None:
         """See `Display`."""
-        self._console.print(Text(text, style="dim"))
+        with suppress(OSError):  # the terminal is gone, and the rig goes on
+            self._console.print(Text(text, style="dim"))
 
     def close(self, view: RigView) -> None:
         """See `Display`; leaves the last table in the terminal."""
-        self._region.stop()
-        self._console.print(draw(view, Text("")))
-        self._console.print("\n".join(view.summary()), highlight=False, markup=False)
+        with suppress(OSError):
+            self._region.stop()
+            self._console.print(draw(view, Text("")))
+            self._console.print("\n".join(view.summary()), highlight=False, markup=False)
 
 
 def draw(view: RigView, spinner: Spinner | Text) -> RenderableType:

@@ -2,6 +2,7 @@
 
 import io
 import json
+import os
 
 import pytest
 
@@ -66,3 +67,27 @@ def test_json_is_one_object_per_estimate_and_nothing_else():
 )
 def test_sizes(number, text):
     assert size(number) == text
+
+
+@pytest.mark.parametrize("kind", [PlainDisplay, JsonDisplay])
+def test_an_output_on_a_full_disk_does_not_end_the_rig_and_says_what_is_missing(live, kind):
+    notes = io.StringIO()
+    out = open("/dev/full", "w", encoding="utf-8")  # noqa: SIM115 - closing it fails, as writing does
+    with kind(out, notes) as display:
+        display.update(view(live))
+        display.estimate(report())
+        display.close(view(live))
+    assert "lines of output are missing: No space left on device" in notes.getvalue()
+    with pytest.raises(OSError, match="No space"):
+        out.close()
+
+
+@pytest.mark.parametrize("kind", [PlainDisplay, JsonDisplay])
+def test_notes_that_nobody_can_read_do_not_end_the_rig(kind):
+    reader, writer = os.pipe()
+    os.close(reader)
+    notes = open(writer, "w", encoding="utf-8")  # noqa: SIM115 - closing it fails, as writing does
+    with kind(io.StringIO(), notes) as display:
+        display.note("record ended by signal 9")
+    with pytest.raises(BrokenPipeError):
+        notes.close()

@@ -1,0 +1,63 @@
+"""Standard input, output and error, which a caller may have closed, or given an encoding without our characters."""
+
+import os
+import sys
+
+#: The three, by their descriptors, with the mode in which Python opens each.
+_FILES = (("stdin", "r"), ("stdout", "w"), ("stderr", "w"))
+
+
+class OutputError(Exception):
+    """Standard output cannot be written; the message has the reason."""
+
+
+def secure() -> None:
+    """Opens those that are closed on /dev/null, and lets no character be an error.
+
+    A closed one is taken by the next file that is opened: the fork server then closes a pipe of ours, or writes to it.
+    """
+    for descriptor, (name, mode) in enumerate(_FILES):
+        try:
+            os.fstat(descriptor)
+        except OSError:
+            null = os.open(os.devnull, os.O_RDWR)  # gets the lowest number that is free, which is this one
+            os.set_inheritable(null, True)
+        if getattr(sys, name) is None:
+            setattr(sys, name, os.fdopen(descriptor, mode, encoding="utf-8", closefd=False))
+    sys.stdout.reconfigure(errors="replace")  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def flush() -> None:
+    """Writes what is left of the output.
+
+    Raises:
+        BrokenPipeError: its reader is gone.
+        OutputError: it cannot be written, as on a full disk.
+    """
+    try:
+        sys.stdout.flush()
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        discard()
+        raise _output_error(error) from None
+
+
+def blamed(error: Exception) -> Exception:
+    """The error that ends a command: OutputError if it was of standard output, else the error itself."""
+    if isinstance(error, OSError):
+        try:
+            print(flush=True)  # fails again
+        except OSError as same:
+            discard()
+            return _output_error(same)
+    return error
+
+
+def discard() -> None:
+    """Lets what is still buffered go nowhere; without this the interpreter would complain about it when it exits."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _output_error(error: OSError) -> OutputError:
+    return OutputError(f"standard output cannot be written: {error.strerror}")
