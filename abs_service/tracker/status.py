@@ -94,7 +94,7 @@ def _seen(fits: Sequence[SensorFit], lost: bool, limits: Settings) -> Iterator[s
             "take away what hides the object, or add a camera on another side"
         )
     if not disagree:
-        yield from _contradicted(fits, limits)
+        yield from _contradicted(fits)
     counts = most_agreeing(fits)
     if not (disagree or hidden) and counts.agreeing < limits.degraded_agreeing * counts.expected:
         cause = max(_ABSENT, key=counts.share)
@@ -104,11 +104,11 @@ def _seen(fits: Sequence[SensorFit], lost: bool, limits: Settings) -> Iterator[s
         )
 
 
-def _contradicted(fits: Sequence[SensorFit], limits: Settings) -> Iterator[str]:
-    """Reasons by sensors of distances that contradict the others: many colours that agree do not outvote them."""
+def _contradicted(fits: Sequence[SensorFit]) -> Iterator[str]:
+    """Reasons by sensors of distances most of which contradict the others: colours that agree do not outvote them."""
     for fit in (fit for fit in fits if fit.is_surprised or np.isfinite(fit.remainder.share)):
         judged = fit.counts.agreeing + fit.counts.disagreeing
-        if judged >= MIN_JUDGED and fit.counts.agreeing < limits.degraded_below * judged:
+        if judged >= MIN_JUDGED and fit.counts.agreeing < judged / 2:
             yield f"only {fit.counts.agreeing / judged:.0%} of the distances of {fit.sensor} agree – {_FOLLOW}"
 
 

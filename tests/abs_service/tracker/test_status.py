@@ -173,7 +173,7 @@ def depth(name: str, agreeing: int, disagreeing: int, share: float = 0.0, surpri
 
 def test_colors_that_agree_do_not_outvote_distances_that_do_not():
     colors = replace(fit(0.95), counts=VertexCounts(facing=10_000, agreeing=9_500, disagreeing=500))
-    assert judge([depth("tof", 180, 120), colors], (), SHAPE, 0.0, SETTINGS) == (Status.TRACKING, ())
+    assert judge([depth("tof", 151, 149), colors], (), SHAPE, 0.0, SETTINGS) == (Status.TRACKING, ())
     status, reasons = judge([depth("tof", 115, 185), colors], (), SHAPE, 0.0, SETTINGS)
     assert (status, facts(reasons)) == (Status.DEGRADED, ("only 38% of the distances of tof agree",))
     assert judge([depth("tof", 5, 14), colors], (), SHAPE, 0.0, SETTINGS)[0] == Status.TRACKING, "too few say nothing"
