@@ -56,9 +56,9 @@ class Mesh:
     def normals(self) -> NDArray[np.float64]:
         """Unit vertex normals (n, 3), the area-weighted mean of the adjacent faces' normals."""
         face_normals = area_vectors(self.vertices, self.faces)
-        normals = np.zeros_like(self.vertices)
-        for corner in range(3):
-            np.add.at(normals, self.faces[:, corner], face_normals)
+        corners, n = self.faces.T.ravel(), len(self.vertices)
+        sums = [np.bincount(corners, np.tile(column, 3), n) for column in face_normals.T]
+        normals = np.stack(sums, axis=1)
         return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
 
     def reordered(self, order: NDArray[np.integer]) -> "Mesh":

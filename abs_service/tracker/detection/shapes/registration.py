@@ -221,12 +221,15 @@ def _rows(
         scale: [m].
         share: factor of all costs.
     """
-    directions = np.broadcast_to(directions, (len(arms), gaps.shape[1], 3))
-    jacobian = np.concatenate([np.cross(arms[:, None], directions), directions], axis=2).reshape(-1, 6)
+    (a, b, c), (d, e, f) = arms.T[..., None], np.moveaxis(directions, 2, 0)
+    jacobian = np.empty((*gaps.shape, 6))
+    # The cross product, column by column: `np.cross` takes four times as long for so few.
+    jacobian[..., 0], jacobian[..., 1], jacobian[..., 2] = b * f - c * e, c * d - a * f, a * e - b * d
+    jacobian[..., 3:] = directions
     length = np.linalg.norm(gaps, axis=1)
     weight = share / np.maximum(length / scale, 1)
     cost = share * scale * np.where(length < scale, length**2 / (2 * scale), length - scale / 2)
-    return gaps.reshape(-1), jacobian, np.repeat(weight, gaps.shape[1]), cost
+    return gaps.reshape(-1), jacobian.reshape(-1, 6), np.repeat(weight, gaps.shape[1]), cost
 
 
 def _turn(camera: Camera, T_ro: Pose) -> float:

@@ -34,7 +34,8 @@ class Samples:
 
 def farthest_first(points: NDArray[np.float64], count: int) -> NDArray[np.intp]:
     """Indices (k,) of evenly spread points among (n, d): each is the farthest from all before it (Gonzalez, 1985)."""
-    centred = (points - points.mean(axis=0)).T.astype(np.float32)  # as columns, which are summed fastest
+    # One column of memory for each coordinate: short rows are summed eight times as slowly.
+    centred = np.ascontiguousarray((points - points.mean(axis=0)).T, np.float32)
     chosen = np.empty(min(count, len(points)), np.intp)
     away = np.full(len(points), np.inf, np.float32)
     following = int(np.argmax(np.sum(centred**2, axis=0)))
