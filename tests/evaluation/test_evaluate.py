@@ -28,9 +28,9 @@ def experiment(monkeypatch: pytest.MonkeyPatch) -> Callable[..., types.SimpleNam
     """Makes experiments `good` and, if told to, others by what they do."""
     made: dict[str, object] = {}
 
-    def add(name: str, run: Callable[[Settings, Context], Findings]) -> None:
+    def add(name: str, run: Callable[[Settings, Context], Findings], group: str = "method") -> None:
         made[name] = types.SimpleNamespace(
-            __name__=f"evaluation.method.{name}", TITLE=f"X: {name}", Settings=Settings, QUICK=Settings(3), run=run
+            __name__=f"evaluation.{group}.{name}", TITLE=f"X: {name}", Settings=Settings, QUICK=Settings(3), run=run
         )
 
     monkeypatch.setattr(running, "available", lambda: made)
@@ -176,6 +176,7 @@ def test_folders_that_cannot_be_are_named(
 
 def test_every_experiment_of_the_program_is_complete() -> None:
     for name, one in running.available().items():
+        assert running.group(one) in running.GROUPS, name
         assert isinstance(one.QUICK, one.Settings), name
         assert one.TITLE, name
         assert callable(one.run), name
@@ -201,12 +202,20 @@ def test_the_header_of_every_experiment_states_goals_and_seeds():
     assert [name for name, text in headers.items() if "goal" not in text or "seeds" not in text] == []
 
 
-def test_a_group_is_all_of_its_experiments_and_two_run_beside_each_other(tmp_path: Path, capsys) -> None:
-    assert __main__.main(["inputs", "--quick", "--jobs", "0"]) == Exit.USER
+def test_a_group_is_all_of_its_experiments(experiment, tmp_path: Path) -> None:
+    for name in ("first", "second"):
+        experiment(name, found(2.5), group="inputs")
+    experiment("other", found(2.5))
+    assert __main__.main(["second", "inputs", "--out", str(tmp_path)]) == Exit.OK
+    assert {path.name for path in tmp_path.iterdir() if path.is_dir()} == {"first", "second"}
+
+
+def test_two_run_beside_each_other_and_find_what_they_find_alone(tmp_path: Path, capsys) -> None:
+    chosen = ["--quick", "--seed", "3"]
+    assert __main__.main(["noise_fits", *chosen, "--jobs", "0"]) == Exit.USER
     assert "--jobs 0: must be 1 or more" in capsys.readouterr().err
-    code = __main__.main(["bayer", "inputs", "--quick", "--seed", "3", "--jobs", "2", "--out", str(tmp_path)])
-    assert code == Exit.OK
-    beside = json.loads((tmp_path / "bayer/report.json").read_text())
-    assert {path.name for path in tmp_path.iterdir() if path.is_dir()} >= {"bayer", "sensors", "warping"}
-    __main__.main(["bayer", "--quick", "--seed", "3", "--out", str(tmp_path / "alone")])
-    assert json.loads((tmp_path / "alone/bayer/report.json").read_text())["verdicts"] == beside["verdicts"]
+    assert __main__.main(["noise_fits", "squares", *chosen, "--jobs", "2", "--out", str(tmp_path)]) == Exit.OK
+    assert (tmp_path / "squares/report.json").exists()
+    beside = json.loads((tmp_path / "noise_fits/report.json").read_text())
+    assert __main__.main(["noise_fits", *chosen, "--out", str(tmp_path / "alone")]) == Exit.OK
+    assert json.loads((tmp_path / "alone/noise_fits/report.json").read_text())["verdicts"] == beside["verdicts"]
