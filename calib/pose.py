@@ -6,6 +6,8 @@ from numpy.typing import ArrayLike, NDArray
 
 Pose = NDArray[np.float64]
 
+_EYE = np.eye(4)
+
 #: Cross-product matrices (3, 3, 3) of the axes: `_CROSS[k] @ v` is the k-th axis × v.
 _CROSS = np.cross(np.eye(3)[:, None], np.eye(3)).transpose(0, 2, 1)
 
@@ -112,7 +114,12 @@ def is_pose(T_ab: NDArray[np.float64], tolerance: float = 1e-6) -> bool:
     rotation = T_ab[:3, :3]
     return bool(
         np.all(np.isfinite(T_ab))
-        and np.allclose(rotation @ rotation.T, np.eye(3), atol=tolerance)
+        and _is_near(rotation @ rotation.T, _EYE[:3, :3], tolerance)
         and np.linalg.det(rotation) > 0
-        and np.allclose(T_ab[3], (0, 0, 0, 1), atol=tolerance)
+        and _is_near(T_ab[3], _EYE[3], tolerance)
     )
+
+
+def _is_near(found: NDArray[np.float64], wanted: NDArray[np.float64], tolerance: float) -> bool:
+    """As `np.allclose` of finite numbers, in a tenth of the time: a calibration checks thousands of poses."""
+    return bool(np.all(np.abs(found - wanted) <= tolerance + 1e-5 * np.abs(wanted)))

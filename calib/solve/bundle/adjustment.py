@@ -168,14 +168,16 @@ def _stage(equations: Equations) -> tuple[NDArray[np.float64], bool]:
     """Increments after at most `STEPS` steps in coordinates scaled by the curvature; True if converged."""
     start = np.zeros(equations.layout.size)
     residuals = equations.residuals(start)
+    first = equations.jacobian(start)
     # Weighted like the robust loss, so that a few gross errors do not dominate the curvature.
     weights = sparse.diags_array(np.sqrt(robust.influence(residuals) / np.where(residuals == 0, 1, residuals)))
-    curvature = require_touched(_normal(weights @ equations.jacobian(start)), equations.layout.names)
+    curvature = require_touched(_normal(weights @ first), equations.layout.names)
     factor = linalg.cholesky(curvature + DAMPING * np.diag(np.diag(curvature)), lower=True)
     metric = linalg.solve_triangular(factor.T, np.eye(len(factor)))
 
     def derivatives(steps: NDArray[np.float64]) -> Any:  # SciPy's operator product has no public type
-        return aslinearoperator(equations.jacobian(metric @ steps)) @ aslinearoperator(metric)
+        jacobian = equations.jacobian(metric @ steps) if steps.any() else first
+        return aslinearoperator(jacobian) @ aslinearoperator(metric)
 
     found = least_squares(
         lambda steps: equations.residuals(metric @ steps),

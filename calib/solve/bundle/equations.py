@@ -1,6 +1,6 @@
 """All residuals of a calibration and their sparse Jacobian, as functions of increments of the parameters."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -14,7 +14,10 @@ from calib.solve.bundle import motion, rotations
 from calib.solve.bundle.blocks import Corners, JacobianBlocks, Planes
 from calib.solve.bundle.motion import ShotPoses, ViewPoses
 from calib.solve.bundle.parameters.layout import DEPTH_TERMS, POSE, Layout
-from calib.solve.bundle.parameters.state import State
+from calib.solve.bundle.parameters.state import SensorState, State
+
+#: Sensors by their names.
+Sensors = Mapping[str, SensorState]
 
 
 @dataclass(frozen=True)
@@ -69,18 +72,18 @@ class Equations:
     def residuals(self, increments: NDArray[np.float64]) -> NDArray[np.float64]:
         """All residuals; infinite where the increments give an invalid camera or a board behind it."""
         try:
-            state = self.layout.move(self.base, increments)
+            sensors = self.layout.sensors(self.base, increments)
             boards = self._boards(increments)
-            parts = [_residuals(group, state, self._placed(group, state, boards)) for group in self.groups]
+            parts = [_residuals(group, sensors, self._placed(group, sensors, boards)) for group in self.groups]
         except (CameraError, LensError):
             return np.full(self.ends[-1] + len(self._regularized_columns), np.inf)
-        return np.concatenate([*parts, self._regularized(state)])
+        return np.concatenate([*parts, self._regularized(sensors)])
 
     def jacobian(self, increments: NDArray[np.float64]) -> sparse.csr_array:
         """Sparse Jacobian of `residuals` with respect to the increments."""
-        state = self.layout.move(self.base, increments)
+        sensors = self.layout.sensors(self.base, increments)
         boards = self._boards(increments)
-        blocks = [self._rows(group, state, boards, increments) for group in self.groups]
+        blocks = [self._rows(group, sensors, boards, increments) for group in self.groups]
         count = len(self._regularized_columns)
         regularized = (1 / self._prior_sigmas, (np.arange(count), self._regularized_columns))
         return sparse.csr_array(
@@ -109,12 +112,12 @@ class Equations:
     def _prior_sigmas(self) -> NDArray[np.float64]:
         return np.array([sigma for free in self.layout.free_parameters.values() for sigma in free.priors.values()])
 
-    def _regularized(self, state: State) -> NDArray[np.float64]:
+    def _regularized(self, sensors: Sensors) -> NDArray[np.float64]:
         """Normalised values of the regularised parameters; appended to the residuals of the groups."""
         values = [
-            getattr(state.sensors[name], each)
+            getattr(sensors[name], each)
             if each in DEPTH_TERMS
-            else state.sensors[name].camera.lens.coefficients[free.kind.every.index(each)]
+            else sensors[name].camera.lens.coefficients[free.kind.every.index(each)]
             for name, free in self.layout.free_parameters.items()
             for each in free.priors
         ]
@@ -131,14 +134,16 @@ class Equations:
         left_jacobians = rotations.left_jacobian(steps[:, :3])
         return ShotPoses(turned, poses[:, :3, 3] + steps[:, 3:], left_jacobians, self.shot_times)
 
-    def _placed(self, group: Group, state: State, boards: ShotPoses) -> ViewPoses:
+    def _placed(self, group: Group, sensors: Sensors, boards: ShotPoses) -> ViewPoses:
         if group.shots.ndim == 1:
             return motion.at_shots(boards, group.shots)
-        return motion.between_shots(boards, group.shots, group.times + state.sensors[group.sensor].time_offset)
+        return motion.between_shots(boards, group.shots, group.times + sensors[group.sensor].time_offset)
 
-    def _rows(self, group: Group, state: State, boards: ShotPoses, increments: NDArray[np.float64]) -> sparse.csr_array:
-        sensor = state.sensors[group.sensor]
-        placed = self._placed(group, state, boards)
+    def _rows(
+        self, group: Group, sensors: Sensors, boards: ShotPoses, increments: NDArray[np.float64]
+    ) -> sparse.csr_array:
+        sensor = sensors[group.sensor]
+        placed = self._placed(group, sensors, boards)
         if isinstance(group.measured, Corners):
             blocks = group.measured.jacobian_blocks(sensor.camera, placed)
         else:
@@ -167,8 +172,8 @@ class Equations:
         return np.concatenate(parts, axis=1), self.layout.columns(name, free.names)
 
 
-def _residuals(group: Group, state: State, placed: ViewPoses) -> NDArray[np.float64]:
-    sensor = state.sensors[group.sensor]
+def _residuals(group: Group, sensors: Sensors, placed: ViewPoses) -> NDArray[np.float64]:
+    sensor = sensors[group.sensor]
     if isinstance(group.measured, Corners):
         return group.measured.residuals(sensor.camera, placed)
     return group.measured.residuals(sensor.camera, placed, sensor.depth_offset, sensor.depth_scale)

@@ -1,6 +1,7 @@
 """Textures: colour and infra-red reflectivity over material coordinates."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +33,7 @@ class Texture:
         )
 
 
+@lru_cache(maxsize=32)  # of 2 MB or less; filtering them takes most of the time in which a simulation starts
 def smooth_pattern(
     seed: int,
     width: float,
@@ -62,6 +64,7 @@ def smooth_pattern(
     return Texture(texels, density)
 
 
+@lru_cache(maxsize=4)  # of 6 MB
 def fine_pattern(
     seed: int, width: float, height: float, color: Range, infrared: Range, density: float = 2500.0
 ) -> Texture:

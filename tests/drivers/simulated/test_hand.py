@@ -45,8 +45,11 @@ def clearance(points: np.ndarray, capsules: np.ndarray) -> np.ndarray:
 def march(rays: np.ndarray, capsules: np.ndarray) -> np.ndarray:
     """Distance to the capsules by ray marching (reference); beyond 2 m for a miss."""
     distance = np.zeros(rays.shape[:-1])
+    underway = np.ones(distance.shape, bool)
     for _ in range(2000):  # a ray that grazes a capsule takes a thousand small steps
-        distance = np.minimum(distance + clearance(rays * distance[..., None], capsules), 3.0)
+        step = clearance(rays[underway] * distance[underway][:, None], capsules)
+        distance[underway] = np.minimum(distance[underway] + step, 3.0)
+        underway[underway] = (np.abs(step) > 1e-9) & (distance[underway] < 3.0)
     return distance
 
 

@@ -71,8 +71,7 @@ class Scene:
     def thinned(self, count: int) -> "Scene":
         """The same scene with about so many points."""
         points = self.points[np.random.default_rng(0).permutation(len(self.points))[:count]]
-        tree = scipy.spatial.KDTree(points)
-        return Scene(points, tree, self.camera, self.background, self.gap, self.scale)
+        return Scene(points, scipy.spatial.KDTree(points), self.camera, self.background, self.gap, self.scale)
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,8 +142,14 @@ def _scene(detection: InitialDetection) -> Scene:
     background = np.where(np.isnan(around), np.inf if is_empty else np.nan, around)
     gap = max(MIN_GAP_M, GAP_DEVIATIONS * deviation)
     points = detection.points
-    tree = scipy.spatial.KDTree(points)
-    return Scene(points, tree, camera, np.where(near, np.nan, background), gap, max(MIN_ERROR_M, deviation))
+    return Scene(
+        points,
+        scipy.spatial.KDTree(points),
+        camera,
+        np.where(near, np.nan, background),
+        gap,
+        max(MIN_ERROR_M, deviation),
+    )
 
 
 def _starts(scene: Scene, samples: Samples) -> list[Pose]:

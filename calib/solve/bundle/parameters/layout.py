@@ -108,9 +108,13 @@ class Layout:
         """State after increments (size,)."""
         boards = increments[self.board_start :].reshape(-1, 6)
         return State(
-            {name: self._moved(name, sensor, increments) for name, sensor in state.sensors.items()},
+            self.sensors(state, increments),
             {shot: turned(state.boards[shot], step) for shot, step in zip(self.shots, boards, strict=True)},
         )
+
+    def sensors(self, state: State, increments: NDArray[np.float64]) -> dict[str, SensorState]:
+        """Sensors of a state after increments (size,)."""
+        return {name: self._moved(name, sensor, increments) for name, sensor in state.sensors.items()}
 
     def _moved(self, name: str, sensor: SensorState, increments: NDArray[np.float64]) -> SensorState:
         free = self.free_parameters[name]
