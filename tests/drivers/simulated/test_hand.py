@@ -49,7 +49,7 @@ def march(rays: np.ndarray, capsules: np.ndarray) -> np.ndarray:
     for _ in range(2000):  # a ray that grazes a capsule takes a thousand small steps
         step = clearance(rays[underway] * distance[underway][:, None], capsules)
         distance[underway] = np.minimum(distance[underway] + step, 3.0)
-        underway[underway] = (np.abs(step) > 1e-9) & (distance[underway] < 3.0)
+        underway[underway] = (np.abs(step) > 1e-7) & (distance[underway] < 3.0)
     return distance
 
 

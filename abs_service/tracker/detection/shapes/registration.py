@@ -140,16 +140,9 @@ def _scene(detection: InitialDetection) -> Scene:
     around = detection.surroundings if detection.surroundings.size else np.full_like(distance, np.nan)
     is_empty = np.count_nonzero(np.isnan(around[~near])) > np.count_nonzero(~near) / 2
     background = np.where(np.isnan(around), np.inf if is_empty else np.nan, around)
-    gap = max(MIN_GAP_M, GAP_DEVIATIONS * deviation)
-    points = detection.points
-    return Scene(
-        points,
-        scipy.spatial.KDTree(points),
-        camera,
-        np.where(near, np.nan, background),
-        gap,
-        max(MIN_ERROR_M, deviation),
-    )
+    gap, scale = max(MIN_GAP_M, GAP_DEVIATIONS * deviation), max(MIN_ERROR_M, deviation)
+    points, tree = detection.points, scipy.spatial.KDTree(detection.points)
+    return Scene(points, tree, camera, np.where(near, np.nan, background), gap, scale)
 
 
 def _starts(scene: Scene, samples: Samples) -> list[Pose]:
