@@ -1,10 +1,11 @@
 """Opens devices and other programs' recordings, and discovers attached devices; a scheme names a driver module."""
 
 import importlib
+import importlib.metadata
 import pkgutil
 from collections.abc import Callable
 from concurrent.futures import Future
-from importlib.metadata import entry_points
+from functools import cache
 from pathlib import Path
 from threading import Thread
 from types import ModuleType
@@ -88,6 +89,12 @@ def _result(scheme: str, search: Future[list[Found]], timeout_s: float) -> list[
     except Exception as error:
         reason = f"the driver broke while looking: {error!r}"
     return [Found(DeviceInfo(f"{scheme}://", scheme, ""), Availability.FAULTY, reason, "please report this")]
+
+
+@cache
+def entry_points(group: str) -> importlib.metadata.EntryPoints:
+    """Entry points of installed distributions; looked for once, as that reads something of each of them."""
+    return importlib.metadata.entry_points(group=group)
 
 
 def _modules() -> dict[str, str]:

@@ -8,6 +8,7 @@ import json
 import pkgutil
 from collections.abc import Iterator
 from dataclasses import fields, replace
+from functools import cache
 from importlib import import_module
 from importlib.metadata import distributions, entry_points
 from pathlib import Path
@@ -70,7 +71,7 @@ def settings(module: str, table: Any, base: Path) -> Any:
             problems += [problem.under((key,)) for problem in error.problems]
     try:
         # JSON in strict mode is TOML's own type system: lists become tuples, but "3" is not a number.
-        made = TypeAdapter(Settings).validate_json(json.dumps(table, default=str), strict=True)
+        made = _adapter(Settings).validate_json(json.dumps(table, default=str), strict=True)
     except ValidationError as error:
         raise ProblemsError(problems + from_pydantic(error, lambda _: allowed)) from None
     if problems:
@@ -78,6 +79,12 @@ def settings(module: str, table: Any, base: Path) -> Any:
     values = {field.name: getattr(made, field.name) for field in fields(Settings)}
     paths = {name: base / value for name, value in values.items() if isinstance(value, Path)}
     return replace(made, **paths, **nested)
+
+
+@cache
+def _adapter(Settings: type) -> TypeAdapter[Any]:
+    """Of `Settings` of one module, made once: a rig file has some of them, and making one takes milliseconds."""
+    return TypeAdapter(Settings)
 
 
 def with_parts(made: Any) -> Iterator[Any]:
@@ -121,5 +128,5 @@ def table(made: Any) -> dict[str, Any]:
 
 def plain(made: Any) -> dict[str, Any]:
     """The TOML table that `settings` makes the same settings from."""
-    values = TypeAdapter(type(made)).dump_python(made, mode="json", exclude_none=True)
+    values = _adapter(type(made)).dump_python(made, mode="json", exclude_none=True)
     return values | {name: table(getattr(made, name)) for name in _nested(made)}
