@@ -53,9 +53,14 @@ def solved(seen: Sequence[CornerView]) -> Solution:
     return calibrate(task(seen))
 
 
+@cache
+def solved_once() -> Solution:
+    return solved(repeated(views(), 1))
+
+
 @pytest.mark.parametrize(("times", "noise"), [(2, "the same"), (2, "fresh"), (5, "fresh")])
 def test_the_same_views_again_do_not_make_a_calibration_trusted(times: int, noise: str) -> None:
-    once = assess(solved(repeated(views(), 1)), 1.0, 1.0)
+    once = assess(solved_once(), 1.0, 1.0)
     again = assess(solved(repeated(views(), times, noise)), 1.0, 1.0)
     assert not once.trusted
     assert not again.trusted, again.verdict
@@ -65,7 +70,7 @@ def test_the_same_views_again_do_not_make_a_calibration_trusted(times: int, nois
 
 
 def test_the_same_views_again_do_not_make_deviations_smaller() -> None:
-    once, again = solved(repeated(views(), 1)), solved(repeated(views(), 3, "the same"))
+    once, again = solved_once(), solved(repeated(views(), 3, "the same"))
     for before, after in zip(once.parameters[:9], again.parameters[:9], strict=True):
         assert after.sigma == pytest.approx(before.sigma, rel=0.03), before.name
 

@@ -171,22 +171,19 @@ def test_the_gripper_line_is_found_in_a_depth_image(stiffness, degrees):
     assert width < 3e-3
 
 
-@pytest.mark.parametrize("stiffness", [0.005, 0.02])
-def test_lengths_scatter_as_they_say_they_do(stiffness):
-    """Regression: the gripper's end of a strip that sags by 80° turned away from the camera, 50 mm too long."""
+@pytest.mark.parametrize("stiffness", [0.005, 0.02, 0.08])
+def test_lengths_and_loads_of_a_first_frame_scatter_as_they_say_they_do(stiffness):
+    """Regressions: the gripper's end of a strip that sags by 80° turned away from the camera, 50 mm too long.
+
+    Mixed pixels at the rim bent the fitted strip, whose stiffness was up to a third too small.
+    """
     cases = [seen(f"simulated://strip?seed={seed}&stiffness={stiffness}", 0) for seed in range(1, 13)]
     found = [find_strip(case.detection, DOWN, -DOWN) for case in cases]
     errors = np.array([(one.length - 0.30) / one.length_deviation for one in found])
     assert np.sqrt(np.mean(errors**2)) < 1.2
     assert np.abs(errors).max() < 3
-
-
-@pytest.mark.parametrize("stiffness", [0.02, 0.08])
-def test_the_load_that_a_first_frame_shows_scatters_as_it_says(stiffness):
-    """Regression: mixed pixels at the rim bent the fitted strip, whose stiffness was up to a third too small."""
-    cases = [seen(f"simulated://strip?seed={seed}&stiffness={stiffness}", 0) for seed in range(1, 13)]
-    found = [find_strip(case.detection, DOWN, -DOWN) for case in cases]
-    # To first order, the bending angle of a strip is proportional to the load.
+    if stiffness < 0.02:  # where a strip sags that much, the bending angle is not proportional to the load
+        return
     turned = [np.ptp(case.strip.profile.angle) for case in cases]
     errors = np.array([np.log(abs(one.turn[-1]) / true) for one, true in zip(found, turned)])
     said = np.array([one.load_deviation for one in found])
