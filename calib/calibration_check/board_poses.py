@@ -34,8 +34,13 @@ def solve(stored: Stored, views: Views, moving: Collection[str]) -> Solution:
         raise NotSolvedError(f"{error}{unlike_the_rest(equations.task, start)}", error.unfinished) from error
 
 
-def formulation(stored: Stored, views: Views, moving: Collection[str], depth: Collection[str] = ()) -> Formulation:
-    """Equations with free boards, free poses of `moving` sensors, and free depth terms of `depth` sensors."""
+def formulation(
+    stored: Stored, views: Views, moving: Collection[str], depth: Collection[str] = (), *, uncertain: bool = False
+) -> Formulation:
+    """Equations with free boards, free poses of `moving` sensors, and free depth terms of `depth` sensors.
+
+    With `uncertain`, intrinsics with stored deviations are free as well.
+    """
     names = list(views.shots)
     sensors = {name: _task(stored.sensors[name].camera) for name in names}
     whole = formulate(Task(sensors, views.corners, views.planes, names[0]))
@@ -43,6 +48,8 @@ def formulation(stored: Stored, views: Views, moving: Collection[str], depth: Co
         name: FreeParameters(sensors[name].lens, (), name in moving, DEPTH_TERMS if name in depth else ())
         for name in names
     }
+    if uncertain:
+        free_parameters = {name: stored.uncertain(name, free) for name, free in free_parameters.items()}
     return replace(whole, layout=Layout(free_parameters, whole.layout.shots))
 
 

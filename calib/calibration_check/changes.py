@@ -7,7 +7,7 @@ from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy import linalg, stats
 
 from calib import pose
 from calib.calibration_check.board_poses import formulation, solve
@@ -15,7 +15,7 @@ from calib.calibration_check.stored import Stored, Views
 from calib.camera import Camera
 from calib.pose import Pose
 from calib.solve.bundle import rotations
-from calib.solve.bundle.adjustment import NotSolvedError
+from calib.solve.bundle.adjustment import Adjustment, NotSolvedError
 from calib.solve.bundle.parameters.layout import POSE
 from calib.solve.solution import Solution
 from calib.solve.validation.contradictions import Contradiction, contradictions
@@ -83,7 +83,7 @@ def _change(stored: Stored, views: Views, pair: tuple[str, str]) -> PairChange:
     turn = rotations.logarithm((after.T_rs[:3, :3] @ before.T_rs[:3, :3].T)[None])[0]
     move = after.T_rs[:3, 3] - before.T_rs[:3, 3]
     columns = adjusted.layout.columns(second, POSE)
-    covariance = adjusted.covariance[np.ix_(columns, columns)] + _relative_covariance(stored, *pair)
+    covariance = adjusted.covariance[np.ix_(columns, columns)] + _stored_covariance(stored, views, pair, adjusted)
     change = np.concatenate([turn, move])
     points = _points(adjusted.state.boards, before, views, second)
     spread = [_shift(before, points, column) for column in np.linalg.cholesky(covariance).T]
@@ -131,25 +131,43 @@ def _without_minimum(stored: Stored, views: Views, pair: tuple[str, str], error:
         yield solve(stored, views, ())
 
 
-def _relative_covariance(stored: Stored, first: str, second: str) -> NDArray[np.float64]:
-    """Stored covariance (6, 6) of the second sensor's pose relative to the first; zero if unknown.
+def _stored_covariance(stored: Stored, views: Views, pair: tuple[str, str], found: Adjustment) -> NDArray[np.float64]:
+    """Covariance (6, 6) of the change that errors of the stored calibration make; zero if they are unknown.
 
-    A rotation of the first sensor translates the second relative to it.
+    A stored pose that is wrong is a change. Stored intrinsics and depth terms that are wrong turn and move the sensor
+    in both solves, which cancels where the boards are as at calibration; the rest is what these views make of it.
     """
     if stored.covariance is None:
         return np.zeros((6, 6))
-    lever = stored.sensors[second].camera.center - stored.sensors[first].camera.center
+    names, by_kept = _by_kept(stored, views, pair, found)
+    rows, blocks = [stored.names.index(name) for name in names], [by_kept]
+    # A rotation of the first sensor translates the second relative to it.
+    lever = stored.sensors[pair[1]].camera.center - stored.sensors[pair[0]].camera.center
     carried = np.eye(6)
     carried[3:, :3] = -rotations.cross(lever[None])[0]
-    rows, blocks = [], []
-    for sensor, block in ((first, -carried), (second, np.eye(6))):
+    for sensor, block in ((pair[0], -carried), (pair[1], np.eye(6))):
         own = stored.of_pose(sensor)
         rows += own
-        blocks += [block] if own else []
-    if not rows:
-        return np.zeros((6, 6))
+        blocks += [-block] if own else []
     change = np.concatenate(blocks, axis=1)
     return change @ stored.covariance[np.ix_(rows, rows)] @ change.T
+
+
+def _by_kept(
+    stored: Stored, views: Views, pair: tuple[str, str], found: Adjustment
+) -> tuple[list[str], NDArray[np.float64]]:
+    """Names of the kept parameters of two sensors with stored deviations (k,), and the pose found by them (6, k)."""
+    depth = {view.sensor for view in views.planes}
+    equations = formulation(stored, views, pair[1:], depth, uncertain=True)(found.state, found.factors)
+    layout = equations.layout
+    poses = layout.columns(pair[1], POSE)
+    free = np.concatenate([poses, np.arange(layout.board_start, layout.size)])
+    columns = {name: column for column, name in enumerate(layout.names[: layout.board_start])}
+    kept = np.array([each for name, each in columns.items() if name in stored.names and each not in poses], np.intp)
+    jacobian = equations.jacobian(np.zeros(layout.size))
+    curvature = (jacobian.T @ jacobian).toarray()
+    found_by = -linalg.solve(curvature[np.ix_(free, free)], curvature[np.ix_(free, kept)], assume_a="pos")
+    return [layout.names[column] for column in kept], found_by[: len(poses)]
 
 
 def _points(boards: Mapping[int, Pose], camera: Camera, views: Views, sensor: str) -> NDArray[np.float64]:

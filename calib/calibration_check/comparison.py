@@ -112,14 +112,20 @@ def compare(stored: Stored, views: Views) -> Comparison:
 
 
 def _stored_changes(stored: Stored, names: Sequence[str]) -> Array:
-    """Changes (n, k) by one deviation each of the stored calibration's undetermined directions."""
+    """Changes (n, k) by one deviation each of the stored calibration's undetermined directions.
+
+    Intrinsics are among them: a principal point and a turn that were stored wrong together move no picture.
+    """
     known = [name for name in stored.names if name in names]
     if stored.covariance is None or not known:
         return np.zeros((len(names), 0))
     rows = [stored.names.index(name) for name in known]
-    variances, directions = linalg.eigh(stored.covariance[np.ix_(rows, rows)])
+    covariance = stored.covariance[np.ix_(rows, rows)]
+    # Pixels and radians differ by more digits than the decomposition has.
+    sigmas = np.sqrt(np.diag(covariance))
+    variances, directions = linalg.eigh(covariance / np.outer(sigmas, sigmas))
     changes = np.zeros((len(names), len(known)))
-    changes[[names.index(name) for name in known]] = directions * np.sqrt(np.maximum(variances, 0))
+    changes[[names.index(name) for name in known]] = sigmas[:, None] * directions * np.sqrt(np.maximum(variances, 0))
     return changes
 
 

@@ -67,7 +67,7 @@ def hypotheses(stored: Stored, names: Sequence[str]) -> list[Hypothesis]:
 
     Args:
         stored: the calibration.
-        names: of the changes that the views can show, such as `tof.x`.
+        names: of the changes that the views can show, such as `tof.x`; intrinsics among them do not change.
     """
     sensors = [*dict.fromkeys(name.rpartition(".")[0] for name in names)]
     found = [Hypothesis(Kind.UNCHANGED)]
@@ -79,7 +79,8 @@ def hypotheses(stored: Stored, names: Sequence[str]) -> list[Hypothesis]:
     for name in sensors:
         if f"{name}.depth_scale" in names:
             found += [_hypothesis(kind, (name,), terms, names) for kind, terms in TERMS.items()]
-    return [*found, Hypothesis(Kind.SEVERAL, tuple(sensors), (tuple(range(len(names))),))]
+    every = tuple(column for column, name in enumerate(names) if name.rpartition(".")[2] in PRIOR)
+    return [*found, Hypothesis(Kind.SEVERAL, tuple(sensors), (every,))]
 
 
 def _hypothesis(kind: Kind, sensors: tuple[str, ...], terms: Sequence[str], names: Sequence[str]) -> Hypothesis:

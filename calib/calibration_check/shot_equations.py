@@ -2,7 +2,9 @@
 
 The residuals of a shot are r + J x + E e: changes x of the sensors since the calibration, and e ~ N(0, 1), by which
 each view sees the board elsewhere than it is (exposures at different moments, errors that the distances of a view
-share). The pose of the board is eliminated by an orthogonal transformation, which leaves a few rows of every shot.
+share). Among the changes are those of intrinsics with stored deviations: they do not happen, but the stored values are
+wrong by so much. The pose of the board is eliminated by an orthogonal transformation, which leaves a few rows of every
+shot.
 """
 
 from collections.abc import Sequence
@@ -18,6 +20,7 @@ from calib.solve.bundle import robust, rotations
 from calib.solve.bundle.blocks import Corners
 from calib.solve.bundle.equations import Equations
 from calib.solve.bundle.formulation import groups_of
+from calib.solve.bundle.parameters.layout import POSE
 from calib.solve.bundle.parameters.state import State
 
 #: Directions of a board's pose that change a view by less than this part of the others are not seen in it.
@@ -68,7 +71,7 @@ class Linearised:
     """Equations of all shots.
 
     Attributes:
-        names: of the changes (n,), such as `tof.rotation_x` and `tof.depth_scale`.
+        names: of the changes (n,): `tof.rotation_x`, `tof.depth_scale`, also `tof.cx` if its deviation is stored.
         shots: equations of each.
         distance_m: median distance of the boards from the sensors [m].
     """
@@ -96,7 +99,7 @@ def linearise(stored: Stored, views: Views) -> Linearised:
     """
     sensors = list(views.shots)
     found = solve(stored, views, sensors[1:]).state
-    formulated = formulation(stored, views, sensors, {view.sensor for view in views.planes})
+    formulated = formulation(stored, views, sensors, {view.sensor for view in views.planes}, uncertain=True)
     equations = formulated(found, (1.0,) * len(groups_of(formulated.task)))
     offset, radius = _middle(views)
     by_shot: dict[int, list[_View]] = {}
@@ -123,9 +126,8 @@ def _changes(stored: Stored, found: State, equations: Equations) -> Array:
     changes = np.zeros(layout.board_start)
     for name in layout.free_parameters:
         before, after = stored.sensors[name].camera.T_rs, found.sensors[name].camera.T_rs
-        start = layout.starts[name]
-        changes[start : start + 3] = rotations.logarithm((after[:3, :3] @ before[:3, :3].T)[None])[0]
-        changes[start + 3 : start + 6] = after[:3, 3] - before[:3, 3]
+        turn = rotations.logarithm((after[:3, :3] @ before[:3, :3].T)[None])[0]
+        changes[layout.columns(name, POSE)] = np.concatenate([turn, after[:3, 3] - before[:3, 3]])
     return changes
 
 

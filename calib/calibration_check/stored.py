@@ -1,13 +1,14 @@
 """Input of a calibration check: a stored calibration, and new views of a board."""
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from calib.board.views import CornerView, PlaneView
-from calib.solve.bundle.parameters.layout import POSE
+from calib.solve.bundle.parameters.layout import POSE, FreeParameters
+from calib.solve.bundle.parameters.lens_parameters import MATRIX
 from calib.solve.bundle.parameters.state import SensorState
 from calib.solve.start.board_poses import pose_candidates
 
@@ -34,6 +35,13 @@ class Stored:
         """Rows of the covariance of a sensor's pose; empty if it is unknown."""
         wanted = [f"{sensor}.{name}" for name in POSE]
         return [self.names.index(name) for name in wanted] if set(wanted) <= set(self.names) else []
+
+    def uncertain(self, sensor: str, free: FreeParameters) -> FreeParameters:
+        """Free parameters of a sensor, and its intrinsics with stored deviations."""
+        intrinsics = tuple(name for name in (*MATRIX, *free.kind.coefficients) if f"{sensor}.{name}" in self.names)
+        # Deviations do not say whether fy was fixed or followed fx; the latter is what `--fix aspect` is for.
+        follows = "fx" in intrinsics and "fy" not in intrinsics
+        return replace(free, intrinsics=intrinsics, fixed_aspect=follows)
 
 
 @dataclass(frozen=True)
