@@ -95,4 +95,4 @@ def _look(file: ImageFile) -> SensorShot:
         image = image_file.read(file.path)
     except ImageFolderError as error:
         raise ShotsError(str(error)) from error
-    return SensorShot(file.t_ns, image, image)
+    return SensorShot(file.t_ns, image, image, file=file.path)

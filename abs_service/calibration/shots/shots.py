@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import chain, pairwise
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -51,6 +52,7 @@ class SensorShot:
         own_light: True if the image is of the sensor's own illumination.
         distance: radial distances (height, width) [m], NaN without return; `NO_DISTANCE` if it measures none.
         sigma: σ reported by the sensor (height, width) [m], NaN where it reports none.
+        file: image file that it comes from; None if it is of a recording or a device.
     """
 
     t_ns: int
@@ -59,6 +61,7 @@ class SensorShot:
     own_light: bool = False
     distance: NDArray[np.float32] = field(default_factory=lambda: NO_DISTANCE)
     sigma: NDArray[np.float32] = field(default_factory=lambda: NO_DISTANCE)
+    file: Path | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

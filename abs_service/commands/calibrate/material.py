@@ -9,7 +9,7 @@ from pathlib import Path
 
 from abs_service.calibration.files import corner_file, mrcal_corners, target_file
 from abs_service.calibration.files.rig_file import SensorCalibration
-from abs_service.calibration.shots import corner_extraction, unseen
+from abs_service.calibration.shots import corner_extraction, image_sizes, unseen
 from abs_service.calibration.shots.corner_extraction import BoardObservations
 from abs_service.calibration.shots.shot_sources import FolderShots, RecordingShots
 from abs_service.calibration.shots.shots import Shot
@@ -71,7 +71,7 @@ def material(arguments: argparse.Namespace) -> Material:
         known = {name: known.get(name, SensorCalibration(camera, factory=camera)) for name, camera in cameras.items()}
         is_live = live.is_live(arguments.source)
         seen, shot = BoardObservations(), None
-        for shot in skipping.kept(shots, arguments.skip, arguments.source):
+        for shot in image_sizes.checked(skipping.kept(shots, arguments.skip, arguments.source)):
             new = corner_extraction.see(target, shot, cameras)
             if is_live and not live.adds(new, seen):
                 continue

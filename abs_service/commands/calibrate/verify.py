@@ -21,6 +21,7 @@ from pathlib import Path
 from abs_service.calibration.cameras import verification
 from abs_service.calibration.files import target_file
 from abs_service.calibration.files.rig_file import RigCalibration
+from abs_service.calibration.shots import image_sizes
 from abs_service.calibration.shots.corner_extraction import BoardObservations, see
 from abs_service.calibration.shots.shot_sources import FolderShots, RecordingShots
 from abs_service.calibration.shots.shots import Shot
@@ -89,17 +90,20 @@ def _look(arguments: argparse.Namespace, target: Target, known: RigCalibration) 
         if not all(patterns.values()):
             raise VerifyOptionError(f"--images {' '.join(arguments.images)}: each must be NAME=GLOB")
         folders = [*dict.fromkeys(Path(pattern).parent for pattern in patterns.values())]
-        return _see_all(target, skipping.kept(FolderShots(patterns), arguments.skip, None), cameras), folders
+        return _see_all(arguments, target, FolderShots(patterns), cameras), folders
     if live.is_live(arguments.source):
         return _see_live(arguments, target, cameras), [arguments.source]
     shots = RecordingShots(Recording(arguments.source), arguments.every, cameras=cameras)
-    return _see_all(target, skipping.kept(shots, arguments.skip, arguments.source), cameras), [arguments.source]
+    return _see_all(arguments, target, shots, cameras), [arguments.source]
 
 
-def _see_all(target: Target, shots: Iterable[Shot], cameras: Mapping[str, Camera]) -> BoardObservations:
+def _see_all(
+    arguments: argparse.Namespace, target: Target, shots: Iterable[Shot], cameras: Mapping[str, Camera]
+) -> BoardObservations:
     """Observations in all shots, with progress on standard error."""
     seen = BoardObservations()
-    for number, shot in enumerate(shots, start=1):
+    kept = skipping.kept(shots, arguments.skip, arguments.source)
+    for number, shot in enumerate(image_sizes.checked_for(kept, cameras, arguments.calibration), start=1):
         seen += see(target, _of(cameras, shot), cameras)
         print(f"\r{number} shots, {len(seen.corners)} images show the board", end="", file=sys.stderr)
     print(file=sys.stderr)
@@ -118,7 +122,8 @@ def _see_live(arguments: argparse.Namespace, target: Target, cameras: Mapping[st
                 f"{arguments.source}: {', '.join(there)}: none of its sensors is one of "
                 f"{arguments.calibration}: {', '.join(cameras)}"
             )
-        for shot in skipping.kept(shots, arguments.skip, arguments.source):
+        kept = skipping.kept(shots, arguments.skip, arguments.source)
+        for shot in image_sizes.checked_for(kept, cameras, arguments.calibration):
             new = see(target, _of(cameras, shot), cameras)
             if not live.adds(new, seen):
                 continue
