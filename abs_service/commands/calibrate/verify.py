@@ -27,6 +27,7 @@ from abs_service.calibration.shots.shot_sources import FolderShots, RecordingSho
 from abs_service.calibration.shots.shots import Shot
 from abs_service.commands.calibrate import calibrations, live, skipping
 from abs_service.commands.parts import rig_process
+from abs_service.config.problems import allowed_instead
 from abs_service.report import page, provenance
 from abs_service.report.content import Level, Report, Verdict, to_json
 from calib.board.target import Target
@@ -89,6 +90,10 @@ def _look(arguments: argparse.Namespace, target: Target, known: RigCalibration) 
         patterns = dict(one.partition("=")[::2] for one in arguments.images)
         if not all(patterns.values()):
             raise VerifyOptionError(f"--images {' '.join(arguments.images)}: each must be NAME=GLOB")
+        for name, pattern in patterns.items():
+            if name not in cameras:
+                reason = f"{arguments.calibration} has no such sensor, {allowed_instead(name, cameras)}"
+                raise VerifyOptionError(f"--images {name}={pattern}: {reason}")
         folders = [*dict.fromkeys(Path(pattern).parent for pattern in patterns.values())]
         return _see_all(arguments, target, FolderShots(patterns), cameras), folders
     if live.is_live(arguments.source):

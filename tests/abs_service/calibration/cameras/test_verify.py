@@ -174,6 +174,10 @@ def test_a_rig_without_any_sensor_of_the_calibration_is_refused(live: list[str],
         (["a.mcap", "--images", "tof=*.png"], "either a recording"),
         (["--images", "tof"], "must be NAME=GLOB"),
         (["--images", "tof=none-*.png"], "no file matches"),
+        (
+            ["--images", "Tof=*.png"],
+            'x.toml has no such sensor, did you mean "tof"? allowed: color, structured_light, tof',
+        ),
     ],
 )
 def test_what_cannot_be_verified_is_said(tmp_path: Path, capsys, monkeypatch, source: list[str], said: str) -> None:
