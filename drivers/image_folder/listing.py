@@ -2,6 +2,7 @@
 
 import math
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -36,30 +37,48 @@ def last_number(stem: str) -> int | None:
     return int(numbers[-1]) if numbers else None
 
 
-def by_number(folder: Path, pattern: str, rate_hz: float) -> list[ImageFile]:
+def by_number(folder: Path, pattern: str, rate_hz: float, *, alone: bool = False) -> list[ImageFile]:
     """Files that match a pattern, sorted by the last number in their name, the sequence number.
 
     Args:
         folder: the folder.
         pattern: glob pattern, such as `depth_*.png`.
         rate_hz: exposures per second; number n was taken n / rate_hz seconds after number 0.
+        alone: True if no other images are to be matched by number: files that share a last number, as times of the day
+            do, are then sorted by all their numbers and counted from 0.
 
     Raises:
         ImageFolderError: missing folder, no match, a name without a number, or duplicate numbers.
     """
     if not folder.is_dir():
         raise ImageFolderError(f"{folder}: no such folder")
-    numbered: dict[int, Path] = {}
-    for path in sorted(folder.glob(pattern)):
-        number = last_number(path.stem)
-        if number is None:
-            raise ImageFolderError(f"{path}: there is no number in its name to tell which exposure it is")
-        if number in numbered:
-            raise ImageFolderError(f"{path}: has the same number as {numbered[number].name}")
-        numbered[number] = path
-    if not numbered:
+    paths = sorted(folder.glob(pattern))
+    if not paths:
         raise ImageFolderError(f"{folder}: no file matches {pattern!r}")
+    for path in paths:
+        if last_number(path.stem) is None:
+            raise ImageFolderError(f"{path}: there is no number in its name to tell which exposure it is")
+    numbered = {number: path for path in paths if (number := last_number(path.stem)) is not None}
+    if len(numbered) < len(paths):
+        numbered = dict(enumerate(_by_all_numbers(paths, alone)))
     return [ImageFile(numbered[number], number, round(number * 1e9 / rate_hz)) for number in sorted(numbered)]
+
+
+def _by_all_numbers(paths: Sequence[Path], alone: bool) -> list[Path]:
+    """Files that share a last number, sorted by all numbers in their names.
+
+    Raises:
+        ImageFolderError: other images are to be matched by the last number, or all numbers of two files are the same.
+    """
+    found: dict[tuple[int, ...], Path] = {}
+    for path in paths:
+        numbers = tuple(map(int, re.findall(r"\d+", path.stem)))
+        key = numbers if alone else numbers[-1:]
+        if key in found:
+            advice = "" if alone else "; the last number tells which images belong together: let it count the exposures"
+            raise ImageFolderError(f"{path}: has the same number as {found[key].name}{advice}")
+        found[key] = path
+    return [found[key] for key in sorted(found)]
 
 
 def by_list(folder: Path, name: str) -> list[ImageFile]:

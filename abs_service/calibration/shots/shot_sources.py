@@ -66,6 +66,8 @@ class RecordingShots:
 class FolderShots:
     """Shots of image folders: files with the same last number in their names belong to one shot.
 
+    Images of one sensor alone may share last numbers, such as the seconds of times of the day.
+
     Attributes:
         patterns: path of each sensor's images, by sensor name; the last part may hold wildcards.
     """
@@ -85,9 +87,10 @@ class FolderShots:
     def _files(self, sensor: str, pattern: str) -> dict[int, ImageFile]:
         path = Path(pattern)
         try:
-            return {file.seq: file for file in by_number(path.parent, path.name, rate_hz=1.0)}
+            files = by_number(path.parent, path.name, rate_hz=1.0, alone=len(self.patterns) == 1)
         except ImageFolderError as error:
             raise ShotsError(f"images of {sensor}: {error}") from error
+        return {file.seq: file for file in files}
 
 
 def _look(file: ImageFile) -> SensorShot:

@@ -153,7 +153,7 @@ def _read(source: str, arguments: argparse.Namespace) -> list[sequences.Sequence
         raise NoiseOptionError(f"{source}: --camera has to say which camera took the images of a folder")
     depth = camera_file.load(arguments.camera).depth
     images = DepthImages(
-        by_number(path, arguments.depth, 30.0), depth.camera(), depth.depth_scale or DEPTH_SCALE,
+        by_number(path, arguments.depth, 30.0, alone=True), depth.camera(), depth.depth_scale or DEPTH_SCALE,
         Geometry(depth.geometry), depth.invalid,
     )  # fmt: skip
     folder = ImageFolder({"depth": images})

@@ -67,6 +67,22 @@ def test_errors_in_lists_name_the_line(tmp_path: Path, text: str | None, complai
         by_list(tmp_path, "depth.txt")
 
 
+def test_times_in_names_are_an_order_where_no_other_images_are_matched(tmp_path: Path) -> None:
+    for name in ("d_2018-10-05__10-30-50.png", "d_2018-10-05__9-31-50.png", "d_2018-10-05__10-29-50.png"):
+        save(tmp_path / name, depth_image())
+    files = by_number(tmp_path, "d_*.png", 10.0, alone=True)
+    assert [(file.path.name[14:-4], file.seq, file.t_ns) for file in files] == [
+        ("9-31-50", 0, 0),
+        ("10-29-50", 1, 100_000_000),
+        ("10-30-50", 2, 200_000_000),
+    ]
+    with pytest.raises(ImageFolderError, match=r"tells which images belong together: let it count the exposures"):
+        by_number(tmp_path, "d_*.png", 10.0)
+    save(tmp_path / "d_2018-10-05__10-30-050.png", depth_image())
+    with pytest.raises(ImageFolderError, match=r"10-30-50\.png: has the same number as d_2018-10-05__10-30-050\.png"):
+        by_number(tmp_path, "d_*.png", 10.0, alone=True)
+
+
 @pytest.mark.parametrize(
     ("names", "complaint"),
     [

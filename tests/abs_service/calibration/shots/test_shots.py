@@ -101,6 +101,16 @@ def test_images_in_folders_are_paired_by_the_last_number_in_their_names(tmp_path
     ]
 
 
+def test_images_of_one_sensor_may_have_times_in_their_names(tmp_path: Path) -> None:
+    for name in ("l_10-30-50.png", "l_10-29-50.png"):
+        write(tmp_path, name, 0.7)
+    alone = {"left": f"{tmp_path}/l_*.png"}
+    files = [shot.sensor_shots["left"].file for shot in FolderShots(alone)]
+    assert [file and file.name for file in files] == ["l_10-29-50.png", "l_10-30-50.png"]
+    with pytest.raises(ShotsError, match=r"images of left: .*let it count the exposures"):
+        list(FolderShots({**alone, "right": f"{tmp_path}/l_*.png"}))
+
+
 def test_what_is_no_image_is_named(tmp_path: Path) -> None:
     (tmp_path / "left01.png").write_bytes(b"nothing")
     with pytest.raises(ShotsError, match=r"left01\.png: cannot be read as an image"):
