@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import map_coordinates
+from scipy.ndimage import gaussian_filter1d, map_coordinates
 
 from calib.board.april_grid import BITS, BORDER, AprilGrid
 from calib.board.corners.order import cells
@@ -18,8 +18,8 @@ _MIN_SIGMA_PX = 0.02
 #: Full scales of analogue-to-digital converters with 10, 12, 14 and 16 bits.
 _FULL_SCALES = (1023, 4095, 16383, 65535)
 
-#: Number of brightness samples across an edge.
-_SAMPLES = 33
+#: Number of brightness samples across an edge, and deviation of the smoothing along them [samples].
+_SAMPLES, _SMOOTHED = 33, 2.0
 
 
 def lattice(target: Target, ids: NDArray[np.intp], pixels: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -89,27 +89,29 @@ def is_saturated(image: Image) -> NDArray[np.bool_]:
 def edge_px(target: Target, points: NDArray[np.float64], levels: Grey) -> float:
     """Width of edges from 10 to 90 % [px], along the axis with the wider ones; NaN without edges.
 
-    Brightness is sampled along lines across all edges of one direction and averaged. A Gaussian blur of deviation σ has
-    its steepest slope, contrast / (σ √2π), at the edge, and rises from 10 to 90 % within 2.563 σ.
+    Brightness is sampled along a line across each edge; the width of a direction is the median over its edges. Profiles
+    are not averaged: distortion and tilt move edges off the middle of their lines, so the mean edge would be wide.
     """
-    rises = [_rise(*_lines(target, points, axis), levels) for axis in (0, 1)]
-    known = [rise for rise in rises if not np.isnan(rise)]
-    return max(known, default=float("nan"))
+    widths = [_widths(*_lines(target, points, axis), levels) for axis in (0, 1)]
+    return max((float(np.median(width)) for width in widths if len(width)), default=float("nan"))
 
 
-def _rise(start: NDArray[np.float64], end: NDArray[np.float64], levels: Grey) -> float:
-    """Edge width [px] from lines `start` to `end` (n, 2) that cross an edge at their midpoint."""
+def _widths(start: NDArray[np.float64], end: NDArray[np.float64], levels: Grey) -> NDArray[np.float64]:
+    """Edge widths [px] along lines `start` to `end` (n, 2) that cross one edge each; fewer than n if some are NaN.
+
+    A Gaussian blur of deviation σ has its steepest slope, contrast / (σ √2π), at the edge, and rises from 10 to 90 %
+    within 2.563 σ. Noise makes slopes steeper, so profiles are smoothed first, and that blur is subtracted.
+    """
     seen = ~np.isnan(start + end).any(axis=1)
     start, end = start[seen], end[seen]
-    if not len(start):
-        return float("nan")
     part = np.linspace(0, 1, _SAMPLES)[:, None, None]
     u, v = np.moveaxis(start + part * (end - start), -1, 0)
     profiles = map_coordinates(levels.astype(np.float32), [v, u], order=1, mode="nearest")
-    profile = np.where(profiles[-1] > profiles[0], profiles, -profiles).mean(axis=1)
-    contrast, slope = float(np.ptp(profile)), float(np.diff(profile).max())
-    length = float(np.median(np.linalg.norm(end - start, axis=1))) / (_SAMPLES - 1)
-    return 2.563 / np.sqrt(2 * np.pi) * contrast / max(slope, 1e-6) * length
+    smooth = gaussian_filter1d(profiles, _SMOOTHED, axis=0, mode="nearest")
+    contrast, slope = np.ptp(smooth, axis=0), np.abs(np.diff(smooth, axis=0)).max(axis=0)
+    blur = contrast / (np.sqrt(2 * np.pi) * np.maximum(slope, 1e-6))
+    step = np.linalg.norm(end - start, axis=1) / (_SAMPLES - 1)
+    return 2.563 * step * np.sqrt(np.maximum(blur**2 - _SMOOTHED**2, 0))
 
 
 def _lines(target: Target, points: NDArray[np.float64], axis: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -12,6 +12,8 @@ from calib.pose import Pose
 
 VGA = Camera(640, 480, 550, 550, 319.5, 239.5)
 TOF = Camera(176, 144, 220, 220, 87.5, 71.5)
+_WIDE = Camera(2000, 1600, 400, 400, 999.5, 799.5)
+_FISHEYE_PX, _FISHEYE_CENTER = 220.0, (319.5, 239.5)
 
 
 def board_pose(rotation: tuple[float, float, float], translation: tuple[float, float, float]) -> Pose:
@@ -62,3 +64,26 @@ def photograph(
 
 def as_bytes(image: NDArray[np.float32]) -> NDArray[np.uint8]:
     return np.clip(np.rint(image), 0, 255).astype(np.uint8)
+
+
+def photograph_by_fisheye(
+    target: Target, T_sb: Pose, noise: float = 2.0, blur: float = 0.5
+) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
+    """Brightness (480, 640) of a board through an equidistant fisheye, and where its points are (n, 2) [px].
+
+    A wide pinhole's image, finer than the fisheye's, is mapped to it, which has `_FISHEYE_PX` pixels per radian.
+    """
+    flat = photograph(target, _WIDE, T_sb, noise=0.0, samples=1)
+    v, u = np.mgrid[:480, :640].astype(np.float32)
+    du, dv = u - _FISHEYE_CENTER[0], v - _FISHEYE_CENTER[1]
+    radius = np.maximum(np.hypot(du, dv), 1e-6)
+    reach = _WIDE.fx * np.tan(np.minimum(radius / _FISHEYE_PX, 1.5)) / radius
+    at = np.stack([_WIDE.cx + reach * du, _WIDE.cy + reach * dv]).astype(np.float32)
+    image = cv2.remap(flat, at[0], at[1], cv2.INTER_CUBIC, borderMode=cv2.BORDER_CONSTANT, borderValue=115.0)
+    image = cv2.GaussianBlur(image, (0, 0), blur)
+    points = pose.transform(T_sb, target.points())
+    beside = np.linalg.norm(points[:, :2], axis=1)
+    angle = np.arctan2(beside, points[:, 2])
+    pixels = np.array(_FISHEYE_CENTER) + _FISHEYE_PX * (angle / np.maximum(beside, 1e-12))[:, None] * points[:, :2]
+    generator = np.random.default_rng(1)
+    return (image + noise * generator.standard_normal(image.shape)).astype(np.float32), pixels

@@ -9,7 +9,7 @@ from calib.board.april_grid import AprilGrid
 from calib.board.corners import errors
 from calib.board.corners.detection import detect
 from calib.board.target import AsymmetricCircles, Charuco, Chessboard, Circles, Target
-from tests.calib.board.boards import TOF, VGA, as_bytes, centered, photograph
+from tests.calib.board.boards import TOF, VGA, as_bytes, centered, photograph, photograph_by_fisheye
 
 CHESSBOARD = Chessboard(9, 6, 0.03)
 CHARUCO = Charuco(10, 7, 0.03, 0.0225, "4x4_100")
@@ -198,3 +198,21 @@ def test_a_board_that_moved_during_the_exposure_is_refused(target: Target) -> No
     reason, message = refused(target, cv2.blur(as_bytes(sharp), (8, 1)))
     assert reason is errors.BlurredError
     assert "still" in message
+
+
+@pytest.mark.parametrize("target", [CHESSBOARD, Circles(7, 5, 0.04, 0.02)])
+@pytest.mark.parametrize("noise", [1, 6])
+def test_a_board_out_of_focus_is_refused_with_noise_too(target: Target, noise: int) -> None:
+    image = photograph(target, VGA, centered(target, (0.2, 0.1, 0), 0.6), noise=noise, blur=(2.5, 2.5))
+    reason, message = refused(target, as_bytes(image))
+    assert reason is errors.BlurredError
+    assert "focus" in message
+
+
+def test_a_fisheye_that_bends_the_board_does_not_make_it_blurred() -> None:
+    T_sb = centered(CHESSBOARD, (0, 0, 0), 0.12)
+    image, pixels = photograph_by_fisheye(CHESSBOARD, T_sb)
+    found = detect(CHESSBOARD, as_bytes(image))
+    assert 1.5 < found.edge_px < 3.0
+    assert np.abs(found.pixels - pixels).max() < 0.2
+    assert refused(CHESSBOARD, as_bytes(photograph_by_fisheye(CHESSBOARD, T_sb, blur=4.0)[0]))[0] is errors.BlurredError
