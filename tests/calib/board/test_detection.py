@@ -216,3 +216,13 @@ def test_a_fisheye_that_bends_the_board_does_not_make_it_blurred() -> None:
     assert 1.5 < found.edge_px < 3.0
     assert np.abs(found.pixels - pixels).max() < 0.2
     assert refused(CHESSBOARD, as_bytes(photograph_by_fisheye(CHESSBOARD, T_sb, blur=4.0)[0]))[0] is errors.BlurredError
+
+
+def test_a_board_bent_so_much_that_one_search_misses_it_is_found_by_the_other() -> None:
+    T_sb = centered(CHESSBOARD, (-0.5, 0.6, 0.1), 0.18)
+    T_sb[1, 3] += 0.1
+    image, pixels = photograph_by_fisheye(CHESSBOARD, T_sb)
+    flags = cv2.CALIB_CB_ACCURACY | cv2.CALIB_CB_NORMALIZE_IMAGE
+    assert not cv2.findChessboardCornersSB(as_bytes(image), CHESSBOARD.grid, flags=flags)[0]
+    found = detect(CHESSBOARD, as_bytes(image))
+    assert np.median(np.linalg.norm(found.pixels - pixels, axis=1)) < 0.15
