@@ -49,14 +49,15 @@ def test_troubleshooting_has_every_reason_of_a_status():
     nothing_right = SensorFit("tof", 100, 300, 100, 10, -1.0, 1.0, RimFit(20, 10, 10), counts, Remainder(0.9, 0.0))
     doubtful = replace(nothing_right, inliers=50)
     out_of_sight = replace(nothing_right, inliers=100, occluded=50)
+    surprised = replace(nothing_right, remainder=Remainder(), is_surprised=True)
     bad = ShapeQuality(folded_share=0.5, deviation_m=1.0, single_frame_deviation_m=1.0)
     found = [
         status.judge([fit], ["color"], bad, 9.9, status.Settings())[1]
-        for fit in (nothing_right, doubtful, out_of_sight)
+        for fit in (nothing_right, doubtful, out_of_sight, surprised)
     ]
-    assert [len(reasons) for reasons in found] == [8, 8, 7]
+    assert [len(reasons) for reasons in found] == [8, 8, 8, 8]
     reasons = {reason for of in found for reason in of}
-    assert len(reasons) == 10
+    assert len(reasons) == 12
     page = _without_numbers(TROUBLESHOOTING)
     assert [reason for reason in reasons if _without_numbers(reason.partition(" so far")[0]) not in page] == []
 

@@ -77,7 +77,7 @@ def _find_chessboard(target: Chessboard, levels: Grey) -> tuple[bool, NDArray[np
     """Corners by the sector-based search or else, as that one misses boards bent by a fisheye, by linking dark squares.
 
     The first bears blur and noise better. `CALIB_CB_FAST_CHECK` misses a board now and then, which the image with local
-    contrast shows; without it, images with clutter and no board take three times as long.
+    contrast shows; without it, images with clutter and no board take much longer.
     """
     flags = cv2.CALIB_CB_ACCURACY | cv2.CALIB_CB_NORMALIZE_IMAGE
     found, corners = cv2.findChessboardCornersSB(levels, target.grid, flags=flags)

@@ -171,8 +171,9 @@ def nothing_is_lost_in_silence(listener):
             mine.update({name: counters[name] for name in names if not name.startswith("published")})
     unseen = 0
     for clock in {state.header.host_clock for state in states}:
-        first, *_, last = [one for one in states if one.header.host_clock == clock and depth_seq(one) is not None]
-        unseen += depth_seq(last) - depth_seq(first) - (last.header.seq - first.header.seq)
+        # A message tells no number of an exposure of which an image is missing.
+        first, *_, last = [one for one in states if one.header.host_clock == clock and not depth(one).missing]
+        unseen += depth(last).seq - depth(first).seq - (last.header.seq - first.header.seq)
     print(f"{unseen} exposures are in no estimate, counted {dict(mine)}")
     assert mine["lost.tof/depth/image"] > (CUT_S - 3) * RATE_HZ
     assert unseen <= mine.total()
@@ -190,6 +191,5 @@ def newest_counters(listener, component, after_ns):
     return list(newest.values())
 
 
-def depth_seq(state):
-    """The exposure; None if an image of it is missing, which the message then tells no number of."""
-    return next(None if one.missing else one.seq for one in state.sensors if one.sensor == "tof")
+def depth(state):
+    return next(one for one in state.sensors if one.sensor == "tof")
