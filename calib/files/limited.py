@@ -52,13 +52,13 @@ def read(path: Path, largest: int) -> bytes:
 
 
 def text(path: Path) -> str:
-    """The text of a file, in UTF-8.
+    """The text of a file, in UTF-8, without the byte order mark that some editors put before it.
 
     Raises:
         OSError: as `read`.
         UnicodeDecodeError: other bytes.
     """
-    return read(path, LARGEST_TEXT).decode("utf-8")
+    return read(path, LARGEST_TEXT).decode("utf-8-sig")
 
 
 def arrays(path: Path) -> dict[str, NDArray]:

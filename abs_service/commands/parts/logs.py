@@ -80,8 +80,13 @@ def end_with(error: Exception, arguments: argparse.Namespace) -> int:
     if not on_stderr(arguments):
         if not user:
             raise error
-        print(f"{ERROR}{error}", file=sys.stderr)
+        print(f"{ERROR}{_shown(str(error))}", file=sys.stderr)
     return code
+
+
+def _shown(text: str) -> str:
+    """A text whose control characters, as of a file's name, are written as escapes: none reaches the terminal."""
+    return "".join(one if one.isprintable() or one == "\n" else repr(one)[1:-1] for one in text)
 
 
 def _handler(file: Path | None) -> logging.Handler:

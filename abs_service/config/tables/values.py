@@ -1,5 +1,6 @@
 """Types of single values of a configuration, with messages that name the allowed values."""
 
+import os
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,6 +16,8 @@ from abs_service.config import plugins
 
 #: Drivers whose addresses name a file, which starts from the folder of the TOML file like every other path.
 FILE_SCHEMES = frozenset({"replay"})
+#: Longest name of a file or folder [bytes]: Linux allows no more.
+LONGEST_NAME = 255
 #: What every address of a device looks like.
 URI = re.compile(r"[a-z][a-z0-9_]*:\S+")
 
@@ -45,7 +48,12 @@ def _stream(value: str) -> str:
 def _from_file(value: Any, base: Path) -> Path:
     if not (isinstance(value, (str, Path)) and str(value)):
         raise ValueError("must be a path; a relative one starts from the folder of this file")
-    return base / value
+    path = base / value
+    if "\0" in str(path) or max(len(os.fsencode(part)) for part in path.parts) > LONGEST_NAME:
+        raise ValueError(f"must be a path whose names have no zero byte and at most {LONGEST_NAME} bytes")
+    if str(value).startswith("~"):
+        raise ValueError('must be a path; "~" is not replaced by a home folder, which differs from user to user')
+    return path
 
 
 def _base(info: ValidationInfo) -> Path:

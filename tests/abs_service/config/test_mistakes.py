@@ -23,6 +23,12 @@ CASES = {
         "[record]\nrotate_sec = 3\n",
         'record.rotate_sec: unknown key, did you mean "rotate_s"? allowed: begin, chunk',
     ),
+    "a path with a zero byte": ('[record]\ndirectory = "a\\u0000b"\n', "whose names have no zero byte"),
+    "a path with a name too long": (
+        f'[record]\ndirectory = "{"x" * 300}"\n',
+        "whose names have no zero byte and at most 255 bytes",
+    ),
+    "a path in a home folder": ('[record]\ndirectory = "~/takes"\n', '"~" is not replaced by a home folder'),
     "a value out of range": ("[record]\nflush_s = 0\n", "record.flush_s = 0: must be greater than 0"),
     "a number as text": ('[record]\nflush_s = "1"\n', 'record.flush_s = "1": must be a valid number'),
     "a value that is none of those allowed": (

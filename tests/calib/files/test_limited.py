@@ -23,6 +23,11 @@ def test_what_has_no_size_is_refused_at_once(tmp_path: Path) -> None:
             limited.read(path, 1 << 20)
 
 
+def test_a_byte_order_mark_is_no_text(tmp_path: Path) -> None:
+    (tmp_path / "x").write_text("name = 1", encoding="utf-8-sig")
+    assert limited.text(tmp_path / "x") == "name = 1"
+
+
 def test_arrays_come_back(tmp_path: Path) -> None:
     np.savez(tmp_path / "x.npz", a=np.arange(3.0))
     assert limited.arrays(tmp_path / "x.npz")["a"].tolist() == [0.0, 1.0, 2.0]

@@ -19,6 +19,8 @@ def act(arguments):
     logging.getLogger("abs_service.act").warning("%d left", 3, extra={"fields": {"left": 3}})
     if arguments.end == "user":
         raise DeviceError("no camera; plug one in")
+    if arguments.end == "odd":
+        raise DeviceError("no camera \x1b[2J\a–")
     return 1 // int(arguments.end)
 
 module = types.ModuleType("abs_service.commands.act", "Acts.")
@@ -43,6 +45,12 @@ def test_people_get_text():
     assert code == Exit.USER
     assert logged.endswith("WARNING abs_service.act: 3 left")
     assert error == "abs-service: error: no camera; plug one in"
+
+
+def test_control_characters_do_not_reach_the_terminal():
+    code, (_, error) = act("odd")
+    assert code == Exit.USER
+    assert error == r"abs-service: error: no camera \x1b[2J\x07–"
 
 
 def test_programs_get_nothing_but_json():
