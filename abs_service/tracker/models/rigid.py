@@ -10,6 +10,7 @@ from abs_service.tracker.detection.grid_mesh import grid_mesh
 from abs_service.tracker.detection.initial_detection import InitialDetection
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import BOARD, SparseJacobian, Surface
+from abs_service.tracker.models.parts.noiseless_normals import noiseless_normals
 from calib import pose
 
 
@@ -51,7 +52,7 @@ class Rigid:
         self._centroid = mesh.vertices.mean(axis=0)
         self._arms = mesh.vertices - self._centroid
         self._arms_32 = np.ascontiguousarray(self._arms.T, np.float32)
-        self._normals_32 = np.ascontiguousarray(mesh.normals.T, np.float32)
+        self._normals_32 = np.ascontiguousarray(noiseless_normals(mesh).T, np.float32)
         radius = np.linalg.norm(self._arms, axis=1).max()
         self.scales = np.repeat([1 / max(radius, 1e-3), 1.0], 3)
         self.roughness = self.prior = np.zeros((0, 6))
