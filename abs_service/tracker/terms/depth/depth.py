@@ -69,14 +69,16 @@ class DepthTerm:
         self._lost = self._covered = self._outside = np.zeros(0, np.bool_)
         self._doubtful = np.zeros(0, np.bool_)
         self._free_m = np.zeros((0, 0), np.float32)
-        self._window, self._is_surprised = WHOLE, False
+        self._window, self._is_surprised, self._begun = WHOLE, False, False
         self._distance, self._foreground = np.zeros((0, 0), np.float32), np.zeros((0, 0), np.bool_)
 
     def observe(self, image: Image, predicted: Surface, reach_m: float = np.inf) -> None:
         """Renders the noise model over a depth image; occluded pixels are masked in this frame."""
         if not isinstance(image, DepthImage):
             raise TypeError(f"sensor {self.sensor} has a depth noise model but delivered {type(image).__name__}")
-        window = self._synthesizer.window(self.sensor, predicted, reach_m)
+        # What the background is, and where the field of view ends, is learnt from a whole image.
+        window = self._synthesizer.window(self.sensor, predicted, reach_m if self._begun else np.inf)
+        self._begun = True
         distance = self._texels.observe(image, window)
         expected = np.ascontiguousarray(self._view.render(predicted)[window])
         self._view.look(predicted)

@@ -154,6 +154,7 @@ def test_within_reach_a_mosaic_costs_the_same_as_in_the_whole_image(order):
 def test_beyond_the_window_nothing_is_explained():
     """Otherwise a search could escape from a bad fit into unprepared pixels."""
     depth = depth_term()
+    depth.observe(depth_image(scene()), moved(0, 0, 0))  # the first image is seen as a whole
     depth.observe(depth_image(scene(0.2)), moved(-0.15, 0, 0), 0.01)
     assert depth.cost(moved(0.25, 0, 0))[0] == pytest.approx(len(MESH.vertices) * BOUNDS.outlier, rel=1e-5)
     color = ColorTerm("color", sparse(WIDE, MESH), MESH.colors, GaussianColor(), BOUNDS)
