@@ -3,10 +3,13 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 import scipy  # its parts are imported when they are first used
 from numpy.typing import NDArray
+
+Float = TypeVar("Float", bound=np.floating)
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,8 +61,7 @@ class Mesh:
         face_normals = area_vectors(self.vertices, self.faces)
         corners, n = self.faces.T.ravel(), len(self.vertices)
         sums = [np.bincount(corners, np.tile(column, 3), n) for column in face_normals.T]
-        normals = np.stack(sums, axis=1)
-        return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+        return unit(np.stack(sums, axis=1).astype(np.float64, copy=False))
 
     def reordered(self, order: NDArray[np.integer]) -> "Mesh":
         """The same mesh with its vertices listed in another order: vertex i becomes the former vertex order[i]."""
@@ -100,6 +102,12 @@ def area_vectors(vertices: NDArray[np.floating], faces: NDArray[np.int32]) -> ND
     corner = vertices[faces[:, 0]]
     (a, b, c), (d, e, f) = (vertices[faces[:, 1]] - corner).T, (vertices[faces[:, 2]] - corner).T
     return np.stack([b * f - c * e, c * d - a * f, a * e - b * d], axis=1)
+
+
+def unit(vectors: NDArray[Float]) -> NDArray[Float]:
+    """Vectors (n, 3) of length 1 in the same directions; those without length stay so."""
+    lengths = np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-12)
+    return np.asarray(vectors / lengths, vectors.dtype)
 
 
 def edge_lengths(vertices: NDArray[np.floating], edges: NDArray[np.int32]) -> NDArray[np.floating]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.mesh import Mesh, area_vectors, edge_lengths, sides_of
+from abs_service.tracker.mesh import Mesh, area_vectors, edge_lengths, sides_of, unit
 from calib.jit import kernel
 
 #: Neighbouring faces are folded if their normals differ by more than 120°, and by less than 60° at rest.
@@ -117,8 +117,7 @@ def compare_shapes(
 
 def _normals(vertices: NDArray[np.floating], faces: NDArray[np.int32]) -> NDArray[np.floating]:
     """Unit normals (m, 3) of the faces."""
-    normals = area_vectors(vertices, faces)
-    return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+    return unit(area_vectors(vertices, faces))
 
 
 def _neighbors(faces: NDArray[np.int32]) -> NDArray[np.intp]:

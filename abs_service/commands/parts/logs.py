@@ -9,6 +9,7 @@ from pathlib import Path
 import abs_service
 from abs_service.supervision.exit_codes import Exit, is_for_user
 from abs_service.supervision.log_lines import ERROR, JsonFormatter
+from drivers.contract.text import printable
 
 LEVELS = ("debug", "info", "warning", "error")
 
@@ -80,13 +81,8 @@ def end_with(error: Exception, arguments: argparse.Namespace) -> int:
     if not on_stderr(arguments):
         if not user:
             raise error
-        print(f"{ERROR}{_shown(str(error))}", file=sys.stderr)
+        print(f"{ERROR}{printable(str(error))}", file=sys.stderr)
     return code
-
-
-def _shown(text: str) -> str:
-    """A text whose control characters, as of a file's name, are written as escapes: none reaches the terminal."""
-    return "".join(one if one.isprintable() or one == "\n" else repr(one)[1:-1] for one in text)
 
 
 def _handler(file: Path | None) -> logging.Handler:

@@ -62,33 +62,38 @@ def color_rows(
         camera: its camera.
         vertices: positions (n, 3) [m].
     """
-    places, projection = project_with_jacobian(camera, vertices)
-    rows = np.empty((len(places), image.shape[2], 3))
-    _color_rows(image, places, _REGRESSION, projection, rows)
-    return rows
+    return _image_rows(image, *project_with_jacobian(camera, vertices))
 
 
-def without_noise(
-    rows: NDArray[np.float64],
-    weight: NDArray[np.floating],
+def noiseless_color_rows(
     image: NDArray[np.float32] | NDArray[np.uint8],
     camera: Camera,
     vertices: NDArray[np.floating],
+    weight: NDArray[np.floating],
 ) -> NDArray[np.float64]:
-    """Rows (n, channels, 3) that the noise of the pixels makes no longer than the picture's gradients make them.
+    """Weighted `color_rows` that the noise of the pixels makes no longer than the picture's gradients make them.
 
     Noise has gradients as a print has, and the more of it there is, the better it would seem to hold a surface without
     print. Its share in the mean square of the rows is known from its deviation, and taken away from all alike.
 
     Args:
-        rows: see `color_rows`, weighted.
-        weight: of the measurements (n, channels), broadcast [1/image unit].
         image, camera, vertices: see `color_rows`.
+        weight: of the measurements (n, channels) [1/image unit].
     """
     places, projection = project_with_jacobian(camera, vertices)
+    rows = _image_rows(image, places, projection) * weight[..., None]
     weighted = np.square(noise_deviation(image, places) * weight).sum(axis=1)
     noise = _NOISE_EXCESS * _NOISE_GAIN * float(weighted @ np.square(projection).sum(axis=(1, 2)))
     return rows * np.sqrt(max(1 - noise / max(float(np.vdot(rows, rows)), 1e-300), 0.0))
+
+
+def _image_rows(
+    image: NDArray[np.float32] | NDArray[np.uint8], places: NDArray[np.float64], projection: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """`color_rows` at places (n, 2), with the Jacobians of the projection (n, 2, 3) there."""
+    rows = np.empty((len(places), image.shape[2], 3))
+    _color_rows(image, places, _REGRESSION, projection, rows)
+    return rows
 
 
 def noise_deviation(image: NDArray[np.float32] | NDArray[np.uint8], places: NDArray[np.float64]) -> NDArray[np.float64]:

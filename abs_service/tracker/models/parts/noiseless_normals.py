@@ -11,7 +11,7 @@ import numpy as np
 import scipy  # its parts are imported when they are first used
 from numpy.typing import NDArray
 
-from abs_service.tracker.mesh import Mesh
+from abs_service.tracker.mesh import Mesh, unit
 
 #: Times that every normal is replaced by the mean with its neighbours: what is smooth reaches over some five edges.
 ROUNDS = 30
@@ -33,7 +33,7 @@ def noiseless_normals(mesh: Mesh) -> NDArray[np.float64]:
     smooth, relief = _parted(normals, mean)
     noise = [_parted(drawn, mean)[1] - relief for drawn in _drawn(mesh, normals)]
     share = 1 - EXCESS * np.mean(np.square(noise)) / max(np.mean(relief**2), np.finfo(float).tiny)
-    return _unit(smooth + np.sqrt(max(share, 0.0)) * relief)
+    return unit(smooth + np.sqrt(max(share, 0.0)) * relief)
 
 
 def _drawn(mesh: Mesh, normals: NDArray[np.float64]) -> list[NDArray[np.float64]]:
@@ -49,7 +49,7 @@ def _parted(
     smooth = normals
     for _ in range(ROUNDS):
         smooth = mean @ smooth
-    smooth = _unit(smooth)
+    smooth = unit(smooth)
     return smooth, normals - smooth
 
 
@@ -60,7 +60,3 @@ def _mean_with_neighbours(mesh: Mesh) -> scipy.sparse.csr_array:
     rows, columns = np.concatenate([own, first, second]), np.concatenate([own, second, first])
     ones = scipy.sparse.csr_array((np.ones(len(rows)), (rows, columns)), shape=(n, n))
     return scipy.sparse.csr_array(scipy.sparse.diags_array(1 / ones.sum(axis=1)) @ ones)
-
-
-def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-12)

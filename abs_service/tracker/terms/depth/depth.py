@@ -11,8 +11,7 @@ from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import Synthesis, Synthesizer
 from abs_service.tracker.synthesis.window import WHOLE, Placed, corner
 from abs_service.tracker.terms.base import Bounds, SensorFit, facing, summarize
-from abs_service.tracker.terms.depth.background import Background, dropouts
-from abs_service.tracker.terms.depth.beyond_view import BeyondView
+from abs_service.tracker.terms.depth.classifier import Classifier
 from abs_service.tracker.terms.depth.continuation import Continuation, NoContinuation
 from abs_service.tracker.terms.depth.depth_cost import (
     FREE_SCALE_M,
@@ -22,7 +21,7 @@ from abs_service.tracker.terms.depth.depth_cost import (
 )
 from abs_service.tracker.terms.depth.outline import NoOutline, Outline
 from abs_service.tracker.terms.depth.texels import Unusable, texels
-from abs_service.tracker.terms.depth.visibility import Visibility, classify, where
+from abs_service.tracker.terms.depth.visibility import Visibility, where
 from abs_service.tracker.terms.gradients import color_rows, depth_rows
 from abs_service.tracker.terms.linearization import NO_ROWS, PointLinearization, Together
 from abs_service.tracker.terms.vertex_counts import Sight
@@ -61,8 +60,7 @@ class DepthTerm:
         self._view = synthesizer.view(sensor, np.zeros((vertices, 0), np.float32))
         self._outline = outline(self._view.camera)
         self._continuation = continuation(self._view.camera)
-        self._background = Background()
-        self._beyond_view = BeyondView()
+        self._classifier = Classifier(self._view.camera.fx)
         self._missing = np.zeros((1, vertices), np.float32)
         self._texels = texels(sensor, synthesizer, noise, bounds)
         self._images = Placed(np.bool_), Placed(np.bool_), Placed(np.float32), Placed(np.bool_), Placed(np.bool_)
@@ -82,32 +80,23 @@ class DepthTerm:
         distance = self._texels.observe(image, window)
         expected = np.ascontiguousarray(self._view.render(predicted)[window])
         self._view.look(predicted)
-        missing, silhouette = np.isnan(distance), np.isfinite(expected)
-        outside = self._beyond_view.observe(missing, silhouette, window)
-        single = dropouts(missing)
-        empty = self._background.observe(missing & ~(single | outside), silhouette, window, self._texels.shape)
-        seen = classify(distance, expected, self._view.camera.fx, empty, single, outside)
+        seen = self._classifier.classify(distance, expected, window, self._texels.shape)
+        self._is_surprised = not seen.object.any()
         doubtful = self._outline.observe(distance, seen, expected, predicted, window)
         self._continuation.observe(seen.object, window)
         self._window, self._distance, self._foreground = window, distance, seen.foreground
         free_m = where(~doubtful, seen.free_m)
-        self._place(seen, doubtful, free_m, outside)
+        self._place(seen, doubtful, free_m)
         self._explain_pixels(seen, doubtful, free_m, predicted)
 
-    def _place(
-        self,
-        seen: Visibility,
-        doubtful: NDArray[np.bool_],
-        free_m: NDArray[np.float32],
-        outside: NDArray[np.bool_],
-    ) -> None:
+    def _place(self, seen: Visibility, doubtful: NDArray[np.bool_], free_m: NDArray[np.float32]) -> None:
         """Puts what the window shows where samples find it: into images (height + 2, width + 2)."""
         lost, shape = seen.hole | seen.dropout, self._texels.shape
         self._lost = self._images[0].put(self._window, lost, *shape).ravel()
         self._doubtful = self._images[1].put(self._window, doubtful, *shape).ravel()
         self._free_m = self._images[2].put(self._window, free_m, *shape)
         self._covered = self._images[3].put(self._window, seen.foreground, *shape).ravel()
-        self._outside = self._images[4].put(self._window, outside, *shape).ravel()
+        self._outside = self._images[4].put(self._window, seen.beyond, *shape).ravel()
 
     def foreground(self) -> NDArray[np.float64]:
         """Points (k, 3) [m] of occluders."""
@@ -130,7 +119,6 @@ class DepthTerm:
         inlier, so that the cost has no gradient there. In free space it costs an outlier plus a penalty proportional to
         the distance from the object. At other missing returns it costs the more, the less likely they are.
         """
-        self._is_surprised = not seen.object.any()
         if self._is_surprised:
             return
         agreeing = self._texels.explain(Unusable(seen.foreground | seen.hole | doubtful, free_m, seen.object))

@@ -7,11 +7,9 @@ from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.synthesis.rasterization.raster import Raster
 from abs_service.tracker.synthesis.window import WHOLE
-from abs_service.tracker.terms.depth.background import Background, dropouts
-from abs_service.tracker.terms.depth.beyond_view import beyond
+from abs_service.tracker.terms.depth.classifier import Classifier
 from abs_service.tracker.terms.depth.outline import RimOutline
 from abs_service.tracker.terms.depth.rim import Rim
-from abs_service.tracker.terms.depth.visibility import classify
 from calib.camera import Camera
 
 
@@ -27,12 +25,9 @@ def classified_rim(
         distance: radial distances (height, width) [m] without mean offset, NaN without return.
     """
     expected = Raster(camera, mesh.faces).render(surface.vertices[0])
-    missing, silhouette = np.isnan(distance), np.isfinite(expected)
-    outside = beyond(missing, silhouette) & missing
-    single = dropouts(missing)
-    empty = Background().observe(missing & ~(single | outside), silhouette, WHOLE, distance.shape)
+    seen = Classifier(camera.fx).classify(distance, expected, WHOLE, distance.shape)
     rim = Rim.of(mesh)
     # The classes do not depend on the standard deviation, which says how far from the outline distances are known.
     outline = RimOutline(camera, rim, deviation=1.0)
-    outline.observe(distance, classify(distance, expected, camera.fx, empty, single, outside), expected, surface)
+    outline.observe(distance, seen, expected, surface)
     return rim, outline.classes

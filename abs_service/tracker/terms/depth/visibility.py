@@ -40,6 +40,7 @@ class Visibility:
         foreground: shows something before the object.
         hole: no return over an area where the object should be.
         dropout: no return of single pixels, see `dropouts`.
+        beyond: no return beyond the field of view, a part of the holes.
         free_m: distance to the nearest pixel of the object, across the line of sight [m], where the sensor looks past
             the object to a background, measured or without return; 0 elsewhere.
     """
@@ -48,6 +49,7 @@ class Visibility:
     foreground: NDArray[np.bool_]
     hole: NDArray[np.bool_]
     dropout: NDArray[np.bool_]
+    beyond: NDArray[np.bool_]
     free_m: NDArray[np.float32]
 
 
@@ -77,7 +79,7 @@ def classify(
     _recognize(distance, predicted, labels, is_object)
     nothing = np.zeros(distance.shape, np.bool_)
     if not is_object.any():
-        return Visibility(nothing, nothing, nothing, nothing, np.zeros(distance.shape, np.float32))
+        return Visibility(nothing, nothing, nothing, nothing, nothing | beyond, np.zeros(distance.shape, np.float32))
     near = _extended(predicted)
     shown, before, solid, behind, missing = (np.empty(distance.shape, np.bool_) for _ in range(5))
     _compare(distance, near, labels, is_object, shown, before, solid, behind, missing)
@@ -87,7 +89,7 @@ def classify(
         hole, past = _holes(missing & ~(single | beyond), np.isfinite(predicted), near / focal, empty)
         hole |= beyond
     away = _depth_inside(~shown) * near / np.float32(focal)
-    return Visibility(shown, foreground, hole, single, where(behind | past, away))
+    return Visibility(shown, foreground, hole, single, nothing | beyond, where(behind | past, away))
 
 
 @kernel

@@ -8,7 +8,7 @@ from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import Synthesis, Synthesizer
 from abs_service.tracker.synthesis.window import NOTHING_HAS, Bordered
 from abs_service.tracker.terms.base import Bounds, SensorFit, facing, summarize
-from abs_service.tracker.terms.gradients import color_rows, without_noise
+from abs_service.tracker.terms.gradients import noiseless_color_rows
 from abs_service.tracker.terms.linearization import PointLinearization
 from abs_service.tracker.terms.photometric.illumination import Exposed
 from abs_service.tracker.terms.photometric.shadow import Shadow
@@ -121,8 +121,7 @@ class ColorTerm:
         use = measured & (self._normalizer + 0.5 * np.sum(residual**2, axis=1) < self._bounds.outlier)
         vertices = self._view.spread(surface, surface.vertices[0].T)
         inverse = np.broadcast_to(self._inverse, residual.shape)[use]
-        seen = self._image, self._view.camera, vertices[use]
-        rows = without_noise(color_rows(*seen) * inverse[..., None], inverse, *seen)
+        rows = noiseless_color_rows(self._image, self._view.camera, vertices[use], inverse)
         points = np.repeat(np.flatnonzero(use), residual.shape[1])
         samples = self._view.follow(surface, sparse_jacobian)
         return PointLinearization(residual[use].ravel(), rows.reshape(-1, 3), points, samples, vertices)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from abs_service.tracker.terms.gradients import color_rows, noise_deviation, without_noise
+from abs_service.tracker.terms.gradients import color_rows, noise_deviation, noiseless_color_rows
 from calib.camera import Camera
 
 CAMERA = Camera(160, 120, 150.0, 150.0, 79.5, 59.5)
@@ -23,8 +23,8 @@ def picture(print_levels: float, noise: float, seed: int = 3) -> np.ndarray:
 def length(image: np.ndarray, corrected: bool = True) -> float:
     """Root mean square of the rows."""
     weight = np.full((len(VERTICES), 3), 0.2)
-    rows = color_rows(image, CAMERA, VERTICES) * weight[..., None]
-    rows = without_noise(rows, weight, image, CAMERA, VERTICES) if corrected else rows
+    whole = color_rows(image, CAMERA, VERTICES) * weight[..., None]
+    rows = noiseless_color_rows(image, CAMERA, VERTICES, weight) if corrected else whole
     return float(np.sqrt(np.mean(rows**2)))
 
 
