@@ -9,8 +9,8 @@ from abs_service.tracker.posterior.frame_posterior import FramePosterior
 from abs_service.tracker.posterior.posterior import Posterior
 from abs_service.tracker.shape_quality import ShapeComparison
 from abs_service.tracker.synthesis.sparse import Sparse, SparseView
-from abs_service.tracker.terms.depth import depth, texels
-from abs_service.tracker.terms.depth.background import Background
+from abs_service.tracker.terms.depth import texels
+from abs_service.tracker.terms.depth.classifier import Classifier
 from abs_service.tracker.terms.depth.outline import RimOutline
 from abs_service.tracker.terms.photometric.color import ColorTerm
 from abs_service.tracker.tracker import Tracker
@@ -36,9 +36,7 @@ SEAMS = (
     Seam("noise rendering", texels, "write_pixels"),
     Seam("rendered prediction", SparseView, "render"),
     Seam("visible vertices", SparseView, "look"),
-    Seam("classify", depth, "dropouts"),
-    Seam("classify", Background, "observe"),
-    Seam("classify", depth, "classify"),
+    Seam("classify", Classifier, "classify"),
     Seam("outline", RimOutline, "observe"),
     Seam("colour", ColorTerm, "observe"),
     Seam("search", Tracker, "_minimize"),

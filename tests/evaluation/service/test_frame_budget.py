@@ -63,6 +63,11 @@ def test_functions_are_put_back_and_errors_pass() -> None:
     assert program.run is broken
 
 
+@pytest.mark.parametrize("seam", SEAMS, ids=lambda seam: f"{seam.stage}: {seam.name}")
+def test_stages_begin_at_functions_that_exist(seam: Seam) -> None:
+    assert callable(vars(seam.owner)[seam.name])
+
+
 def plane(k: int) -> np.ndarray:
     """A flat surface that moves by 1 mm along z from exposure to exposure."""
     x, y = np.meshgrid(np.linspace(-0.1, 0.1, 5), np.linspace(-0.1, 0.1, 4))
