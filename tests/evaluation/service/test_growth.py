@@ -1,10 +1,9 @@
-"""The experiment `growth`: laws, walls, extrapolations, and a short run."""
+"""The experiment `growth`: laws, walls and extrapolations."""
 
 import math
 
 import pytest
 
-from evaluation.experiment import Context
 from evaluation.service import growth
 from evaluation.service.growth import hosts
 from evaluation.service.growth.frames import axes
@@ -48,10 +47,3 @@ def test_larger_hosts_carry_what_the_costs_say() -> None:
 def test_every_axis_has_numbers_enough_for_its_law() -> None:
     assert all(len(axis.setups) >= 4 for axis in axes())
     assert {axis.power for axis in axes()} == {1, 2}
-
-
-@pytest.mark.slow
-def test_a_short_run_has_a_law_for_every_axis() -> None:
-    findings = growth.run(growth.QUICK, Context(0))
-    assert set(findings.values["laws"]) == {axis.unit for axis in axes()}
-    assert all(point["median_ms"] > 0 for points in findings.values["points"].values() for point in points)

@@ -73,6 +73,7 @@ print(json.dumps({"results": results, "total": pool.total, "hits": hits, "misses
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.environ.get("NUMBA_DISABLE_JIT", "0") != "0", reason="nothing is compiled")
 def test_kernels_of_modules_are_compiled_elsewhere_and_others_here(tmp_path: Path) -> None:
     (tmp_path / "kernels.py").write_text(KERNELS)
