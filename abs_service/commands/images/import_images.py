@@ -44,6 +44,7 @@ colour images:
 
 import argparse
 import math
+import shlex
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -53,6 +54,7 @@ from abs_service.commands.images.camera_file import CameraFile
 from abs_service.supervision.exit_codes import Exit
 from calib.files import limited, nested
 from drivers.contract.frame import Geometry
+from drivers.contract.text import printable
 from drivers.encoding.foreign_recording import ForeignRecording
 from drivers.image_folder.images import ColorImages, DepthImages, ImageFolder, Images
 from drivers.image_folder.listing import ImageFile, ImageFolderError, by_list, by_number
@@ -62,7 +64,7 @@ from drivers.sens.recording import SensRecording
 #: Metres per unit of depth images whose camera file does not tell.
 DEPTH_SCALES = {"open3d": 0.001, "pairs": 0.001, "tum": 1 / 5000}
 #: Depth and colour images of the layouts whose images are numbered.
-PATTERNS = {"open3d": ("depth/*.png", "color/*"), "pairs": ("depth_*.png", "color_*.png")}
+PATTERNS = {"open3d": ("depth/*.png", "color/*"), "pairs": ("depth_*.png", "color_*.[jp]*g")}
 #: Layouts that are one file and know their cameras.
 RECORDINGS = ("azure", "o3r", "oak", "realsense", "ros2", "sens")
 #: Exposures per second of numbered images, if no option tells [Hz].
@@ -84,7 +86,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--camera", type=Path, metavar="FILE", help="camera file, TOML or JSON (pairs; tum, open3d: optional)"
     )
     parser.add_argument("--depth", metavar="GLOB", help="depth images (pairs: depth_*.png, open3d: depth/*.png)")
-    parser.add_argument("--color", metavar="GLOB", help="colour images (pairs: color_*.png, open3d: color/*)")
+    parser.add_argument("--color", metavar="GLOB", help="colour images (pairs: color_*, PNG or JPEG; open3d: color/*)")
     parser.add_argument("--mask", metavar="GLOB", help="images, black or transparent where depth is left out (pairs)")
     parser.add_argument(
         "--rate",
@@ -119,7 +121,9 @@ def run(arguments: argparse.Namespace) -> int:
     names = (
         (stream if sensor == stream else f"{sensor}/{stream}", number) for (sensor, stream), number in counts.items()
     )
-    print(f"{arguments.out}: {', '.join(f'{number} {name}' for name, number in names)} images")
+    print(f"{arguments.out}: {', '.join(f'{number} {name}' for name, number in names)} images; next:")
+    shown = printable(shlex.quote(str(arguments.out)))
+    print(f"  abs-service {f'replay {shown}' if rig_toml else f'new rig.toml --recording {shown}'}")
     return Exit.OK
 
 
@@ -191,7 +195,10 @@ def _streams(arguments: argparse.Namespace, cameras: CameraFile) -> Mapping[str,
             masks=_masks(files, folder, arguments.mask, rate),
         )
     }
-    if cameras.color is not None:
+    if cameras.color is None:
+        if arguments.color is not None:
+            raise ImportOptionError(f"--color: {arguments.camera} has no table color that describes the colour camera")
+    else:
         colors = by_number(folder, color_names, rate) if numbered else by_list(folder, "rgb.txt")
         if numbered:
             colors = arguments.frames.of(colors)

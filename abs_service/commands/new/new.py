@@ -1,8 +1,9 @@
-"""Writes a rig file: asks for the attached camera and the kind of object.
+"""Writes a rig file: asks for the attached camera, or a recording, and the kind of object.
 
   abs-service new rig.toml                       asks
   abs-service new rig.toml --device kinect1 --object sheet --no-color --behind plane       asks nothing
   abs-service new rig.toml --device oak-tof --uri 'oak://18443010E1A2B3C4?mode=tof' …      one of several cameras
+  abs-service new rig.toml --recording x.mcap --object body --color --behind things        to replay a recording with
 
 Every question is an option; what is not given as one is asked if a person is there to answer, and an error if not. The
 file has comments, and `abs-service check` accepts it.
@@ -14,14 +15,16 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from abs_service.bus import keys
-from abs_service.commands.new import rig_text
-from abs_service.commands.new.rig_text import BEHIND, DEVICES, OBJECTS, Answers
+from abs_service.commands.new import recorded, rig_text
+from abs_service.commands.new.rig_text import BEHIND, DEVICES, OBJECTS, Answers, Device
 from abs_service.supervision.exit_codes import Exit
 from drivers import opening
 from drivers.contract.discovery import Found
 
 #: Time to look for cameras [s].
 DISCOVERY_S = 2.0
+#: The choice beside the devices.
+RECORDED = {"recording": "nothing: a recording, such as `abs-service import` makes"}
 #: Sides of the simulated sheet [m].
 SIMULATED_SIZE = (0.3, 0.2)
 
@@ -35,6 +38,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", metavar="RIG.toml", type=Path, help="file to write")
     parser.add_argument("--device", choices=DEVICES, help="what is attached")
     parser.add_argument("--uri", help="address of one of several cameras (default: the only one)")
+    parser.add_argument(
+        "--recording", metavar="FILE", type=Path, help="instead of a device: a recording, such as `import` makes"
+    )
     parser.add_argument("--object", choices=OBJECTS, help="what is tracked")
     parser.add_argument(
         "--size", nargs=2, type=float, metavar=("WIDTH", "HEIGHT"), help="of a sheet of known size, in metres"
@@ -58,7 +64,7 @@ def run(arguments: argparse.Namespace) -> int:
         file.write_text(rig_text.write(answers, str(file)), encoding="utf-8")
     except OSError as error:
         raise NewFileError(f"{file}: cannot be written: {error.strerror}") from None
-    print(f"wrote {file}; next:\n  abs-service check {file}\n  abs-service run {file}")
+    print(f"wrote {file}; next:", *rig_text.commands(answers.device, str(file)), sep="\n  ")
     return Exit.OK
 
 
@@ -77,14 +83,9 @@ def answered(arguments: argparse.Namespace, name: str, found: list[Found], ask: 
 
     Raises:
         NewFileError: an answer that is impossible.
+        RecordingError: a recording that cannot be used.
     """
-    attached = {one.info.uri: one.info.model for one in found if device_of(one)}
-    device, uri = arguments.device, arguments.uri
-    if device is None:
-        kinds = {name: device.text for name, device in DEVICES.items()}
-        device = ask("device", "What is attached?", attached | kinds)
-        if device in attached:
-            uri, device = device, next(kind for one in found if one.info.uri == device and (kind := device_of(one)))
+    device, uri = _device(arguments, found, ask)
     thing = arguments.object or ask("object", "What is the object?", OBJECTS)
     size = arguments.size and (arguments.size[0], arguments.size[1])
     if thing == "known-sheet":
@@ -92,15 +93,37 @@ def answered(arguments: argparse.Namespace, name: str, found: list[Found], ask: 
         if not all(0 < side < 100 for side in size):
             raise NewFileError(f"--size {size[0]:g} {size[1]:g}: sides are lengths in metres, above 0")
     color = arguments.color
-    if color is None:
+    if device.color is None:
+        if color:
+            raise NewFileError(f"--color: {device.text} has no colour camera")
+    elif color is None:
         color = ask("color", "Is its colour camera used, too?", {"yes": "print and edges", "no": "distances"}) == "yes"
     behind = arguments.behind or ask("behind", "What is behind the object?", BEHIND)
-    uri = uri or _uri(device, thing)
-    scheme = DEVICES[device].uri.partition(":")[0]
-    if not uri.startswith(f"{scheme}:"):
-        raise NewFileError(f"--uri {uri}: the address of a device {device} begins with {scheme}://")
-    opening.check_address(uri)
-    return Answers(name, device, uri, thing, size or SIMULATED_SIZE, color, behind)
+    uri = uri or ("simulated://strip?seed=1" if (device, thing) == (DEVICES["simulated"], "strip") else device.uri)
+    return Answers(name, device, uri, thing, size or SIMULATED_SIZE, bool(color), behind)
+
+
+def _device(arguments: argparse.Namespace, found: list[Found], ask: Ask) -> tuple[Device, str]:
+    """The device, and its address if it is not the only one of its kind."""
+    kind, uri = arguments.device, arguments.uri or ""
+    if arguments.recording is not None:
+        if kind or uri:
+            raise NewFileError("--recording: the file takes the place of a device; leave out --device and --uri")
+        return recorded.device(arguments.recording), ""
+    if kind is None:
+        attached = {one.info.uri: one.info.model for one in found if device_of(one)}
+        kinds = {name: device.text for name, device in DEVICES.items()} | RECORDED
+        kind = ask("device", "What is attached?", attached | kinds)
+        if kind in RECORDED:
+            return recorded.device(Path(ask("recording", "Which file?", {}))), ""
+        if kind in attached:
+            uri, kind = kind, next(named for one in found if one.info.uri == kind and (named := device_of(one)))
+    scheme = DEVICES[kind].uri.partition(":")[0]
+    if uri:
+        if not uri.startswith(f"{scheme}:"):
+            raise NewFileError(f"--uri {uri}: the address of a device {kind} begins with {scheme}://")
+        opening.check_address(uri)
+    return DEVICES[kind], uri
 
 
 def device_of(found: Found) -> str | None:
@@ -113,10 +136,6 @@ def device_of(found: Found) -> str | None:
     return scheme if scheme in DEVICES and found.info.serial else None
 
 
-def _uri(device: str, thing: str) -> str:
-    return "simulated://strip?seed=1" if (device, thing) == ("simulated", "strip") else DEVICES[device].uri
-
-
 def _size(text: str) -> tuple[float, float]:
     try:
         width, height = map(float, text.replace(",", " ").split())
@@ -126,7 +145,11 @@ def _size(text: str) -> tuple[float, float]:
 
 
 def _refuse(option: str, question: str, choices: Mapping[str, str]) -> str:
-    options = {"size": "two lengths in metres", "color": "--color or --no-color"}
+    options = {
+        "device": f"{', '.join(DEVICES)}; or --recording FILE",
+        "size": "two lengths in metres",
+        "color": "--color or --no-color",
+    }
     allowed = options.get(option) or ", ".join(choices)
     raise NewFileError(f"--{option}: missing, and nobody is there to be asked; allowed: {allowed}")
 

@@ -6,26 +6,11 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class Answers:
-    """Description of a rig, from which its file is written.
+class Color:
+    """A colour camera: name of its sensor, and its noise model."""
 
-    Attributes:
-        name: of the rig.
-        device: one of `DEVICES`.
-        uri: address of the device.
-        object: one of `OBJECTS`.
-        size: lengths of the sides of a sheet of known size [m].
-        color: True if its colour camera is used.
-        behind: one of `BEHIND`.
-    """
-
-    name: str
-    device: str
-    uri: str
-    object: str
-    size: tuple[float, float]
-    color: bool
-    behind: str
+    head: str
+    noise: str
 
 
 @dataclass(frozen=True)
@@ -37,27 +22,54 @@ class Device:
         uri: address of the only one that is attached.
         head: name of its depth sensor.
         noise: noise model of distances, with a comment.
-        color: noise model of colours.
+        color: its colour camera, if there is one.
         tolerance_ms: largest difference of two images of one moment [ms].
         controls: table of controls.
+        address: comment on the address.
+        commands: to use a rig file with, in this order; `{file}` is its path.
     """
 
     text: str
     uri: str
     head: str
     noise: str
-    color: str = '{ type = "color", sigma = 20.0 }'
+    color: Color | None = Color("color", '{ type = "color", sigma = 20.0 }')
     tolerance_ms: float = 17.0
     controls: str = ""
+    address: str = "`abs-service devices` lists the addresses of the cameras that are attached."
+    commands: tuple[str, ...] = ("abs-service check {file}", "abs-service run {file}")
 
 
-_STEREO = """\
+@dataclass(frozen=True)
+class Answers:
+    """Description of a rig, from which its file is written.
+
+    Attributes:
+        name: of the rig.
+        device: its only one.
+        uri: address of the device.
+        object: one of `OBJECTS`.
+        size: lengths of the sides of a sheet of known size [m].
+        color: True if its colour camera is used.
+        behind: one of `BEHIND`.
+    """
+
+    name: str
+    device: Device
+    uri: str
+    object: str
+    size: tuple[float, float]
+    color: bool
+    behind: str
+
+
+STRUCTURED_LIGHT = """\
 # A starting point, that of a PrimeSense camera: random error and step, both in inverse distance [1/m]. Measure yours
 # with `abs-service calibrate noise`.
 noise = { type = "structured_light", noise = 1.425e-3, step = 2.85e-3 }
 """
 
-_TIME_OF_FLIGHT = """\
+TIME_OF_FLIGHT = """\
 # A starting point: 1 cm. Measure yours with `abs-service calibrate noise`.
 noise = { type = "constant", sigma = 0.01 }
 """
@@ -70,7 +82,7 @@ DEVICES: Mapping[str, Device] = {
         "# Deviation [m]: row i belongs to the power i of the distance [m], column j to that of the amplitude.\n"
         'noise = { type = "gaussian_polynomial", sigma = [[1.0425e-2, -2.8187e-6, 3.5261e-10, -1.5195e-14], '
         "[5.0e-4, 0.0, 0.0, 0.0]], amplitudes = [400.0, 10000.0] }\n",
-        '{ type = "color", sigma = 4.0 }',
+        Color("color", '{ type = "color", sigma = 4.0 }'),
         12.0,
     ),
     "kinect1": Device(
@@ -79,14 +91,14 @@ DEVICES: Mapping[str, Device] = {
         "depth",
         "# The disparity's random error (Khoshelham and Elberink, 2012) and its step, both in inverse distance [1/m].\n"
         'noise = { type = "structured_light", noise = 1.425e-3, step = 2.89e-3 }\n',
-        '{ type = "bayer", sigma = 25.0 }',
+        Color("color", '{ type = "bayer", sigma = 25.0 }'),
         controls="auto_exposure = false\nauto_white_balance = false\nexposure_s = 0.02\n",
     ),
-    "realsense": Device("Intel RealSense", "realsense://", "depth", _STEREO),
-    "oak-stereo": Device("OAK with stereo cameras", "oak://?mode=stereo", "depth", _STEREO),
-    "oak-tof": Device("OAK with a time-of-flight camera", "oak://?mode=tof", "tof", _TIME_OF_FLIGHT),
-    "orbbec-stereo": Device("Orbbec Gemini", "orbbec://", "depth", _STEREO),
-    "orbbec-tof": Device("Orbbec Femto", "orbbec://", "depth", _TIME_OF_FLIGHT),
+    "realsense": Device("Intel RealSense", "realsense://", "depth", STRUCTURED_LIGHT),
+    "oak-stereo": Device("OAK with stereo cameras", "oak://?mode=stereo", "depth", STRUCTURED_LIGHT),
+    "oak-tof": Device("OAK with a time-of-flight camera", "oak://?mode=tof", "tof", TIME_OF_FLIGHT),
+    "orbbec-stereo": Device("Orbbec Gemini", "orbbec://", "depth", STRUCTURED_LIGHT),
+    "orbbec-tof": Device("Orbbec Femto", "orbbec://", "depth", TIME_OF_FLIGHT),
 }
 
 OBJECTS: Mapping[str, str] = {
@@ -154,9 +166,9 @@ _CONTROLS = """
 
 _COLOR = """
 # `sigma`, in levels of 256, is what differs between a picture and its prediction, not only the camera's noise.
-[sensors.color]
+[sensors.{color.head}]
 device = "camera"
-noise = {noise}
+noise = {color.noise}
 """
 
 _FILE = """\
@@ -166,13 +178,12 @@ _FILE = """\
 #
 # Written by `abs-service new`. Every other key: docs/reference/configuration.md.
 #
-#   abs-service check {file}
-#   abs-service run {file}
+{commands}
 
 version = 1
 name = "{answers.name}" # on the wire: keys are abs/{answers.name}/…
 
-# `abs-service devices` lists the addresses of the cameras that are attached.
+# {device.address}
 [devices.camera]
 uri = {uri}
 {controls}
@@ -203,18 +214,24 @@ def write(answers: Answers, file: str) -> str:
         answers: description of the rig.
         file: how the file will be called, for its comments.
     """
-    device = DEVICES[answers.device]
-    sensors = [device.head, *(["color"] if answers.color else [])]
+    device = answers.device
+    color = device.color if answers.color else None
+    sensors = [device.head, *([color.head] if color else [])]
     return _FILE.format(
         what=OBJECTS[answers.object].capitalize(),
         behind=BEHIND[answers.behind],
-        file=file,
+        commands="\n".join(f"#   {command}" for command in commands(device, file)),
         uri=json.dumps(answers.uri),
         answers=answers,
         device=device,
         controls=_CONTROLS.format(controls=device.controls) if device.controls else "",
-        color=_COLOR.format(noise=device.color) if answers.color else "",
+        color=_COLOR.format(color=color) if color else "",
         sensors=", ".join(f'"{sensor}"' for sensor in sensors),
         model=_MODELS[answers.object].format(size=answers.size),
         region=_REGIONS[answers.behind],
     )
+
+
+def commands(device: Device, file: str) -> list[str]:
+    """The commands to use a rig file with."""
+    return [command.replace("{file}", file) for command in device.commands]

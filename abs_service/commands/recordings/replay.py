@@ -94,7 +94,10 @@ def configuration(recording: Recording, path: Path | None) -> config.ServiceConf
         ReplayOptionError: none is given and the recording holds none, or it has no tracker.
     """
     if path is None and not recording.config:
-        raise ReplayOptionError(f"{recording.path}: no configuration is in this recording; name one with --config")
+        writes = f"`abs-service new rig.toml --recording {recording.path}` writes one"
+        raise ReplayOptionError(
+            f"{recording.path}: no configuration is in this recording; name one with --config, {writes}"
+        )
     source = f"{recording.path} (rig.toml)"
     base = recording.path.resolve().parent
     settings = config.load(path) if path else config.loads(recording.config, source, base)

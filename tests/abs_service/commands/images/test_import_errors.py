@@ -32,6 +32,7 @@ def test_a_folder_of_open3d_without_intrinsics_is_refused(tmp_path: Path, capsys
     ("camera", "options", "complaint"),
     [
         (CAMERA, ["--depth", "*.tiff"], "no file matches '*.tiff'"),
+        (CAMERA, ["--color", "color_*.png"], "--color: "),
         (CAMERA, ["--mask", "m_*.png"], "no file matches 'm_*.png'"),
         (CAMERA, ["--mask", "mask_*[01].png"], "depth_002.png: no mask that matches 'mask_*[01].png' has the number 2"),
         (

@@ -110,9 +110,9 @@ def test_attached_cameras_are_offered_by_their_addresses():
 
     arguments = cli.command_parser("new", new).parse_args(["x.toml"])
     answers = new.answered(arguments, "x", [kinect, oak, orbbec, nothing], ask)
-    assert offered["device"] == ["kinect1://A00363A01234040A", "oak://1844", "orbbec://CL8", *DEVICES]
+    assert offered["device"] == [*("kinect1://A00363A01234040A", "oak://1844", "orbbec://CL8"), *DEVICES, "recording"]
     assert new.device_of(orbbec) == "orbbec-tof"
-    assert (answers.device, answers.uri, answers.color) == ("oak-tof", "oak://1844", False)
+    assert (answers.device, answers.uri, answers.color) == (DEVICES["oak-tof"], "oak://1844", False)
 
 
 def test_a_person_is_asked(tmp_path):

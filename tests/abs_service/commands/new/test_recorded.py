@@ -1,0 +1,67 @@
+"""`abs-service new --recording` writes the rig file that a recording without one is replayed with."""
+
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from abs_service import cli
+from abs_service.commands.new import recorded
+from abs_service.supervision.exit_codes import Exit
+from drivers.simulated.address import parse
+from tests.abs_service.commands.recordings.simulated_recording import write_take
+from tests.drivers.o3r import pcic_messages
+
+SIMULATION = parse("simulated://sheet?tof=32x24&color=32x24&rate=10").build()
+ANSWERS = ["--object", "sheet", "--behind", "space"]
+
+
+def take(path: Path, names: dict[str, str]) -> Path:
+    return write_take(path, SIMULATION, range(3), names)
+
+
+def test_sensors_noise_and_tolerance_follow_from_the_images(tmp_path, capsys):
+    recording = take(tmp_path / "my take.mcap", {"tof": "range", "color": "eye"})
+    rig = tmp_path / "rig.toml"
+    assert cli.main(["new", str(rig), "--recording", str(recording), *ANSWERS, "--color"]) == Exit.OK
+    assert f"abs-service replay '{recording}' --config {rig}" in capsys.readouterr().out
+    table = tomllib.loads(rig.read_text())
+    assert {name: sensor["noise"]["type"] for name, sensor in table["sensors"].items()} == {
+        "range": "constant",  # it has amplitudes beside its distances, so it is a time-of-flight camera
+        "eye": "color",
+    }
+    assert table["trackers"]["object"]["sensors"] == ["range", "eye"]
+    assert table["synchronisation"] == {"reference": "range/depth", "tolerance_ms": 50.0}  # half of 0.1 s
+    assert cli.main(["check", str(rig)]) == Exit.OK
+    assert cli.main(["check", str(rig), "--replay", str(recording)]) == Exit.OK
+
+
+def test_a_single_image_with_deviations_is_weighed_with_them(tmp_path):
+    out, rig = tmp_path / "out.mcap", tmp_path / "rig.toml"
+    (tmp_path / "buffer.data").write_bytes(pcic_messages.exposure())
+    assert cli.main(["import", str(tmp_path / "buffer.data"), "--layout", "o3r", "--out", str(out)]) == Exit.OK
+    assert cli.main(["new", str(rig), "--recording", str(out), *ANSWERS]) == Exit.OK
+    table = tomllib.loads(rig.read_text())
+    assert table["sensors"]["depth"]["noise"]["type"] == "measured"
+    assert table["synchronisation"]["tolerance_ms"] == 17.0
+
+
+@pytest.mark.parametrize(
+    ("names", "options", "said"),
+    [
+        ({"tof": "tof"}, ["--color"], "--color: recording x.mcap has no colour camera"),
+        ({"tof": "tof"}, ["--device", "kinect1"], "--recording: the file takes the place of a device"),
+        ({"color": "color"}, ["--no-color"], "there are no depth images in it"),
+    ],
+)
+def test_what_the_recording_cannot_give_is_refused(tmp_path, capsys, names, options, said):
+    recording, rig = take(tmp_path / "x.mcap", names), tmp_path / "rig.toml"
+    assert cli.main(["new", str(rig), "--recording", str(recording), *ANSWERS, *options]) == Exit.USER
+    assert said in capsys.readouterr().err
+    assert not rig.exists()
+
+
+def test_of_several_depth_sensors_the_first_by_name_is_taken(tmp_path):
+    both = parse("simulated://sheet?tof=32x24&structured_light=32x24&sensors=tof,structured_light").build()
+    first = recorded.device(write_take(tmp_path / "x.mcap", both, range(2), {"structured_light": "a", "tof": "b"}))
+    assert (first.head, first.color) == ("a", None)
