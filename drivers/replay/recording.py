@@ -4,6 +4,7 @@ import re
 from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 
+from absmsg.v1.deformation_state_pb2 import DeformationState
 from absmsg.v1.frame_info_pb2 import FrameInfo
 from absmsg.v1.sensor_model_pb2 import SensorModel
 from google.protobuf.message import DecodeError
@@ -17,6 +18,7 @@ from drivers.encoding.sensor_model import decode_camera
 from drivers.replay.contents import Contents, RecordingError, scan
 from drivers.replay.messages import messages
 
+STATE_SCHEMA = DeformationState.DESCRIPTOR.full_name
 MODEL_SCHEMA = SensorModel.DESCRIPTOR.full_name
 
 _IMAGE = re.compile(r"/(?P<sensor>[^/]+)/(?P<stream>[^/]+)/image")
@@ -136,5 +138,7 @@ def _image_counts(path: Path, contents: Contents) -> Mapping[tuple[str, str], in
             )
         counts[match["sensor"], match["stream"]] = topic.count
     if not counts:
-        raise RecordingError(f"{path}: there are no images in this file, its topics are {sorted(names)}")
+        tracked = any(topic.schema == STATE_SCHEMA for topic in contents.topics.values())
+        way_out = "; `abs-service replay --images` writes estimates and images" if tracked else ""
+        raise RecordingError(f"{path}: there are no images in this file, its topics are {sorted(names)}{way_out}")
     return counts

@@ -42,7 +42,7 @@ class ShotRecording:
         self._file = McapFile(self._stream)
         now_ns = headers.clock.wall(headers.clock.monotonic())
         self._file.attach("rig.toml", "text/toml", rig_toml.encode(), now_ns)
-        self._write_cameras(cameras, now_ns)
+        sensor_metadata.write_cameras(self._file, headers.now(0), cameras, now_ns)
 
     def write(self, shot: Shot) -> None:
         """Appends a shot and flushes it to disk.
@@ -69,15 +69,6 @@ class ShotRecording:
             raise ShotFileError(f"{self._path}: cannot be written: {error.strerror}") from error
         finally:
             self._stream.close()
-
-    def _write_cameras(self, cameras: Mapping[str, Camera], wall_ns: int) -> None:
-        for sensor, camera in cameras.items():
-            model = sensor_metadata.sensor_model(self._headers.now(0), sensor, camera, {})
-            calibration = sensor_metadata.calibration(sensor, camera, wall_ns)
-            for topic, message in ((keys.model(sensor), model), (keys.calibration(sensor), calibration)):
-                self._file.write(f"/{topic}", message.DESCRIPTOR.full_name, message.SerializeToString(), wall_ns, 0)
-        poses = sensor_metadata.transforms(cameras, wall_ns)
-        self._file.write(f"/{keys.TRANSFORMS}", poses.DESCRIPTOR.full_name, poses.SerializeToString(), wall_ns, 0)
 
     def _write_frame(self, frame: Frame) -> None:
         topic, wall_ns = keys.image(frame.sensor, frame.stream), self._headers.clock.wall(frame.t_host_ns)

@@ -11,7 +11,6 @@ from rich.progress import track
 
 from abs_service.bus import keys
 from abs_service.capture import sensor_metadata
-from calib.camera import Camera
 from drivers.contract.frame import Frame
 from drivers.encoding import codec
 from drivers.encoding.foreign_recording import ForeignRecording, ForeignRecordingError
@@ -43,23 +42,14 @@ def write(path: Path, rig: str, recording: ForeignRecording, rig_toml: bytes) ->
         file = McapFile(stream)
         if rig_toml:
             file.attach("rig.toml", "text/toml", rig_toml, first.t_host_ns)
-        _write_cameras(file, rig, recording.cameras, first.t_host_ns)
+        header = _header(rig, first.t_host_ns, 0)
+        sensor_metadata.write_cameras(file, header, recording.cameras, first.t_host_ns)
         console = Console(stderr=True)
         for frame in track(chain([first], frames), "importing", recording.total, console=console, transient=True):
             _write_frame(file, rig, frame)
             counts[frame.key] += 1
         file.finish()
     return counts
-
-
-def _write_cameras(file: McapFile, rig: str, cameras: Mapping[str, Camera], wall_ns: int) -> None:
-    for sensor, camera in cameras.items():
-        model = sensor_metadata.sensor_model(_header(rig, wall_ns, 0), sensor, camera, {})
-        calibration = sensor_metadata.calibration(sensor, camera, wall_ns)
-        for topic, message in ((keys.model(sensor), model), (keys.calibration(sensor), calibration)):
-            file.write(f"/{topic}", message.DESCRIPTOR.full_name, message.SerializeToString(), wall_ns, 0)
-    transforms = sensor_metadata.transforms(cameras, wall_ns)
-    file.write(f"/{keys.TRANSFORMS}", transforms.DESCRIPTOR.full_name, transforms.SerializeToString(), wall_ns, 0)
 
 
 def _write_frame(file: McapFile, rig: str, frame: Frame) -> None:

@@ -46,6 +46,6 @@ def device(path: Path) -> Device:
         address=f"The recording; `abs-service info {shown}` describes it.",
         commands=(
             "abs-service check {file} --picture first.png",
-            f"abs-service replay {shown} --config " + "{file}",
+            f"abs-service replay {shown} --images --config " + "{file}",
         ),
     )

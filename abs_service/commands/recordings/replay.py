@@ -2,6 +2,7 @@
 
   abs-service replay recordings/x.mcap                          with the configuration that it was recorded with
   abs-service replay recordings/x.mcap --config rig.toml        with another one
+  abs-service replay recordings/x.mcap --images                 with the images, to view both or make a film
   abs-service replay recordings/x.mcap --json > estimates.jsonl one JSON object per estimate, for scripts
   abs-service replay recordings/x.mcap --picture first.png      draws what will be tracked first
   abs-service replay recordings/x.mcap --speed 1                in real time, through the processes of `run`
@@ -27,6 +28,7 @@ from abs_service.commands import run as run_command
 from abs_service.commands.parts import logs, preview_option, progress
 from abs_service.commands.parts.recorded_rig import ReplayOptionError, draw_previews, recorded_rig
 from abs_service.commands.parts.rig_in_memory import in_memory
+from abs_service.commands.recordings.image_copies import image_copies
 from abs_service.supervision.exit_codes import Exit
 from abs_service.tracking.replay import OfflineTracker, free_path, replay
 from abs_service.tracking.session import TrackingSession
@@ -42,6 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("recording", metavar="FILE", type=Path, help="recording to track")
     parser.add_argument("--config", metavar="RIG", type=Path, help="TOML file (default: the one in the recording)")
     parser.add_argument("--out", metavar="PATH", type=Path, help="file to write; with --speed the folder")
+    parser.add_argument("--images", action="store_true", help="write the images as well, for `view` and films")
     parser.add_argument("--speed", metavar="X", type=float, help="play live, X times as fast as it was recorded")
     parser.add_argument("--json", action="store_true", help="print one JSON object per estimate, no progress bar")
     preview_option.add_argument(parser)
@@ -59,13 +62,18 @@ def run(arguments: argparse.Namespace) -> int:
         for line in draw_previews(settings, recording, arguments.picture):
             print(line, file=sys.stderr if arguments.json else sys.stdout, flush=True)
     if arguments.speed is not None:
+        if arguments.images:
+            raise ReplayOptionError("--images: with --speed, --out FOLDER records the images; leave out --images")
         return _live(settings, arguments)
     out = arguments.out or free_path(arguments.recording)
     if out.exists():
         raise ReplayOptionError(f"--out {out}: exists already; choose another name or remove it")
     with _writing(out, config.to_toml(settings)) as file, progress.bars(disable=arguments.json) as bars:
-        trackers = {name: _tracker(settings, name, recording, file) for name in settings.trackers}
-        _run_through(recording, trackers, bars, arguments.json)
+        headers = _headers(settings, recording)
+        trackers = {name: _tracker(settings, name, recording, headers, file) for name in settings.trackers}
+        cameras = recording.cameras | wiring.cameras(settings, recording.cameras)
+        images = image_copies(recording, cameras, headers, file) if arguments.images else iter(())
+        _run_through(recording, trackers, images, bars, arguments.json)
     output = sys.stderr if arguments.json else sys.stdout
     for name, tracker in trackers.items():
         print(*(f"{name}: {line}" for line in [*tracker.log.summary(), *_unused(tracker)]), sep="\n", file=output)
@@ -96,7 +104,7 @@ def configuration(recording: Recording, path: Path | None) -> config.ServiceConf
     if path is None and not recording.config:
         writes = f"`abs-service new rig.toml --recording {recording.path}` writes one"
         raise ReplayOptionError(
-            f"{recording.path}: no configuration is in this recording; name one with --config, {writes}"
+            f"{recording.path}: no configuration is in this recording; name one with --config; {writes}"
         )
     source = f"{recording.path} (rig.toml)"
     base = recording.path.resolve().parent
@@ -106,16 +114,22 @@ def configuration(recording: Recording, path: Path | None) -> config.ServiceConf
     return settings
 
 
-def _tracker(settings: config.ServiceConfig, name: str, recording: Recording, file: McapFile) -> OfflineTracker:
-    rig, synchroniser = recorded_rig(settings, name, recording)
+def _headers(settings: config.ServiceConfig, recording: Recording) -> HeaderFactory:
     clock = WallClock(monotonic=lambda: 0, wall=lambda: recording.wall_offset_ns)
+    return HeaderFactory(settings.name, clock, boot_id="replay")
+
+
+def _tracker(
+    settings: config.ServiceConfig, name: str, recording: Recording, headers: HeaderFactory, file: McapFile
+) -> OfflineTracker:
+    rig, synchroniser = recorded_rig(settings, name, recording)
     return OfflineTracker(
         name,
         TrackingSession(rig, wiring.plan(settings, name)),
         synchroniser,
         wiring.model_name(settings, name),
         rig.calib_id,
-        HeaderFactory(settings.name, clock, boot_id="replay"),
+        headers,
         file,
         time.monotonic_ns,
     )
@@ -126,16 +140,25 @@ def _unused(tracker: OfflineTracker) -> list[str]:
     return [f"frames in no set: {', '.join(f'{name} {n}' for name, n in counters.items())}"] if counters else []
 
 
-def _run_through(recording: Recording, trackers: dict[str, OfflineTracker], bars: Progress, as_json: bool) -> None:
+def _run_through(
+    recording: Recording,
+    trackers: dict[str, OfflineTracker],
+    images: Iterator[None],
+    bars: Progress,
+    as_json: bool,
+) -> None:
     task = bars.add_task("images", total=sum(recording.counts.values()))
     for _, report in replay(recording, trackers):
         if report is None:
+            next(images, None)
             bars.advance(task)
         elif as_json:
             print(json.dumps(report.as_dict(), ensure_ascii=False), flush=True)
         else:
             error = "" if report.error_mm is None else f", error {report.error_mm:.2f} mm"
             bars.update(task, description=f"{report.tracker} {report.status}{error}")
+    for _ in images:
+        pass
 
 
 @contextmanager

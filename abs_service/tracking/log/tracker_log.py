@@ -138,19 +138,21 @@ class TrackerLog:
             yield self._report(state, mesh)
 
     def summary(self) -> list[str]:
-        """Summary in one or two lines."""
+        """Summary in one to three lines."""
         line = f"{self.estimates} estimates, {self.skipped} frame sets skipped"
         if self.estimates:
             line += f", {self.solve_ms.mean:.1f} ms each"
             line += ", " + ", ".join(f"{number} {status}" for status, number in self.statuses.most_common())
+        lines = [line]
+        if self.last and self.last.reasons:
+            lines.append(f"{self.last.status} at the end: {'; '.join(self.last.reasons)}")
         error, surface = self.error_mm, self.surface_mm
-        if not error.count:
-            return [line]
-        return [
-            line,
-            f"vertex error mean {error.mean:.2f} mm, max {error.max:.2f} mm; "
-            f"surface error mean {surface.mean:.2f} mm, max {surface.max:.2f} mm",
-        ]
+        if error.count:
+            lines.append(
+                f"vertex error mean {error.mean:.2f} mm, max {error.max:.2f} mm; "
+                f"surface error mean {surface.mean:.2f} mm, max {surface.max:.2f} mm"
+            )
+        return lines
 
     def _report(self, state: DeformationState, mesh: DeformedMesh) -> EstimateReport:
         errors = self.truth.compare(state.header.t_host_ns, points(mesh.vertices_f32))

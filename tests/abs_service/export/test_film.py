@@ -61,7 +61,7 @@ def test_a_film_has_a_picture_for_each_estimate(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("part", "complaint"), [("image", "there are no images in this file"), ("model", "has images of its moment")]
+    ("part", "complaint"), [("image", "`abs-service replay --images` writes"), ("model", "has images of its moment")]
 )
 def test_estimates_without_images_or_cameras_are_no_film(tmp_path, capsys, part, complaint):
     recording = write_without(tmp_path, part)

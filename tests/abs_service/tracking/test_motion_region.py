@@ -16,7 +16,7 @@ def test_what_moves_is_tracked_and_found_again_on_request():
     begun = [step.estimate for step in drive(tracking, SIMULATION, range(60, 110))]
     waiting = [estimate for estimate in begun if estimate.status == Status.INITIALIZING]
     assert 15 <= len(waiting) < 50
-    assert "in the images of 0.5 s, of which 0.0 s are there" in waiting[0].reasons[0]
+    assert "in the images of 0.5 s, of which 0.00 s are there" in waiting[0].reasons[0]
     assert tracking.mesh_version == 1
     tracking.reinitialize()
     list(drive(tracking, SIMULATION, range(110, 120)))

@@ -110,7 +110,7 @@ class MotionSeed:
         compared_s = self._remember(view)
         if compared_s < self._seconds:
             raise UndecidedError(
-                f"what moves is looked for in the images of {self._seconds:g} s, of which {compared_s:.1f} s are there"
+                f"what moves is looked for in the images of {self._seconds:g} s, of which {compared_s:.2f} s are there"
             )
         before = np.sort([np.nan_to_num(distance, nan=-np.inf) for _, distance in self._before], axis=0)
         with np.errstate(invalid="ignore"):

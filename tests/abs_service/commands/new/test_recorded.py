@@ -24,7 +24,7 @@ def test_sensors_noise_and_tolerance_follow_from_the_images(tmp_path, capsys):
     recording = take(tmp_path / "my take.mcap", {"tof": "range", "color": "eye"})
     rig = tmp_path / "rig.toml"
     assert cli.main(["new", str(rig), "--recording", str(recording), *ANSWERS, "--color"]) == Exit.OK
-    assert f"abs-service replay '{recording}' --config {rig}" in capsys.readouterr().out
+    assert f"abs-service replay '{recording}' --images --config {rig}" in capsys.readouterr().out
     table = tomllib.loads(rig.read_text())
     assert {name: sensor["noise"]["type"] for name, sensor in table["sensors"].items()} == {
         "range": "constant",  # it has amplitudes beside its distances, so it is a time-of-flight camera

@@ -115,6 +115,24 @@ def check_mesh(topics):
     assert {sensor.sensor for sensor in state.sensors} == {"tof", "color"}
 
 
+def test_with_its_images_a_replay_is_a_recording_that_replays_to_the_same(recording, replayed, tmp_path):
+    rig, out, again = tmp_path / "rig.toml", tmp_path / "out.mcap", tmp_path / "again.mcap"
+    table = "[sensors.color.camera]\n"
+    rig.write_text(TOML.replace(table, f"{table}T_rs = {{ translation = [0.06, 0.0, 0.0] }}\n"))
+    assert cli.main(["replay", str(recording), "--config", str(rig), "--images", "--out", str(out)]) == Exit.OK
+    source, copy = Recording(recording), Recording(out)
+    assert copy.counts == source.counts
+    assert copy.cameras["tof"].calib_id == source.cameras["tof"].calib_id
+    assert copy.cameras["color"].center.tolist() == [0.06, 0.0, 0.0]  # that of the replay
+    assert cli.main(["replay", str(out), "--out", str(again)]) == Exit.OK
+    assert thetas(again) == thetas(out) != thetas(replayed[0])
+
+
+def test_images_of_a_live_replay_are_recorded_by_run(recording, capsys):
+    assert cli.main(["replay", str(recording), "--images", "--speed", "1"]) == Exit.USER
+    assert "--out FOLDER records the images" in capsys.readouterr().err
+
+
 def test_one_json_object_per_estimate(recording, tmp_path, capsys):
     assert cli.main(["replay", str(recording), "--json", "--out", str(tmp_path / "out.mcap")]) == Exit.OK
     captured = capsys.readouterr()
@@ -136,6 +154,15 @@ def test_one_json_object_per_estimate(recording, tmp_path, capsys):
     assert "vertex error mean" in captured.err
 
 
+def test_the_last_reason_is_told_in_the_summary(recording, tmp_path, capsys):
+    rig = tmp_path / "rig.toml"
+    rig.write_text(TOML.replace("minimum_pixels = 200", "minimum_pixels = 1000000"))
+    assert cli.main(["replay", str(recording), "--config", str(rig), "--out", str(tmp_path / "out.mcap")]) == Exit.OK
+    summary = capsys.readouterr().out
+    assert "20 INITIALIZING\n" in summary
+    assert "sheet: INITIALIZING at the end: no connected surface of at least minimum_pixels" in summary
+
+
 def test_what_exists_is_not_overwritten(recording, tmp_path, capsys):
     out = tmp_path / "out.mcap"
     out.write_bytes(b"precious")
@@ -152,7 +179,9 @@ def test_a_folder_that_is_not_there_is_named(recording, tmp_path, capsys):
 def test_a_recording_without_configuration_needs_one(tmp_path, capsys):
     bare = write(tmp_path / "bare.mcap", toml="")
     assert cli.main(["replay", str(bare)]) == Exit.USER
-    assert "no configuration is in this recording; name one with --config" in capsys.readouterr().err
+    assert (
+        f"name one with --config; `abs-service new rig.toml --recording {bare}` writes one" in capsys.readouterr().err
+    )
     rig = tmp_path / "rig.toml"
     rig.write_text(TOML)
     assert cli.main(["replay", str(bare), "--config", str(rig), "--out", str(tmp_path / "out.mcap")]) == Exit.OK
