@@ -40,7 +40,7 @@ def load(package: str, table: Any, base: Path, *others: str) -> Any:
     packages = (package, *others)
     if not isinstance(table, dict) or not isinstance(table.get("type"), str):
         types = available(*packages)
-        example = f'{{ type = "{types[0]}", … }}'
+        example = f'{{ type = "{table if isinstance(table, str) and table in types else types[0]}", … }}'
         raise ProblemsError([Problem((), f"must be a table such as {example}; types: {', '.join(types)}", table)])
     name = table["type"]
     module = next(filter(None, (_module(package, name) for package in packages)), None)

@@ -6,6 +6,12 @@ from typing import Any
 from abs_service.config.problems import Problem, allowed_instead
 from abs_service.config.tables.values import URI
 
+#: Starting points that need no measurement.
+NOISE_EXAMPLES = (
+    '{ type = "structured_light" } of a structured-light or stereo camera, { type = "constant", sigma = 0.01 } [m] of '
+    'a time-of-flight camera, { type = "color", sigma = 20.0 } of colours'
+)
+
 
 def check(file: dict[str, Any]) -> list[Problem]:
     """All dangling or ambiguous references in a file.
@@ -63,7 +69,8 @@ def _trackers(file: dict[str, Any]) -> Iterator[Problem]:
                 )
             elif "noise" not in sensors[sensor]:
                 yield Problem(
-                    ("sensors", sensor, "noise"), f'missing, but tracker "{name}" weighs its measurements with it'
+                    ("sensors", sensor, "noise"),
+                    f'missing, but tracker "{name}" weighs its measurements with it, such as {NOISE_EXAMPLES}',
                 )
             if sensor in used[:index]:
                 yield Problem(("trackers", name, "sensors", index), "named twice", sensor)

@@ -112,7 +112,8 @@ def _summary(path: Path, stream: BinaryIO) -> Summary | None:
     try:
         reader = SeekingReader(stream)
     except DAMAGE as error:
-        raise RecordingError(f"{path}: this is no MCAP file ({stream.seek(0, 2)} bytes)") from error
+        what = f"{path}: this is no MCAP file ({stream.seek(0, 2)} bytes)"
+        raise RecordingError(f"{what}; `abs-service import` reads recordings of other tools") from error
     try:
         return reader.get_summary()
     except (*DAMAGE, OSError):  # the latter if the file is shorter than the end of a finished one

@@ -24,7 +24,7 @@ def show(summary: Summary) -> None:
     lines = [
         f"{summary.path}: {size(summary.size_bytes)}, {time}{state}{damage}",
         "sensors: " + (", ".join(f"{name} {w} × {h} px" for name, (w, h) in found["sensors"].items()) or "none"),
-        f"configuration and calibration: {', '.join(found['attachments']) or 'none'}",
+        f"attached: {', '.join(found['attachments']) or 'no configuration'}",
         *recorded_configuration.lines(found["configuration"]),
         *(f"{name} = {number}" for name, number in found["losses"].items()),
     ]

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from abs_service import config
+from abs_service.config import references
 from tests.abs_service.config.sensors_file import SENSORS, loads
 
 
@@ -160,7 +161,7 @@ def test_a_tracker_needs_sensors_with_noise_models_and_a_reference():
     assert 'trackers.tof.reference = "tov/depth": no such sensor, did you mean "tof"? allowed: color, tof' in found
     assert "trackers.tof: a sensor has this name" in found
     assert 'trackers.tof.sensors[1] = "rgb": no such sensor, allowed: color, tof' in found
-    assert 'sensors.color.noise: missing, but tracker "tof" weighs its measurements with it' in found
+    assert 'sensors.color.noise: missing, but tracker "tof" weighs its measurements with it, such as {' in found
     assert 'trackers.tof.sensors[3] = "tof": named twice' in found
     assert "trackers.tof.model: missing" in found
 
@@ -200,3 +201,8 @@ def test_a_file_that_is_no_rig_file_is_refused_without_being_read_to_its_end(tmp
 def test_a_device_without_end_is_no_rig_file():
     with pytest.raises(config.ConfigError, match=r"/dev/zero: .*no regular file"):
         config.load(Path("/dev/zero"))
+
+
+@pytest.mark.parametrize("offered", re.findall(r"\{.*?\}", references.NOISE_EXAMPLES))
+def test_a_noise_model_that_a_message_offers_is_one(offered):
+    loads(SENSORS.replace('head = "rgb"', f"noise = {offered}"))

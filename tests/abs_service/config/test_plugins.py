@@ -107,9 +107,12 @@ def test_errors_of_the_settings_class_are_reported_verbatim(package):
     assert "degree must be below" in problems(package, {"type": "bendy", "degree": 4})[0]
 
 
-@pytest.mark.parametrize("table", ["bendy", 3, {}, {"type": 1}])
-def test_what_is_no_table_with_a_type_is_answered_with_an_example(package, table):
-    assert 'must be a table such as { type = "around"' in problems(package, table)[0]
+@pytest.mark.parametrize(
+    ("table", "example"),
+    [("bendy", "bendy"), ("bend", "around"), (3, "around"), ({}, "around"), ({"type": 1}, "around")],
+)
+def test_what_is_no_table_with_a_type_is_answered_with_an_example(package, table, example):
+    assert f'must be a table such as {{ type = "{example}"' in problems(package, table)[0]
 
 
 def test_a_part_may_hold_another_part(package):
@@ -134,7 +137,7 @@ def test_problems_in_both_parts_are_reported_with_their_full_keys(package):
     ("table", "message"),
     [
         ({}, "inner: missing, but needed"),
-        ({"inner": "bendy"}, 'inner = "bendy": must be a table such as { type = "around"'),
+        ({"inner": "bendy"}, 'inner = "bendy": must be a table such as { type = "bendy"'),
         ({"inner": {"type": "bend"}}, 'inner.type = "bend": no such type, did you mean "bendy"?'),
     ],
 )
