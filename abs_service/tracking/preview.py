@@ -57,13 +57,13 @@ class Preview:
     """The object that a tracker would track.
 
     Attributes:
-        number: index of the frame set that is shown: the first one in which the object is found, else the first one
+        number: index of the frame set that is shown: the first one in which the object is found, else the last one
             with a depth image.
         camera: camera of the reference sensor.
         distance: its radial distances (height, width) [m], NaN without return.
         selected: pixels (height, width) that the region selects; none if it finds no object.
         found: the mesh made from them; None if there is none.
-        reason: why the first depth image shows no object; "" if it does.
+        reason: why the first depth image shows no object, "" if it does; if none does, why the last one shows none.
         warnings: doubts about the object, and why tracking would not begin with the status TRACKING.
         derived: numbers that follow from this image unless keys give them, by key.
     """
@@ -93,17 +93,18 @@ def preview(frame_sets: Iterable[FrameSet], rig: Rig, plan: Plan) -> Preview:
     observer, region = Observer(rig), plan.region.build()
     template = build_template(plan.template, plan.vertices)
     first: Preview | None = None
+    last: Preview | None = None
     number = -1
     for number, frames in enumerate(frame_sets):
         seen = _look(number, observer.observe(frames), rig, plan, region, template)
         if seen is None:
             continue
-        first = first or seen
+        first, last = first or seen, seen
         if seen.found is not None:
             return replace(seen, reason=first.reason)
-    if first is None:
+    if last is None:
         raise PreviewError(f"no depth image from {plan.reference} in {number + 1} frame sets")
-    return first
+    return last
 
 
 def _look(

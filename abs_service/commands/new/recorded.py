@@ -43,6 +43,7 @@ def device(path: Path) -> Device:
         next(noise, STRUCTURED_LIGHT),
         Color(colors[0][0], _COLORS[colors[0][1]]) if colors else None,
         round(500.0 * period_s, 1) or 17.0,
+        min(2.0, max(0.5, round(recording.duration_s / 2, 1))),
         address=f"The recording; `abs-service info {shown}` describes it.",
         commands=(
             "abs-service check {file} --picture first.png",

@@ -24,6 +24,7 @@ class Device:
         noise: noise model of distances, with a comment.
         color: its colour camera, if there is one.
         tolerance_ms: largest difference of two images of one moment [ms].
+        motion_s: time within which an object shows itself by its motion [s].
         controls: table of controls.
         address: comment on the address.
         commands: to use a rig file with, in this order; `{file}` is its path.
@@ -35,6 +36,7 @@ class Device:
     noise: str
     color: Color | None = Color("color", '{ type = "color", sigma = 20.0 }')
     tolerance_ms: float = 17.0
+    motion_s: float = 2.0
     controls: str = ""
     address: str = "`abs-service devices` lists the addresses of the cameras that are attached."
     commands: tuple[str, ...] = ("abs-service check {file}", "abs-service run {file}")
@@ -146,16 +148,16 @@ model = {{ type = "rigid" }}
 _REGIONS = {
     "space": """\
 # The object is the surface nearest to the camera when tracking begins.
-region = { type = "nearest" }
+region = {{ type = "nearest" }}
 """,
     "plane": """\
 # The object is what stands out from the largest plane in view by more than clearance_m when tracking begins.
-# What lies flat on it does not; region = { type = "seed", pixel = [320, 240], grow = "color" } finds it by its colour.
-region = { type = "above_plane", clearance_m = 0.01 }
+# What lies flat on it does not; region = {{ type = "seed", pixel = [320, 240], grow = "color" }} finds it by colour.
+region = {{ type = "above_plane", clearance_m = 0.01 }}
 """,
     "things": """\
-# The object is what moves within the first two seconds; everything else has to rest meanwhile.
-region = { type = "seed", motion_s = 2.0 }
+# The object is what moves within the first {motion_s} seconds; everything else has to rest meanwhile.
+region = {{ type = "seed", motion_s = {motion_s} }}
 """,
 }
 
@@ -228,7 +230,7 @@ def write(answers: Answers, file: str) -> str:
         color=_COLOR.format(color=color) if color else "",
         sensors=", ".join(f'"{sensor}"' for sensor in sensors),
         model=_MODELS[answers.object].format(size=answers.size),
-        region=_REGIONS[answers.behind],
+        region=_REGIONS[answers.behind].format(motion_s=device.motion_s),
     )
 
 

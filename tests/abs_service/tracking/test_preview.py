@@ -80,9 +80,9 @@ def test_the_first_frame_with_the_object_is_shown():
     assert "no connected surface" in seen.reason
 
 
-def test_without_an_object_the_first_frame_and_the_reason_are_shown():
+def test_without_an_object_the_last_frame_and_the_reason_are_shown():
     seen = preview(frame_sets(30, 31, empty=2), RIG, PLAN)
-    assert (seen.number, seen.found, seen.selected.any()) == (0, None, np.False_)
+    assert (seen.number, seen.found, seen.selected.any()) == (1, None, np.False_)
     assert np.isnan(seen.distance).all()
     assert "no connected surface" in seen.reason
 

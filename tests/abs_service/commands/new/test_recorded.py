@@ -36,6 +36,13 @@ def test_sensors_noise_and_tolerance_follow_from_the_images(tmp_path, capsys):
     assert cli.main(["check", str(rig), "--replay", str(recording)]) == Exit.OK
 
 
+def test_motion_is_looked_for_in_half_of_a_short_recording(tmp_path):
+    rig, recording = tmp_path / "rig.toml", write_take(tmp_path / "x.mcap", SIMULATION, range(21), {"tof": "tof"})
+    answers = ["--object", "body", "--behind", "things"]
+    assert cli.main(["new", str(rig), "--recording", str(recording), *answers]) == Exit.OK
+    assert tomllib.loads(rig.read_text())["trackers"]["object"]["region"] == {"type": "seed", "motion_s": 1.0}
+
+
 def test_a_single_image_with_deviations_is_weighed_with_them(tmp_path):
     out, rig = tmp_path / "out.mcap", tmp_path / "rig.toml"
     (tmp_path / "buffer.data").write_bytes(pcic_messages.exposure())
