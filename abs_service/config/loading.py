@@ -23,6 +23,8 @@ def load(path: Path) -> ServiceConfig:
     Raises:
         ConfigError: the file cannot be read or used; names all that is wrong with it.
     """
+    if path.suffix == ".mcap":
+        raise ConfigError(f"{path}: this is a recording, not a configuration; `abs-service replay` tracks it")
     try:
         text = limited.text(path)
     except OSError as error:

@@ -67,6 +67,13 @@ DEPTH_SCALES = {"open3d": 0.001, "pairs": 0.001, "tum": 1 / 5000}
 PATTERNS = {"open3d": ("depth/*.png", "color/*"), "pairs": ("depth_*.png", "color_*.[jp]*g")}
 #: Layouts that are one file and know their cameras.
 RECORDINGS = ("azure", "o3r", "oak", "realsense", "ros2", "sens")
+#: Options of a layout; those that are not here have none.
+OPTIONS = {
+    "open3d": ("camera", "depth", "color", "rate", "frames"),
+    "pairs": ("camera", "depth", "color", "mask", "rate", "frames"),
+    "sens": ("rate", "frames"),
+    "tum": ("camera", "frames"),
+}
 #: Exposures per second of numbered images, if no option tells [Hz].
 RATE_HZ = 30.0
 
@@ -106,6 +113,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Imports; errors of the images or options are raised as errors of this package or of `drivers`."""
+    _check_options(arguments)
     rig_toml = _rig(arguments.rig)
     foreign_recording = _foreign_recording(arguments)
     if arguments.out.exists():
@@ -127,16 +135,19 @@ def run(arguments: argparse.Namespace) -> int:
     return Exit.OK
 
 
+def _check_options(arguments: argparse.Namespace) -> None:
+    own = OPTIONS.get(arguments.layout, ())
+    for option in OPTIONS["pairs"]:
+        if option not in own and getattr(arguments, option) not in (None, frame_numbers.ALL):
+            allowed = ", ".join(f"--{name}" for name in own) or "no options but --out and --rig"
+            raise ImportOptionError(f"--{option}: layout {arguments.layout} takes {allowed}")
+
+
 def _foreign_recording(arguments: argparse.Namespace) -> ForeignRecording:
     if arguments.layout not in RECORDINGS:
         return ImageFolder(_streams(arguments, _cameras(arguments)))
-    for option in ("camera", "mask"):
-        if getattr(arguments, option) is not None:
-            raise ImportOptionError(f"--{option}: a recording with layout {arguments.layout} needs none")
     if arguments.layout == "sens":
         return _sens(arguments)
-    if arguments.frames is not frame_numbers.ALL:
-        raise ImportOptionError(f"--frames: a recording with layout {arguments.layout} is imported as a whole")
     return open_recording(arguments.layout, arguments.path)
 
 
@@ -176,8 +187,6 @@ def _rig(path: Path | None) -> bytes:
 def _streams(arguments: argparse.Namespace, cameras: CameraFile) -> Mapping[str, Images]:
     """The images to import, by sensor name."""
     numbered = arguments.layout in PATTERNS
-    if arguments.mask is not None and arguments.layout != "pairs":
-        raise ImportOptionError("--mask: only layout pairs has masks")
     folder, rate = arguments.path, arguments.rate or RATE_HZ
     if not folder.is_dir():
         raise ImageFolderError(f"{folder}: no such folder")

@@ -191,4 +191,5 @@ def _translated_errors(path: Path) -> Iterator[None]:
     except OSError as error:
         raise ForeignRecordingError(f"{path}: cannot be read: {error.strerror or error}") from error
     except Exception as error:  # MCAP and protobuf readers raise arbitrary exceptions for corrupt bytes
-        raise ForeignRecordingError(f"{path}: this is no recording of depthai, or a damaged one: {error!r}") from error
+        what = f"{type(error).__name__}: {error}"  # the repr of a UnicodeDecodeError holds all that it could not decode
+        raise ForeignRecordingError(f"{path}: this is no recording of depthai, or a damaged one: {what}") from error

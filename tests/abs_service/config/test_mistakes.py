@@ -182,6 +182,8 @@ def test_a_duplicate_name_is_reported_with_the_line():
 def test_a_file_that_cannot_be_read_is_named(tmp_path):
     with pytest.raises(config.ConfigError, match=r"none\.toml: cannot be read: No such file"):
         config.load(tmp_path / "none.toml")
+    with pytest.raises(config.ConfigError, match=r"x\.mcap: this is a recording, not a configuration"):
+        config.load(tmp_path / "x.mcap")
     (tmp_path / "latin.toml").write_bytes(b'name = "\xe4"')
     with pytest.raises(config.ConfigError, match="byte 8"):
         config.load(tmp_path / "latin.toml")

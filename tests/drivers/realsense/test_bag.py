@@ -142,6 +142,10 @@ def test_other_files_are_rejected_with_their_name(tmp_path: Path) -> None:
     (tmp_path / "text.bag").write_bytes(b"no bag")
     with pytest.raises(ForeignRecordingError, match=r"text.bag: this is no ROS 1 bag"):
         RealsenseBag(tmp_path / "text.bag")
+    (tmp_path / "film.mkv").write_bytes(b"\x1aE\xdf\xa3\xa3B\x86\x81" * 1000 + b"\n")
+    with pytest.raises(ForeignRecordingError, match=r"film.mkv: this is no ROS 1 bag") as caught:
+        RealsenseBag(tmp_path / "film.mkv")
+    assert len(str(caught.value)) < 300
     with pytest.raises(ForeignRecordingError, match=r"nothing.bag: cannot be read"):
         RealsenseBag(tmp_path / "nothing.bag")
     with pytest.raises(ForeignRecordingError, match="has no camera_info"):

@@ -52,7 +52,9 @@ def test_a_folder_of_open3d_without_intrinsics_is_refused(tmp_path: Path, capsys
         (None, [], "--camera: layout pairs needs a camera file"),
         (CAMERA, ["--rig", "nowhere.toml"], "nowhere.toml: cannot be read"),
         (CAMERA, ["--layout", "tum"], "depth.txt: cannot be read"),
-        (CAMERA, ["--layout", "tum", "--mask", "m*"], "--mask: only layout pairs has masks"),
+        (CAMERA, ["--layout", "tum", "--mask", "m*"], "--mask: layout tum takes --camera, --frames"),
+        (CAMERA, ["--layout", "tum", "--depth", "d*"], "--depth: layout tum takes --camera, --frames"),
+        (CAMERA, ["--layout", "tum", "--rate", "9"], "--rate: layout tum takes --camera, --frames"),
         (CAMERA, ["--out", "/nowhere/at/all.mcap"], "/nowhere/at/all.mcap: cannot be written: No such file"),
     ],
 )
@@ -85,7 +87,7 @@ def test_frames_that_are_not_there_are_refused(
     assert "--frames 7:9: no image has such a number; there are 0 to 2" in capsys.readouterr().err
     arguments = ["import", str(tmp_path), "--layout", "o3r", "--out", str(tmp_path / "x.mcap"), "--frames", "0:2"]
     assert cli.main(arguments) == Exit.USER
-    assert "--frames: a recording with layout o3r is imported as a whole" in capsys.readouterr().err
+    assert "--frames: layout o3r takes no options but --out" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("frames", ["a", "1:2:0", "1-2", "", "1:2:3:4", "-1:2"])
