@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from abs_service import cli
-from abs_service.commands.new import recorded
+from abs_service.commands.new import new, recorded
 from abs_service.supervision.exit_codes import Exit
 from drivers.simulated.address import parse
 from tests.abs_service.commands.recordings.simulated_recording import write_take
@@ -66,6 +66,14 @@ def test_what_the_recording_cannot_give_is_refused(tmp_path, capsys, names, opti
     assert cli.main(["new", str(rig), "--recording", str(recording), *ANSWERS, *options]) == Exit.USER
     assert said in capsys.readouterr().err
     assert not rig.exists()
+
+
+def test_a_person_who_has_no_camera_is_asked_for_a_recording(tmp_path):
+    path = take(tmp_path / "x.mcap", {"tof": "tof"})
+    said = {"device": "recording", "recording": str(path), "object": "rigid", "behind": "plane"}
+    arguments = cli.command_parser("new", new).parse_args(["x.toml"])
+    answers = new.answered(arguments, "x", [], lambda option, question, choices: said[option])  # not for colours
+    assert (answers.device.head, answers.uri, answers.color) == ("tof", f"replay://{path}", False)
 
 
 def test_of_several_depth_sensors_the_first_by_name_is_taken(tmp_path):
