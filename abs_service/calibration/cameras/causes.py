@@ -6,8 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from abs_service.report.content import Level, Verdict
+from calib.calibration_check import mistakes
 from calib.calibration_check.comparison import Comparison, Explanation
 from calib.calibration_check.hypotheses import TERMS, Kind
+from calib.calibration_check.mistakes import Mistake
+from calib.calibration_check.stored import Views
 from calib.solve.validation.contradictions import Contradiction
 
 #: Distance bias that is as good as any depth camera's, and that is unacceptable [m].
@@ -20,6 +23,23 @@ _ADVICE = {
 }
 _WARM = "Let it warm up for half an hour and look again; if it stays, calibrate its depth terms."
 
+_OF_TWO = (mistakes.Kind.EXCHANGED, mistakes.Kind.REPEATED)
+_MISTAKES = {
+    mistakes.Kind.EXCHANGED: (
+        "the images of {0} seem to be those of {1} and the other way round: with the names exchanged",
+        "Exchange the names of the images, or those in the calibration.",
+    ),
+    mistakes.Kind.REPEATED: ("{0} and {1} have the same images", "Give each sensor its own images."),
+    mistakes.Kind.MIRRORED: (
+        "{0} seems to show the board as in a mirror: mirrored back,",
+        "Switch off the mirroring of the camera or its driver.",
+    ),
+    mistakes.Kind.TURNED: (
+        "the images of {0} seem to be turned by 180°: turned back,",
+        "Switch off the turning of images in the camera or its driver.",
+    ),
+}
+
 
 @dataclass(frozen=True)
 class Reach:
@@ -27,6 +47,14 @@ class Reach:
 
     near: float
     far: float
+
+
+def reaches(views: Views) -> dict[str, Reach]:
+    """Distances of the boards by the sensors that measured them."""
+    found: dict[str, list[float]] = {}
+    for view in views.planes:
+        found.setdefault(view.sensor, []).append(float(np.median(view.distances)))
+    return {name: Reach(min(distances), max(distances)) for name, distances in found.items()}
 
 
 def verdicts(found: Comparison, motion: Level, reaches: Mapping[str, Reach]) -> list[Verdict]:
@@ -64,6 +92,20 @@ def of_contradictions(found: Sequence[Contradiction]) -> list[Verdict]:
     text = f"{'; '.join(map(str, found))}. The others agree; these shots were left out of what follows."
     skipped = ",".join(str(one.shot) for one in found)
     return [Verdict(Level.DOUBTFUL, text, f"Look at the pictures, and leave out what is wrong: --skip {skipped}.")]
+
+
+def of_mistakes(found: Sequence[Mistake]) -> Verdict:
+    """Verdict on images that do not fit because of a mistake, of which there is one at least."""
+    best = found[0]
+    said = "; or ".join(_mistaken(one) for one in found)
+    text = f"{said[0].upper()}{said[1:]}. As given, corners miss by {best.given_px:.3g} px."
+    return Verdict(Level.BAD, f"{text} Nothing else can be said of the calibration.", _MISTAKES[best.kind][1])
+
+
+def _mistaken(mistake: Mistake) -> str:
+    names = mistake.sensors if mistake.kind in _OF_TWO else (" and ".join(mistake.sensors),)
+    said = _MISTAKES[mistake.kind][0].format(*names)
+    return said if np.isnan(mistake.undone_px) else f"{said} corners miss by {mistake.undone_px:.2g} px"
 
 
 def _level(explanation: Explanation, motion: Level, reaches: Mapping[str, Reach]) -> Level:

@@ -1,32 +1,23 @@
 """Verification of a stored calibration against new views of a board, as a report in plain words."""
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from abs_service.calibration.cameras import causes
+from abs_service.calibration.cameras import causes, new_views
 from abs_service.calibration.cameras import verification_tables as tables
 from abs_service.calibration.cameras.causes import UNNOTICED_M, WRONG_M, Reach
 from abs_service.calibration.files.rig_file import RigCalibration
 from abs_service.calibration.shots.corner_extraction import BoardObservations
 from abs_service.report.content import Level, Report, Verdict
 from abs_service.report.provenance import Provenance
-from calib.board.distinct import distinct_poses
-from calib.board.views import PlaneView
+from calib.calibration_check import mistakes
 from calib.calibration_check.alone import CornerFit, DistanceBias, corner_fit, distance_bias
 from calib.calibration_check.changes import PairChange, contradicting, pair_changes
 from calib.calibration_check.comparison import NOT_COMPARED, Comparison, compare
 from calib.calibration_check.hypotheses import TERMS, Kind
 from calib.calibration_check.stored import Stored, Views, usable
-from calib.solve.bundle.parameters.state import SensorState
-
-#: Maximum number of shots, each of another pose of the board.
-MAX_SHOTS = 40
-
-#: Maximum number of distances per view; errors of neighbours are correlated, so more add little.
-MAX_DISTANCES = 300
 
 #: Expected reprojection error if the calibration does not contain its own [px].
 BASELINE_PX = 0.5
@@ -56,7 +47,9 @@ class Verification:
         changes: relative motion of all pairs.
         comparison: explanations of the shots; `NOT_COMPARED` without two sensors that saw the board together.
         reaches: distances of the boards that sensors measured.
-        unseen: sensors without views.
+        likelier: another sensor whose camera fits the corners better, by sensor; "" if there is none.
+        unused: verdicts on sensors without views, and on views that were left out.
+        sensors: number of sensors.
     """
 
     fits: Mapping[str, CornerFit]
@@ -66,7 +59,9 @@ class Verification:
     changes: tuple[PairChange, ...]
     comparison: Comparison
     reaches: Mapping[str, Reach]
-    unseen: tuple[str, ...]
+    likelier: Mapping[str, str]
+    unused: tuple[Verdict, ...]
+    sensors: int
 
 
 def verify(known: RigCalibration, seen: BoardObservations, provenance: Provenance) -> Report:
@@ -81,20 +76,25 @@ def verify(known: RigCalibration, seen: BoardObservations, provenance: Provenanc
         CalibrationCheckError: no usable view.
         NotSolvedError, UndeterminedError: the views do not determine the board poses.
     """
-    found = _found(known, seen)
+    title, stored = f"Verification of {known.name}", new_views.stored_in(known)
+    used = usable(stored, new_views.of_known_sensors(seen, stored))
+    if wrong := mistakes.find(stored, used.corners):
+        said = (causes.of_mistakes(wrong), *new_views.verdicts(stored, seen, used))
+        return Report(title, provenance, said, tuple(tables.refusals(seen)), {})
+    found = _found(known, stored, seen, used)
     sections = [
         tables.sensors(found.fits, found.expected_px, found.biases),
         *tables.pairs(found.changes, found.comparison),
     ]
     sections += [tables.fields(known, found.fits), *tables.refusals(seen)]
     values = tables.values(found.fits, found.biases, found.changes, found.comparison)
-    return Report(f"Verification of {known.name}", provenance, tuple(verdicts(found)), tuple(sections), values)
+    return Report(title, provenance, tuple(verdicts(found)), tuple(sections), values)
 
 
 def verdicts(found: Verification) -> list[Verdict]:
     """Verdicts, the worst first."""
     motion = max((_level(change) for change in found.changes if change.is_significant), default=Level.GOOD)
-    fits = [_of_fit(name, fit, found.expected_px[name]) for name, fit in found.fits.items()]
+    fits = [_of_fit(name, fit, found.expected_px[name], found.likelier[name]) for name, fit in found.fits.items()]
     scatter = _of_scatter(found, max(one.level for one in fits))
     # Shots that do not agree with each other say nothing of a change that lasts.
     disagree = any(one.level == Level.BAD for one in scatter)
@@ -104,24 +104,16 @@ def verdicts(found: Verification) -> list[Verdict]:
     said += [_of_bias(name, bias) for name, bias in found.biases.items() if name not in named]
     changes = [change for change in found.changes if not (disagree or _is_explained(change, found))]
     said += [_of_pair(change, found.comparison) for change in changes]
-    said += [
-        Verdict(Level.DOUBTFUL, "did not see the board, so nothing can be said of it.", "Show it the board too.", name)
-        for name in found.unseen
-    ]
-    if len(found.fits) + len(found.unseen) > 1 and not found.changes:
+    said += found.unused
+    if found.sensors > 1 and not found.changes:
         text = "No two sensors saw the board together often enough to be compared; three shots are needed, better ten."
         said.append(Verdict(Level.DOUBTFUL, text, "Show the board to several sensors at once."))
     return sorted(said, key=lambda verdict: -verdict.level)
 
 
-def _found(known: RigCalibration, seen: BoardObservations) -> Verification:
-    sensors = {
-        name: SensorState(one.camera, one.depth_offset, one.depth_scale, one.time_offset)
-        for name, one in known.sensors.items()
-    }
-    covariance = known.covariance
-    stored = Stored(sensors, covariance.names, covariance.matrix if covariance.names else None)
-    views = _thinned(usable(stored, _ours(seen, sensors)))
+def _found(known: RigCalibration, stored: Stored, seen: BoardObservations, used: Views) -> Verification:
+    sensors = stored.sensors
+    views = new_views.thinned(used)
     observers = dict.fromkeys(view.sensor for view in views.corners)
     biases = {name: distance_bias(stored, views, name) for name in observers}
     changes = tuple(pair_changes(stored, views))
@@ -133,8 +125,10 @@ def _found(known: RigCalibration, seen: BoardObservations) -> Verification:
         {name: bias for name, bias in biases.items() if bias is not None},
         changes,
         _compared(stored, views, changes),
-        _reaches(views),
-        tuple(name for name in sensors if name not in views.shots),
+        causes.reaches(views),
+        {name: mistakes.likelier(stored, views, name) for name in observers},
+        tuple(new_views.verdicts(stored, seen, used)),
+        len(sensors),
     )
 
 
@@ -150,43 +144,14 @@ def _compared(stored: Stored, views: Views, changes: Sequence[PairChange]) -> Co
     return compare(stored, views.of(together, shots)) if together else NOT_COMPARED
 
 
-def _reaches(views: Views) -> dict[str, Reach]:
-    found: dict[str, list[float]] = {}
-    for view in views.planes:
-        found.setdefault(view.sensor, []).append(float(np.median(view.distances)))
-    return {name: Reach(min(distances), max(distances)) for name, distances in found.items()}
-
-
-def _ours(seen: BoardObservations, sensors: Mapping[str, SensorState]) -> Views:
-    return Views(
-        [view for view in seen.corners if view.sensor in sensors],
-        [view for view in seen.planes if view.sensor in sensors],
-    )
-
-
-def _thinned(views: Views) -> Views:
-    """At most a fixed number of evenly spread shots: of each distinct pose the one that most sensors saw."""
-    poses = distinct_poses(views.corners)
-    seen = Counter(view.shot for view in views.corners)
-    best = {poses[shot]: shot for shot in sorted(seen, key=lambda shot: seen[shot])}
-    shots = sorted(best.values())
-    kept = {shots[index] for index in np.linspace(0, len(shots) - 1, min(MAX_SHOTS, len(shots))).round().astype(int)}
-    fewer = views.of(views.shots, kept)
-    return Views(fewer.corners, [_sparse(view) for view in fewer.planes])
-
-
-def _sparse(view: PlaneView) -> PlaneView:
-    every = max(1, len(view.pixels) // MAX_DISTANCES)
-    parts = {part: getattr(view, part)[::every] for part in ("pixels", "distances", "sigmas")}
-    return replace(view, **parts)
-
-
-def _of_fit(name: str, fit: CornerFit, baseline: float) -> Verdict:
+def _of_fit(name: str, fit: CornerFit, baseline: float, likelier: str) -> Verdict:
     said = f"corners miss by {fit.rms:.2f} px; {baseline:.2f} px are usual for it."
     if fit.rms <= DOUBTFUL_RATIO * baseline or fit.rms < UNNOTICED_PX:
         return Verdict(Level.GOOD, f"still projects as it was calibrated: {said}", about=name)
     level = Level.BAD if fit.rms > BAD_RATIO * baseline else Level.DOUBTFUL
     advice = "Was it refocused, zoomed or set to another mode? If so, calibrate its intrinsics again."
+    if likelier:
+        advice = f"The camera of {likelier} fits these corners by far better: are they its images?"
     return Verdict(level, f"no longer projects as it was calibrated: {said}", advice, name)
 
 

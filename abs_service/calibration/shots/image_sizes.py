@@ -44,10 +44,14 @@ def checked_for(shots: Iterable[Shot], cameras: Mapping[str, Camera], calibratio
         for sensor, look in shot.sensor_shots.items():
             size, camera = _size(look), cameras.get(sensor)
             if size is not None and camera is not None and size != (camera.width, camera.height):
+                alike = [name for name, other in cameras.items() if size == (other.width, other.height)]
+                hint = (
+                    f"that is the size of {' and '.join(alike)}: are the names exchanged? Otherwise " if alike else ""
+                )
                 raise ShotsError(
                     f"{_source(shot, look)}: the image of {sensor} is {_text(size)}, but its camera in {calibration} "
-                    f"is for {_text((camera.width, camera.height))}; take images of that size, or scale the camera: "
-                    f"abs-service calibrate convert --size {size[0]}x{size[1]} --sensor {sensor}"
+                    f"is for {_text((camera.width, camera.height))}; {hint}take images of that size, "
+                    f"or scale the camera: abs-service calibrate convert --size {size[0]}x{size[1]} --sensor {sensor}"
                 )
         yield shot
 

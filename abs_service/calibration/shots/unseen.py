@@ -1,6 +1,7 @@
 """One sentence on images of which none shows the board: their number, and the reasons by frequency."""
 
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import replace
 
 from abs_service.calibration.shots.corner_extraction import BoardObservations
@@ -34,7 +35,7 @@ def reason(target: Target, seen: BoardObservations, last: Shot) -> str:
         last: one of the shots, in which boards of similar sizes are looked for.
     """
     count = len(seen.rejected)
-    parts = ", ".join(f"{words} in {number}" for words, number in _reasons(seen).most_common())
+    parts = reasons(seen.rejected.values())
     advice = f". {STILLS}" if mostly_moved(seen) else ""
     like = _similar(target, last)
     found = f". Image {last.number} shows {like}: correct the description of the board" if like else ""
@@ -47,8 +48,10 @@ def mostly_moved(seen: BoardObservations) -> bool:
     return 2 * moved > len(seen.rejected)
 
 
-def _reasons(seen: BoardObservations) -> Counter[str]:
-    return Counter(_WORDS[type(error)] for error in seen.rejected.values())
+def reasons(errors_: Iterable[Exception]) -> str:
+    """Reasons for which images were not used, the most frequent first; "" without any."""
+    counts = Counter(_WORDS[type(error)] for error in errors_)
+    return ", ".join(f"{words} in {number}" for words, number in counts.most_common())
 
 
 def _name(target: Target) -> str:

@@ -21,11 +21,12 @@ from pathlib import Path
 from abs_service.calibration.cameras import verification
 from abs_service.calibration.files import target_file
 from abs_service.calibration.files.rig_file import RigCalibration
-from abs_service.calibration.shots import image_sizes
+from abs_service.calibration.shots import image_sizes, unseen
 from abs_service.calibration.shots.corner_extraction import BoardObservations, see
 from abs_service.calibration.shots.shot_sources import FolderShots, RecordingShots
 from abs_service.calibration.shots.shots import Shot
 from abs_service.commands.calibrate import calibrations, live, skipping
+from abs_service.commands.calibrate.material import UnusableImagesError
 from abs_service.commands.parts import rig_process
 from abs_service.config.problems import allowed_instead
 from abs_service.report import page, provenance
@@ -106,12 +107,14 @@ def _see_all(
     arguments: argparse.Namespace, target: Target, shots: Iterable[Shot], cameras: Mapping[str, Camera]
 ) -> BoardObservations:
     """Observations in all shots, with progress on standard error."""
-    seen = BoardObservations()
+    seen, shot = BoardObservations(), None
     kept = skipping.kept(shots, arguments.skip, arguments.source)
     for number, shot in enumerate(image_sizes.checked_for(kept, cameras, arguments.calibration), start=1):
         seen += see(target, _of(cameras, shot), cameras)
         print(f"\r{number} shots, {len(seen.corners)} images show the board", end="", file=sys.stderr)
     print(file=sys.stderr)
+    if shot is not None and not seen.corners:
+        raise UnusableImagesError(unseen.reason(target, seen, shot))
     return seen
 
 

@@ -51,6 +51,12 @@ def test_a_verification_refuses_images_that_the_stored_camera_is_not_for(folder:
     assert "left3.png: the image of left is 32 × 24 pixels, but its camera in lab.toml is for 64 × 48 pixels" in said
 
 
+def test_an_image_of_the_size_of_another_sensor_asks_whether_names_are_exchanged() -> None:
+    cameras = {name: Camera(width, width, 9.0, 9.0, 4.0, 4.0) for name, width in (("tof", 8), ("color", 6))}
+    with pytest.raises(ShotsError, match=r"that is the size of color: are the names exchanged\?"):
+        list(image_sizes.checked_for([Shot(1, {"tof": look(6, 0)})], cameras, Path("lab.toml")))
+
+
 def test_a_shot_without_an_image_is_no_other_size() -> None:
     shots = [Shot(number, {"tof": look(width, 4)}) for number, width in enumerate((8, 0, 8))]
     assert list(image_sizes.checked(shots)) == shots
