@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from calib.calibration_check.hypotheses import PRIOR, Hypothesis, Kind, hypotheses
+from calib.calibration_check.hypotheses import Hypothesis, Kind, board, hypotheses
 from calib.calibration_check.shot_equations import Linearised, WhiteShot, linearise
 from calib.calibration_check.stored import Stored, Views
 
@@ -25,6 +25,9 @@ MAX_NATS = 10.0
 
 #: Candidate scatter of the board's place from view to view [m].
 SCATTERS = (0.0, *np.geomspace(3e-5, 0.1, 15).tolist())
+
+#: Number of times that the board's size is found again, each time about the last one.
+BOARD_ROUNDS = 2
 
 Array = NDArray[np.float64]
 
@@ -46,6 +49,11 @@ class Explanation:
     sigmas: Array
     scores: Array
     stored: float
+
+    @property
+    def board_size(self) -> float:
+        """Factor by which the board is larger than described, of a hypothesis about that."""
+        return float(1 / (1 - min(self.values[0], 0.9)))
 
     def beats(self, other: "Explanation") -> bool:
         """True if it predicts the shots better than another one, beyond doubt."""
@@ -71,17 +79,15 @@ class Comparison:
 
     @property
     def chosen(self) -> Explanation:
-        """Of those that no other beats, the one with the fewest parameters."""
-        return min(self._unbeaten, key=lambda each: len(each.values))
+        """Of those that no other beats, the one with the fewest parameters; one about a sensor before the board's."""
+        return min(self._unbeaten, key=lambda each: (len(each.values), each.hypothesis.kind == Kind.BOARD))
 
     @property
     def rivals(self) -> list[Explanation]:
         """Others that these shots cannot tell from the chosen one, without those that contain it."""
-        mine = {column for own in self.chosen.hypothesis.columns for column in own}
+        chosen = self.chosen
         return [
-            each
-            for each in self._unbeaten
-            if each is not self.chosen and not mine < {column for own in each.hypothesis.columns for column in own}
+            each for each in self._unbeaten if each is not chosen and not each.hypothesis.contains(chosen.hypothesis)
         ]
 
     @property
@@ -106,6 +112,10 @@ def compare(stored: Stored, views: Views) -> Comparison:
     corners_m, distances_m = _scatter(seen, stored, vague)
     white = [shot.whitened(corners_m, distances_m) for shot in seen.shots]
     found = [_explanation(each, seen.names, vague, white) for each in hypotheses(stored, seen.names)]
+    of_board = _explanation(board(stored, seen.names), seen.names, vague, white)
+    for _ in range(BOARD_ROUNDS):
+        of_board = _explanation(board(stored, seen.names, of_board.board_size), seen.names, vague, white)
+    found.append(of_board)
     return Comparison(
         sorted(found, key=lambda each: -each.scores.sum() - each.stored), corners_m, distances_m, seen.distance_m
     )
@@ -143,9 +153,7 @@ def _scatter(seen: Linearised, stored: Stored, vague: Array) -> tuple[float, flo
 def _explanation(hypothesis: Hypothesis, names: Sequence[str], vague: Array, white: Sequence[WhiteShot]) -> Explanation:
     basis = hypothesis.basis(names)
     steps, covariance, scores = _fit(np.hstack([basis, vague]), white)
-    units = np.array(
-        [PRIOR[names[column].rpartition(".")[2]] for column in hypothesis.columns[:1] for column in column]
-    )
+    units = hypothesis.units(names)
     count = len(units)
     sigmas = np.sqrt(np.diag(covariance)[:count]) * units
     stored = -0.5 * float(steps[count:] @ steps[count:])

@@ -14,6 +14,9 @@ from calib.solve.bundle.parameters.layout import DEPTH_TERMS, POSE
 #: Deviations of what happens to a sensor: moved by 0.1 rad and 0.1 m, distances changed by 5 cm and 5 %.
 PRIOR: Mapping[str, float] = dict(zip((*POSE, *DEPTH_TERMS), (0.1,) * 6 + (0.05, 0.05), strict=True))
 
+#: Deviation of a board's size from its description.
+BOARD_PRIOR = 0.05
+
 
 class Kind(Enum):
     """Kinds of change."""
@@ -24,6 +27,7 @@ class Kind(Enum):
     SCALE = "depth scale"
     OFFSET = "depth offset"
     BOTH = "depth scale and offset"
+    BOARD = "size of the board"
     SEVERAL = "several changes"
 
 
@@ -44,18 +48,31 @@ class Hypothesis:
         sensors: to which; several that move together, or none.
         columns: changes that it allows, by position in the names of all changes; those of sensors that move together
             are rows, otherwise there is one row.
+        factors: by which the only parameter changes each row; empty if by 1 as every other parameter.
     """
 
     kind: Kind
     sensors: tuple[str, ...] = ()
     columns: tuple[tuple[int, ...], ...] = ()
+    factors: tuple[float, ...] = ()
+
+    def contains(self, other: "Hypothesis") -> bool:
+        """True if it allows all changes of another one, and more."""
+        own, less = ({column for row in each.columns for column in row} for each in (self, other))
+        return less < own and self.kind != Kind.BOARD
+
+    def units(self, names: Sequence[str]) -> NDArray[np.float64]:
+        """Prior deviations of its parameters (k,) [rad, m, 1]."""
+        if self.kind == Kind.BOARD:
+            return np.array([BOARD_PRIOR])
+        return np.array([PRIOR[names[column].rpartition(".")[2]] for own in self.columns[:1] for column in own])
 
     def basis(self, names: Sequence[str]) -> NDArray[np.float64]:
         """Changes (n, k) of all names by one prior deviation of each of its parameters."""
-        found = np.zeros((len(names), len(self.columns[0]) if self.columns else 0))
-        for own in self.columns:
-            for parameter, column in enumerate(own):
-                found[column, parameter] = PRIOR[names[column].rpartition(".")[2]]
+        units = self.units(names)
+        found = np.zeros((len(names), len(units)))
+        for own, factor in zip(self.columns, self.factors or (1.0,) * len(self.columns), strict=True):
+            found[own, np.arange(len(own))] = factor * units
         return found
 
 
@@ -81,6 +98,28 @@ def hypotheses(stored: Stored, names: Sequence[str]) -> list[Hypothesis]:
             found += [_hypothesis(kind, (name,), terms, names) for kind, terms in TERMS.items()]
     every = tuple(column for column, name in enumerate(names) if name.rpartition(".")[2] in PRIOR)
     return [*found, Hypothesis(Kind.SEVERAL, tuple(sensors), (every,))]
+
+
+def board(stored: Stored, names: Sequence[str], size: float = 1.0) -> Hypothesis:
+    """The hypothesis of a board of another size than described, by which all sensors seem to change together.
+
+    Seen by a board that is larger by a factor k than described, all sensors stand nearer to each other by 1 / k and
+    measure distances that are longer by k. The parameter is 1 - 1 / k.
+
+    Args:
+        stored: the calibration.
+        names: of the changes that the views can show.
+        size: approximate k, about which distances are linear.
+    """
+    changes: dict[int, float] = {}
+    for column, name in enumerate(names):
+        sensor, _, term = name.rpartition(".")
+        state = stored.sensors[sensor]
+        if term in POSE[3:]:
+            changes[column] = -float(state.camera.T_rs[POSE[3:].index(term), 3])
+        elif term == "depth_scale":
+            changes[column] = size * (1 + state.depth_scale)
+    return Hypothesis(Kind.BOARD, (), tuple((column,) for column in changes), tuple(changes.values()))
 
 
 def _hypothesis(kind: Kind, sensors: tuple[str, ...], terms: Sequence[str], names: Sequence[str]) -> Hypothesis:

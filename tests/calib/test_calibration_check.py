@@ -138,7 +138,7 @@ def test_shots_at_one_distance_cannot_tell_a_scale_from_an_offset() -> None:
     heads["depth"] = replace(heads["depth"], depth_scale=0.01)
     near = look(heads, random_boards(10, random, 0.95, 1.05), random)
     found = compare(before, Views(near.corners, near.planes))
-    assert {named(found), *rivals(found)} == {(Kind.SCALE, ("depth",)), (Kind.OFFSET, ("depth",))}
+    assert {named(found), *rivals(found)} == {(Kind.SCALE, ("depth",)), (Kind.OFFSET, ("depth",)), (Kind.BOARD, ())}
 
 
 def test_a_wrong_alignment_is_told_from_wrong_distances() -> None:

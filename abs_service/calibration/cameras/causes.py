@@ -19,6 +19,7 @@ UNNOTICED_M, WRONG_M = 0.002, 0.01
 _ADVICE = {
     Kind.MOVED: "Put it back and fix it, or calibrate the rig again.",
     Kind.ALIGNMENT: "Calibrate the device again, or use its depth image before alignment.",
+    Kind.BOARD: "Measure the squares with a ruler, and correct the description of the board.",
     Kind.SEVERAL: "Calibrate the rig again.",
 }
 _WARM = "Let it warm up for half an hour and look again; if it stays, calibrate its depth terms."
@@ -76,13 +77,13 @@ def verdicts(found: Comparison, motion: Level, reaches: Mapping[str, Reach]) -> 
     if rivals and all(each.hypothesis.kind == Kind.MOVED for each in (chosen, *rivals)):
         names = ", ".join(sorted(_names(each) for each in (chosen, *rivals)))
         text = f"One of {names} has moved; these views cannot tell which, since each would explain them."
-        advice = "Calibrate the rig again. A third sensor that sees the board at the same time could tell."
-        return [Verdict(level, text, advice)]
+        return [Verdict(level, text, _advice((chosen, *rivals), reaches))]
     text = f"{_said(chosen)}."
     if rivals:
-        text += f" These shots cannot tell that from this: {'; '.join(f'{_names(r)} {_said(r)}' for r in rivals)}."
-    advice = _telling(chosen, rivals, reaches) if rivals else _ADVICE.get(kind, _WARM)
-    return [Verdict(level, text, advice, _names(chosen))]
+        others = "; ".join(f"{_names(rival)} {_said(rival)}".strip() for rival in rivals)
+        text += f" These shots cannot tell that from this: {others}."
+    text = text if _names(chosen) else text[0].upper() + text[1:]
+    return [Verdict(level, text, _advice((chosen, *rivals), reaches), _names(chosen))]
 
 
 def of_contradictions(found: Sequence[Contradiction]) -> list[Verdict]:
@@ -94,12 +95,29 @@ def of_contradictions(found: Sequence[Contradiction]) -> list[Verdict]:
     return [Verdict(Level.DOUBTFUL, text, f"Look at the pictures, and leave out what is wrong: --skip {skipped}.")]
 
 
-def of_mistakes(found: Sequence[Mistake]) -> Verdict:
-    """Verdict on images that do not fit because of a mistake, of which there is one at least."""
+def of_material(size: float, found: Sequence[Mistake]) -> list[Verdict]:
+    """Verdict on a board or images from which nothing can be said of the calibration; at most one.
+
+    Args:
+        size: factor by which the board is larger than described, if that is gross, otherwise 1.
+        found: mistakes of which each would explain the images.
+    """
+    return [_of_size(size)] if size != 1 else [_of_mistakes(found)] if found else []
+
+
+def _of_mistakes(found: Sequence[Mistake]) -> Verdict:
     best = found[0]
     said = "; or ".join(_mistaken(one) for one in found)
     text = f"{said[0].upper()}{said[1:]}. As given, corners miss by {best.given_px:.3g} px."
     return Verdict(Level.BAD, f"{text} Nothing else can be said of the calibration.", _MISTAKES[best.kind][1])
+
+
+def _of_size(size: float) -> Verdict:
+    text = (
+        f"The squares of the board are about {size:.3g} times as large as described (or those of the board that the "
+        "rig was calibrated with were not as described). Nothing else can be said of the calibration."
+    )
+    return Verdict(Level.BAD, text, f"{_ADVICE[Kind.BOARD]} Its lengths are in millimetres if their keys end in _mm.")
 
 
 def _mistaken(mistake: Mistake) -> str:
@@ -113,13 +131,19 @@ def _level(explanation: Explanation, motion: Level, reaches: Mapping[str, Reach]
     kind = explanation.hypothesis.kind
     if kind == Kind.UNCHANGED:
         return Level.GOOD
+    if kind == Kind.BOARD:
+        middles = [(reach.near + reach.far) / 2 for reach in reaches.values()]
+        return max(motion, _of_distance(max(middles, default=0.0) * (explanation.board_size - 1)))
     if kind not in TERMS:
         return motion
     terms = dict(zip(TERMS[kind], explanation.values.tolist(), strict=True))
     reach = reaches[explanation.hypothesis.sensors[0]]
     middle = (reach.near + reach.far) / 2
-    miss = abs(terms.get("depth_scale", 0.0) * middle + terms.get("depth_offset", 0.0))
-    return Level.GOOD if miss < UNNOTICED_M else Level.BAD if miss > WRONG_M else Level.DOUBTFUL
+    return _of_distance(terms.get("depth_scale", 0.0) * middle + terms.get("depth_offset", 0.0))
+
+
+def _of_distance(miss_m: float) -> Level:
+    return Level.GOOD if abs(miss_m) < UNNOTICED_M else Level.BAD if abs(miss_m) > WRONG_M else Level.DOUBTFUL
 
 
 def _names(explanation: Explanation) -> str:
@@ -129,6 +153,12 @@ def _names(explanation: Explanation) -> str:
 def _said(explanation: Explanation) -> str:
     """The change of the sensor, as a clause without its name."""
     kind, values = explanation.hypothesis.kind, explanation.values
+    if kind == Kind.BOARD:
+        size, sigma = explanation.board_size, explanation.board_size**2 * explanation.sigmas[0]
+        return (
+            f"the squares of the board are {size:.4f} ± {sigma:.4f} times as large as described (or those of the board "
+            "that the rig was calibrated with were not as described)"
+        )
     if kind in TERMS:
         pairs = zip(TERMS[kind], values.tolist(), explanation.sigmas.tolist(), strict=True)
         return f"measures distances wrongly, by {' and '.join(_term(*each) for each in pairs)}"
@@ -142,9 +172,16 @@ def _term(name: str, value: float, sigma: float) -> str:
     return f"{1e3 * value:+.1f} ± {1e3 * sigma:.1f} mm"
 
 
-def _telling(chosen: Explanation, rivals: list[Explanation], reaches: Mapping[str, Reach]) -> str:
-    """Shots that would tell explanations apart, of which at least one is of distances."""
-    every = (chosen, *rivals)
+def _advice(every: Sequence[Explanation], reaches: Mapping[str, Reach]) -> str:
+    """Action that mends what explains the shots, or that tells explanations apart."""
+    of_sensors = [each for each in every if each.hypothesis.kind != Kind.BOARD]
+    if len(of_sensors) < len(every):
+        otherwise = f" If they are as described: {_advice(of_sensors, reaches)}" if of_sensors else ""
+        return f"{_ADVICE[Kind.BOARD]}{otherwise}"
+    if len(every) == 1:
+        return _ADVICE.get(every[0].hypothesis.kind, _WARM)
+    if all(each.hypothesis.kind == Kind.MOVED for each in every):
+        return "Calibrate the rig again. A third sensor that sees the board at the same time could tell."
     sensor = next(each.hypothesis.sensors[0] for each in every if each.hypothesis.kind in TERMS)
     reach = reaches[sensor]
     board = f"the board much nearer than {reach.near:.2f} m and much further than {reach.far:.2f} m"

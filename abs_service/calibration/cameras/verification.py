@@ -14,6 +14,7 @@ from abs_service.report.content import Level, Report, Verdict
 from abs_service.report.provenance import Provenance
 from calib.calibration_check import mistakes
 from calib.calibration_check.alone import CornerFit, DistanceBias, corner_fit, distance_bias
+from calib.calibration_check.board_size import gross_size
 from calib.calibration_check.changes import PairChange, contradicting, pair_changes
 from calib.calibration_check.comparison import NOT_COMPARED, Comparison, compare
 from calib.calibration_check.hypotheses import TERMS, Kind
@@ -78,8 +79,9 @@ def verify(known: RigCalibration, seen: BoardObservations, provenance: Provenanc
     """
     title, stored = f"Verification of {known.name}", new_views.stored_in(known)
     used = usable(stored, new_views.of_known_sensors(seen, stored))
-    if wrong := mistakes.find(stored, used.corners):
-        said = (causes.of_mistakes(wrong), *new_views.verdicts(stored, seen, used))
+    wrong = causes.of_material(gross_size(stored, used), mistakes.find(stored, used.corners))
+    if wrong:
+        said = (*wrong, *new_views.verdicts(stored, seen, used))
         return Report(title, provenance, said, tuple(tables.refusals(seen)), {})
     found = _found(known, stored, seen, used)
     sections = [
@@ -99,7 +101,8 @@ def verdicts(found: Verification) -> list[Verdict]:
     # Shots that do not agree with each other say nothing of a change that lasts.
     disagree = any(one.level == Level.BAD for one in scatter)
     lasting = [] if disagree else causes.verdicts(found.comparison, motion, found.reaches)
-    named = {one.about for one in lasting}
+    is_board = bool(lasting) and found.comparison.chosen.hypothesis.kind == Kind.BOARD
+    named = {*found.biases} if is_board else {one.about for one in lasting}
     said = [*lasting, *(scatter or causes.of_contradictions(contradicting(found.changes))), *fits]
     said += [_of_bias(name, bias) for name, bias in found.biases.items() if name not in named]
     changes = [change for change in found.changes if not (disagree or _is_explained(change, found))]
@@ -189,9 +192,10 @@ def _of_pair(change: PairChange, comparison: Comparison) -> Verdict:
 
 
 def _is_explained(change: PairChange, found: Verification) -> bool:
-    """True if a pair contradicts itself because the distances of one of them changed."""
+    """True if a pair contradicts itself because the board has another size, or the distances of one changed."""
     chosen = found.comparison.chosen.hypothesis
-    return change.is_significant and chosen.kind in TERMS and bool({*chosen.sensors} & {change.first, change.second})
+    explains = chosen.kind in TERMS and bool({*chosen.sensors} & {change.first, change.second})
+    return change.is_significant and (explains or chosen.kind == Kind.BOARD)
 
 
 def _of_scatter(found: Verification, worst_fit: Level) -> list[Verdict]:

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from abs_service.calibration.cameras import verification
 from abs_service.calibration.files import rig_file
@@ -44,6 +45,8 @@ def test_an_aligned_depth_image_that_is_too_long_is_said_to_measure_wrongly() ->
     worst = report.verdicts[0]
     assert (worst.level, worst.about) == (Level.BAD, "depth")
     assert worst.text.startswith("measures distances wrongly, by +0.9")
+    assert "the squares of the board are 1.0" in worst.text
+    assert worst.advice.startswith("Measure the squares with a ruler")
     assert "warm up" in worst.advice
     assert not any("moved" in one.text or "no longer stand" in one.text for one in report.verdicts)
 
@@ -52,8 +55,9 @@ def test_what_cannot_be_told_apart_is_said_with_the_shots_that_would() -> None:
     heads = aligned()
     report = verified(heads, {**heads, "depth": replace(heads["depth"], depth_scale=0.01)}, 0, 0.95, 1.05)
     worst = report.verdicts[0]
-    assert "cannot tell that from this: depth measures distances wrongly, by +" in worst.text
-    assert worst.advice.startswith("To tell, show depth the board much nearer than 1.00 m")
+    assert "cannot tell that from this: " in worst.text
+    assert "; depth measures distances wrongly, by +" in worst.text
+    assert "To tell, show depth the board much nearer than 1.00 m" in worst.advice
 
 
 def test_a_rig_that_is_as_it_was_has_no_cause_named() -> None:
@@ -94,3 +98,29 @@ def test_a_pair_of_images_that_contradicts_the_others_is_named_and_moves_no_sens
     assert "shot 4: corners of" in doubtful[0].text
     assert "belongs to shot 9" in doubtful[0].text
     assert doubtful[0].advice.endswith("--skip 4,9.")
+
+
+def seen_with(size: float, heads: dict[str, Head]) -> Report:
+    """Report on ten shots of a rig that is as it was, and a board that is larger than described by a factor."""
+    random = np.random.default_rng(5)
+    seen = look(heads, random_boards(10, random), random)
+    corners = tuple(replace(view, points_b=view.points_b / size) for view in seen.corners)
+    sensors = {name: rig_file.SensorCalibration(head.camera) for name, head in heads.items()}
+    known = rig_file.RigCalibration("lab", sensors, ORIGIN, "good")
+    return verification.verify(known, BoardObservations(corners, tuple(seen.planes)), ORIGIN)
+
+
+def test_a_board_of_another_size_is_no_motion_and_no_distance_bias() -> None:
+    heads = {name: head for name, head in three_heads().items() if name != "light"}
+    worst, *others = seen_with(0.97, heads).verdicts
+    assert worst.level == Level.BAD
+    assert worst.text.startswith("The squares of the board are 0.970")
+    assert "cannot tell" not in worst.text
+    assert {one.level for one in others} == {Level.GOOD}
+
+
+@pytest.mark.parametrize("size", [0.1, 1.3, 25.4])
+@pytest.mark.parametrize("sensors", [("light", "color"), ("tof",)])
+def test_a_board_in_another_unit_is_told_from_everything_else(size: float, sensors: tuple[str, ...]) -> None:
+    (worst,) = seen_with(size, {name: three_heads()[name] for name in sensors}).verdicts
+    assert worst.text.startswith(f"The squares of the board are about {size:.3g} times as large as described")
