@@ -15,6 +15,8 @@ from drivers.image_folder.listing import ImageFolderError
 LARGEST = 1 << 28
 #: Formats that can be read, for messages.
 READABLE = "PNG, TIFF, PGM, PPM, JPEG, WebP and BMP"
+#: Beginning of the text that stands in for a file of a repository with Git Large File Storage.
+_POINTER = b"version https://git-lfs.github.com/spec/"
 
 
 def read(path: Path) -> NDArray[Any]:
@@ -27,6 +29,8 @@ def read(path: Path) -> NDArray[Any]:
         content = limited.read(path, LARGEST)
     except OSError as error:
         raise ImageFolderError(f"{path}: cannot be read: {error.strerror}") from error
+    if content.startswith(_POINTER):
+        raise ImageFolderError(f"{path}: is a pointer of Git LFS, not the image itself; fetch it with: git lfs pull")
     if image_size.is_cut_off(content):
         raise ImageFolderError(f"{path}: the image is truncated: its end is missing")
     try:

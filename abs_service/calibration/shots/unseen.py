@@ -1,20 +1,23 @@
 """One sentence on images of which none shows the board: their number, and the reasons by frequency."""
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 from abs_service.calibration.shots.corner_extraction import BoardObservations
 from abs_service.calibration.shots.shots import Shot
 from calib.board.april_grid import AprilGrid
-from calib.board.corners import errors
+from calib.board.corners import description, errors
 from calib.board.corners.search import find
 from calib.board.corners.to_8bit import grey
-from calib.board.target import Charuco, Chessboard, Target
+from calib.board.target import Charuco, Chessboard, Circles, Target
+from calib.board.target_checks import TargetError
 
 _WORDS = {
     errors.NothingFoundError: "nothing found",
     errors.MirroredBoardError: "mirrored",
+    errors.OtherBoardError: "not as described",
     errors.SaturatedError: "saturated",
     errors.TooSmallError: "too small",
     errors.CutOffError: "cut off by the border",
@@ -26,19 +29,19 @@ _WORDS = {
 STILLS = "If these are single photographs, give them times of their own: abs-service import … --rate 1"
 
 
-def reason(target: Target, seen: BoardObservations, last: Shot) -> str:
+def reason(target: Target, seen: BoardObservations, shown: Sequence[Shot]) -> str:
     """Reasons for which the board was found in no image, as a sentence.
 
     Args:
         target: the board.
         seen: observations without any corners.
-        last: one of the shots, in which boards of similar sizes are looked for.
+        shown: some of the shots, in which boards are looked for that differ from the description.
     """
     count = len(seen.rejected)
     parts = reasons(seen.rejected.values())
     advice = f". {STILLS}" if mostly_moved(seen) else ""
-    like = _similar(target, last)
-    found = f". Image {last.number} shows {like}: correct the description of the board" if like else ""
+    found = _instead(target, shown)
+    found = f". {found}: correct the description of the board" if found else ""
     return f"no {_name(target)} in any of {count} images: {parts}{found}{advice}"
 
 
@@ -63,14 +66,26 @@ def _name(target: Target) -> str:
     return kind.format(target.columns, target.rows)
 
 
-def _similar(target: Target, last: Shot) -> str:
-    """A chessboard of nearly this size, such as one whose squares were counted instead of its corners; "" if none."""
-    if not isinstance(target, Chessboard):
-        return ""
-    changes = ((-1, -1), (1, 1), (-1, 0), (0, -1), (1, 0), (0, 1))
-    sizes = [(target.columns + dx, target.rows + dy) for dx, dy in changes]
-    for columns, rows in ((c, r) for c, r in sizes if min(c, r) >= 3):
-        other = replace(target, columns=columns, rows=rows)
-        if any(len(find(other, grey(look.image))[0]) for look in last.sensor_shots.values() if look.image.size):
-            return f"a {_name(other)}"
+def _instead(target: Target, shown: Sequence[Shot]) -> str:
+    """Clause on what shots show in place of the described board; "" if that is not clear."""
+    images = [(f"Image {shot.number}", grey(each.image)) for shot in shown for each in shot.sensor_shots.values()
+              if each.image.size]  # fmt: skip
+    for image, levels in images:
+        if said := description.mismatch(target, levels):
+            return f"{image} {said}"
+    for image, levels in images[-1:]:  # the search takes seconds
+        if similar := next((other for other in _similar(target) if len(find(other, levels)[0])), None):
+            return f"{image} shows a {_name(similar)}"
     return ""
+
+
+def _similar(target: Target) -> Iterator[Target]:
+    """Boards that are easily described as this one: squares were counted, not their corners, or the other way round."""
+    if isinstance(target, Charuco):
+        yield Chessboard(target.columns - 1, target.rows - 1, target.square)
+    if isinstance(target, Circles):
+        yield replace(target, columns=target.rows, rows=target.columns)
+    if isinstance(target, Chessboard):
+        for dx, dy in ((-1, -1), (1, 1), (-1, 0), (0, -1), (1, 0), (0, 1)):
+            with suppress(TargetError):
+                yield replace(target, columns=target.columns + dx, rows=target.rows + dy)

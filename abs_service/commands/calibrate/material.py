@@ -70,8 +70,9 @@ def material(arguments: argparse.Namespace) -> Material:
         shots, cameras, data = _shots(arguments, {name: each.camera for name, each in known.items()}, stack)
         known = {name: known.get(name, SensorCalibration(camera, factory=camera)) for name, camera in cameras.items()}
         is_live = live.is_live(arguments.source)
-        seen, shot = BoardObservations(), None
+        seen, shown = BoardObservations(), list[Shot]()
         for shot in image_sizes.checked(skipping.kept(shots, arguments.skip, arguments.source)):
+            shown = [*shown[:1], shot]
             new = corner_extraction.see(target, shot, cameras)
             if is_live and not live.adds(new, seen):
                 continue
@@ -79,8 +80,8 @@ def material(arguments: argparse.Namespace) -> Material:
             say(f"shot {shot.number}: {', '.join(view.sensor for view in new.corners) or 'no board'}")
             if is_live and live.views(seen) >= arguments.shots:
                 break
-    if shot is not None and not seen.corners:
-        raise UnusableImagesError(unseen.reason(target, seen, shot))
+    if shown and not seen.corners:
+        raise UnusableImagesError(unseen.reason(target, seen, shown))
     corner_file.write(seen, corner_file.path_beside(arguments.out))
     if arguments.corners is not None:
         mrcal_corners.write(seen, target, arguments.corners)

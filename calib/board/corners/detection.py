@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.board.april_grid import AprilGrid
-from calib.board.corners import ellipse, errors, quality, saddle
+from calib.board.corners import description, ellipse, errors, quality, saddle
 from calib.board.corners.order import canonical_order
 from calib.board.corners.search import find, is_cut_off
 from calib.board.corners.to_8bit import Grey, Image, grey
@@ -21,8 +21,8 @@ MIN_SPACING_PX = 5.0
 MAX_SATURATED = 0.85
 #: … while distances of an active depth sensor are wrong wherever it is saturated.
 MAX_SATURATED_ACTIVE = 0.10
-#: Saturation of the whole image that is reported as the cause if no board is found.
-_MAX_SATURATED_IMAGE = 0.3
+#: Saturated fraction of the whole image that may be why no board is found, and beyond which none can be.
+_MAY_BE_SATURATED, _IS_SATURATED = 0.3, 0.95
 #: Largest width of an edge, in pixels or relative to the distance between points, whichever is larger.
 MAX_EDGE_PX, MAX_EDGE_SHARE = 3.5, 0.15
 #: Radius of the subpixel refinement, relative to the distance between corners; excludes a ChArUco's markers.
@@ -76,6 +76,8 @@ def detect(target: Target, image: Image, largest_saturated: float = MAX_SATURATE
         raise _detection_error(target, image, levels, len(ids))
     pixels = canonical_order(target, pixels, levels)
     points = quality.lattice(target, ids, pixels)
+    if isinstance(target, AprilGrid):
+        description.require_grid(target, points)
     spacing, edge = quality.spacing_px(points), quality.edge_px(target, points, levels)
     _check_whole(target, pixels, points, levels.shape)
     if spacing < MIN_SPACING_PX:
@@ -125,14 +127,16 @@ def _detection_error(target: Target, image: Image, levels: Grey, found: int) -> 
             "board anew if the print itself is mirrored"
         )
     share = float(quality.is_saturated(image).mean())
-    if share > _MAX_SATURATED_IMAGE:
+    bright = f"{share:.0%} of the image is as bright as the sensor can tell"
+    if share > _IS_SATURATED:
         return errors.SaturatedError(
-            f"no board found, and {share:.0%} of the image is as bright as the sensor can tell. Use a shorter "
-            "exposure, less light, or stand further away"
+            f"no board found, and {bright}. Use a shorter exposure, less light, or stand further away"
         )
     if is_cut_off(target, levels):
         return errors.CutOffError(_CUT_OFF)
     seen = f"only {found} of its points" if found else "none of its points"
+    hint = f" {bright}, which may be why." if share > _MAY_BE_SATURATED else ""
     return errors.NothingFoundError(
-        f"no board found: {seen} can be seen. Is it this board, in the image, evenly lit, in focus and not hidden?"
+        f"no board found: {seen} can be seen. Is it this board, in the image, evenly lit, in focus and not "
+        f"hidden?{hint}"
     )

@@ -13,6 +13,10 @@ class MirroredBoardError(BoardError):
     """Mirrored image of the board."""
 
 
+class OtherBoardError(BoardError):
+    """Board that is not as described."""
+
+
 class SaturatedError(BoardError):
     """Saturation displaces the edges of the board."""
 

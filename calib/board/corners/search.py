@@ -23,6 +23,9 @@ _SMALLEST, _SMALLEST_OF_DISCS = 400, 1000
 #: Largest number of blobs per disc; the grid search takes minutes above it.
 _MAX_BLOBS = 3
 
+#: A board goes on beyond the border if its last point is nearer to it than this many distances between points.
+_CUT = 1.1
+
 _NOTHING: Found = (np.zeros(0, np.intp), np.zeros((0, 2)))
 
 
@@ -104,8 +107,10 @@ def is_cut_off(target: Target, levels: Grey) -> bool:
     match target:
         case Chessboard():
             flags = cv2.CALIB_CB_LARGER | cv2.CALIB_CB_NORMALIZE_IMAGE
-            found, corners, _ = cv2.findChessboardCornersSBWithMeta(levels, (3, 3), flags)
-            part = corners.reshape(-1, 2) if found else np.zeros((0, 2))
+            found, corners, meta = cv2.findChessboardCornersSBWithMeta(levels, (3, 3), flags)
+            if not found or max(meta.shape) > max(target.grid) or min(meta.shape) > min(target.grid):
+                return False  # of another board there is nothing to say
+            part = corners.reshape(-1, 2)
         case Charuco() | AprilGrid():
             return False
         case _:
@@ -117,8 +122,8 @@ def is_cut_off(target: Target, levels: Grey) -> bool:
     between[np.diag_indices(len(part))] = np.inf
     closest = between.min(axis=1)
     regular = closest.std() < 0.3 * np.median(closest)  # rejects clutter that resembles discs
-    to_end = np.minimum(part, np.array(levels.shape[::-1]) - 1 - part).min()
-    return bool(regular and to_end < 1.5 * np.median(closest))
+    to_end = np.minimum(part, np.array(levels.shape[::-1]) - 1 - part).min(axis=1)
+    return bool(regular and (to_end < _CUT * closest).any())
 
 
 def _find_circles(target: Circles | AsymmetricCircles, levels: Grey, kind: int) -> tuple[bool, NDArray[np.floating]]:

@@ -38,7 +38,10 @@ def start(task: Task, note: Callable[[str], None]) -> tuple[Task, State]:
         if views:
             seen[name] = {shot: each for shot, each in found.items() if each}
     placed = _placed(task, cameras, seen)
-    return _usable(task, seen), placed
+    usable = _usable(task, seen)
+    for said in _left_out(task, usable):
+        note(said)
+    return usable, placed
 
 
 def _camera(name: str, sensor: SensorTask, views: Sequence[CornerView], note: Callable[[str], None]) -> Camera:
@@ -138,3 +141,18 @@ def _usable(task: Task, seen: extrinsics_graph.PoseCandidates) -> Task:
         corners=[view for view in task.corners if view.shot in seen.get(view.sensor, {})],
         planes=[view for view in task.planes if view.shot in shots],
     )
+
+
+def _left_out(task: Task, usable: Task) -> list[str]:
+    """Sentences that count the views of each sensor that are not used, and say why."""
+    found = []
+    for views, kept, why in (
+        (task.corners, usable.corners, "images show a board where its camera could not have seen one"),
+        (task.planes, usable.planes, "shots have distances, but no sensor's corners tell where the board is"),
+    ):
+        for name in task.sensors:
+            all_shots, shots = ({view.shot for view in each if view.sensor == name} for each in (views, kept))
+            if lost := sorted(all_shots - shots):
+                numbers = ", ".join(map(str, lost))
+                found.append(f"{name}: {len(lost)} of {len(all_shots)} {why}; left out: {numbers}")
+    return found

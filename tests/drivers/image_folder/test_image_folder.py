@@ -180,6 +180,13 @@ def test_16_bit_colour_and_other_files_are_rejected(tmp_path: Path) -> None:
         ColorImages([file], CAMERA).frame(file)
 
 
+def test_a_pointer_of_git_lfs_is_said_to_be_one(tmp_path: Path) -> None:
+    pointer = tmp_path / "c_0.png"
+    pointer.write_text("version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n", encoding="utf-8")
+    with pytest.raises(ImageFolderError, match=r"c_0\.png: is a pointer of Git LFS.*git lfs pull"):
+        image_file.read(pointer)
+
+
 @pytest.mark.parametrize("name", image_file.READABLE.replace(" and", ",").split(", "))
 def test_each_format_that_is_said_to_be_readable_is(name: str, tmp_path: Path) -> None:
     path = tmp_path / f"image.{name.lower()}"

@@ -10,15 +10,16 @@ import pytest
 
 from abs_service import cli
 from abs_service.calibration.files import target_file
-from calib.board.target import Chessboard
+from calib.board.target import Charuco, Chessboard, Target
 from tests.abs_service.calibration.simulated import scene
+from tests.calib.board.boards import VGA, as_bytes, centered, photograph
 
 
 @pytest.fixture
 def said(capsys, tmp_path: Path) -> Callable[..., str]:
     """Runs `calibrate intrinsics` with a board, which has to write no calibration; gives what it said."""
 
-    def said(board: Chessboard, *options: str) -> str:
+    def said(board: Target, *options: str) -> str:
         target_file.write(board, tmp_path / "board.toml")
         out = tmp_path / "out.toml"
         arguments = ["calibrate", "intrinsics", *options, "--target", str(tmp_path / "board.toml"), "--out", str(out)]
@@ -34,6 +35,25 @@ def test_a_board_that_is_in_no_image_is_said_with_what_is_there(said, data_set: 
     error = said(Chessboard(10, 7, 0.025), "--images", images)
     assert "no board of 10 × 7 inner corners in any of 4 images: nothing found in 3" in error
     assert "shows a board of 9 × 6 inner corners: correct the description" in error
+
+
+PRINT = Charuco(7, 5, 0.03, 0.022, "5x5_50")
+
+
+@pytest.mark.parametrize(
+    ("described", "told"),
+    [
+        (Charuco(7, 5, 0.03, 0.022, "4x4_50"), "dictionary 5x5_50, the description says 4x4_50"),
+        (Charuco(5, 7, 0.03, 0.022, "5x5_50"), "fits with columns and rows exchanged, 7 × 5 instead of 5 × 7"),
+        (Charuco(9, 4, 0.03, 0.022, "5x5_50"), "ids up to 16 that stand as on a board of 7 columns, not of 9 × 4"),
+    ],
+)
+def test_a_wrong_description_of_a_board_with_markers_is_named(
+    said, tmp_path: Path, described: Target, told: str
+) -> None:
+    shown = photograph(PRINT, VGA, centered(PRINT, (0.2, 0.1, 0.3), 0.45))
+    cv2.imwrite(str(tmp_path / "c_1.png"), as_bytes(shown))
+    assert f"{told}: correct the description" in said(described, "--images", f"color={tmp_path}/c_*.png")
 
 
 def test_images_without_a_board_are_counted_by_what_is_wrong(said, tmp_path: Path) -> None:

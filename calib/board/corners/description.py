@@ -1,0 +1,183 @@
+"""Boards with markers that are not as described: another dictionary, layout or pattern."""
+
+import re
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.board.april_grid import BORDER, AprilGrid
+from calib.board.corners.errors import OtherBoardError
+from calib.board.corners.to_8bit import Grey
+from calib.board.target import DICTIONARIES, Charuco, Target
+
+#: Minimum number of markers that say which dictionary a board has, and how they stand.
+LEAST, LEAST_PLACED = 4, 6
+
+#: Images are searched at this size at most [px]; markers need not be exact.
+_LARGEST = 1600
+
+#: Largest number of columns that is tried.
+_MAX_COLUMNS = 30
+
+#: Percentile of the markers that have to stand so; a few may be misread.
+_MOST = 80
+
+#: Markers stand as on a board if they are off by less than this share of a square, and three times less than otherwise.
+_OFF, _CLEARLY = 0.3, 3.0
+
+#: Tags are off by more than this share of their size if columns or rows are wrong; gaps, if these are.
+_OTHER_LAYOUT, _OTHER_GAP = 0.8, 0.15
+
+#: Kalibr's tags have a wider frame than markers.
+_APRIL_GRID = "apriltag_36h11"
+
+#: Dictionaries with so many markers that a search for others than the described one leaves them out.
+_SLOW = re.compile("_1000|36h10")
+
+
+@dataclass(frozen=True)
+class _Markers:
+    """Markers of one dictionary in an image.
+
+    Attributes:
+        family: the largest dictionary that has them.
+        border: width of their black frame [cells].
+        ids: their numbers (n,).
+        centers: their centres (n, 2) [px].
+    """
+
+    family: str
+    border: int
+    ids: NDArray[np.intp]
+    centers: NDArray[np.float64]
+
+    @property
+    def name(self) -> str:
+        """The smallest dictionary that has these numbers, as described; larger ones begin with the same markers."""
+        bits = self.family.rpartition("_")[0]
+        sizes = [int(name.rpartition("_")[2]) for name in DICTIONARIES if re.fullmatch(rf"{bits}_\d+", name)]
+        return next((f"{bits}_{size}" for size in sizes if size > self.ids.max()), self.family)
+
+
+def mismatch(target: Target, levels: Grey) -> str:
+    """Clause on what markers in an image say against the description of a board; "" if they say nothing."""
+    image = _smaller(levels)
+    own = (_family(target.dictionary), 1) if isinstance(target, Charuco) else (_APRIL_GRID, BORDER)
+    every = [(name, 1) for name in dict.fromkeys(map(_family, DICTIONARIES)) if not _SLOW.search(name)]
+    seen = _markers(image, *own)
+    if len(seen.ids) < LEAST:
+        seen = max((_markers(image, *each) for each in (*every, (_APRIL_GRID, BORDER))), key=lambda each: len(each.ids))
+    if len(seen.ids) < LEAST:
+        return ""
+    if isinstance(target, AprilGrid) != (seen.border == BORDER) or not isinstance(target, Charuco | AprilGrid):
+        kind = "an AprilGrid" if seen.border == BORDER else f"a ChArUco with markers of the dictionary {seen.name}"
+        return f"shows {kind}"
+    if isinstance(target, Charuco) and _family(target.dictionary) != seen.family:
+        return f"shows markers of the dictionary {seen.name}, the description says {target.dictionary}"
+    return _misplaced(target, seen)
+
+
+def require_grid(target: AprilGrid, points: NDArray[np.float64]) -> None:
+    """Checks detected points (rows, columns, 2) [px], NaN where there are none, against the layout of a grid.
+
+    Raises:
+        OtherBoardError: tags do not stand where the description has them; says what is wrong.
+    """
+    off, gaps = [], []
+    for along in (points, points.transpose(1, 0, 2)):
+        first, last, following = along[:, :-2:2], along[:, 1:-1:2], along[:, 2::2]
+        tags, gap = last - first, following - last
+        sizes = np.sum(tags**2, axis=-1)
+        gaps.append((np.sum(gap * tags, axis=-1) / sizes).ravel())
+        off.append(np.sqrt(np.sum((gap - target.gap / target.tag * tags) ** 2, axis=-1) / sizes).ravel())
+    known = [each[np.isfinite(each)] for each in off]
+    ratios = np.concatenate(gaps)
+    if any(len(each) and np.median(each) > _OTHER_LAYOUT for each in known):
+        raise OtherBoardError(
+            f"the tags do not stand as on a board of {target.columns} × {target.rows} tags. Are columns and rows right?"
+        )
+    ratio, said = float(np.nanmedian(ratios)) if np.isfinite(ratios).any() else np.nan, target.gap / target.tag
+    if abs(ratio / said - 1) > _OTHER_GAP:
+        raise OtherBoardError(
+            f"the gaps between the tags are {ratio:.2f} of a tag wide, but {said:.2f} as described. Measure both"
+        )
+
+
+def _smaller(levels: Grey) -> Grey:
+    scale = _LARGEST / max(levels.shape)
+    if scale >= 1:
+        return levels
+    return np.asarray(cv2.resize(levels, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA), np.uint8)
+
+
+def _family(dictionary: str) -> str:
+    """The dictionary that is searched for those of its family; of 1000 markers, few boards have more than 250."""
+    return re.sub(r"^(\dx\d)_(50|100|250)$", r"\1_250", dictionary)
+
+
+def _markers(levels: Grey, family: str, border: int) -> _Markers:
+    parameters = cv2.aruco.DetectorParameters()
+    parameters.markerBorderBits = border
+    dictionary = cv2.aruco.getPredefinedDictionary([*DICTIONARIES].index(family))
+    corners, ids, _ = cv2.aruco.ArucoDetector(dictionary, parameters).detectMarkers(levels)
+    numbers = np.zeros(0, np.intp) if ids is None else ids.ravel().astype(np.intp)
+    return _Markers(family, border, numbers, np.array([each.reshape(4, 2).mean(axis=0) for each in corners]))
+
+
+def _misplaced(target: Charuco | AprilGrid, seen: _Markers) -> str:
+    """Other numbers of columns and rows, or squares of the other colour, by where markers stand."""
+    count = target.columns * target.rows // (2 if isinstance(target, Charuco) else 1)
+    size, largest = f"{target.columns} × {target.rows}", int(seen.ids.max())
+    ids = f"shows markers with ids up to {largest}, a board of {size} has 0 to {count - 1}"
+    columns, is_first_black = _layout(target, seen)
+    if not columns:
+        return ids if largest >= count else ""
+    if not is_first_black:
+        return (
+            "shows a ChArUco whose upper left square is white, as in the pattern of OpenCV before 4.6 (legacy) with an "
+            "even number of rows; print one with a black square there: abs-service calibrate target charuco"
+        )
+    if columns == target.columns:
+        return ids if largest >= count else ""
+    if columns == target.rows and largest < count:
+        return f"fits with columns and rows exchanged, {columns} × {target.columns} instead of {size}"
+    return f"shows markers with ids up to {largest} that stand as on a board of {columns} columns, not of {size}"
+
+
+def _layout(target: Charuco | AprilGrid, seen: _Markers) -> tuple[int, bool]:
+    """Number of columns, and whether the upper left square is black; 0 columns if the markers do not tell."""
+    if len(seen.ids) < LEAST_PLACED:
+        return 0, True
+    colors = (True, False) if isinstance(target, Charuco) else (True,)
+    tried = {
+        (columns, black): _off(_places(target, seen.ids, columns, black), seen.centers)
+        for columns in range(2, _MAX_COLUMNS + 1)
+        for black in colors
+    }
+    given = tried.get((target.columns, True), np.inf)
+    best = min(tried, key=lambda key: tried[key])
+    if given < _OFF or tried[best] > _OFF or given < _CLEARLY * tried[best]:
+        return (target.columns, True) if given < _OFF else (0, True)
+    return best
+
+
+def _places(target: Charuco | AprilGrid, ids: NDArray[np.intp], columns: int, black: bool) -> NDArray[np.float64]:
+    """Places of markers on a board of a number of columns (n, 2) [squares]."""
+    if isinstance(target, AprilGrid):
+        return np.stack([ids % columns, -(ids // columns)], axis=1).astype(np.float64)
+    row, column = np.divmod(np.arange(2 * (int(ids.max()) + columns + 1)), columns)
+    white = (row + column) % 2 == int(black)
+    return np.stack([column[white][ids], row[white][ids]], axis=1).astype(np.float64)
+
+
+def _off(places: NDArray[np.float64], centers: NDArray[np.float64]) -> float:
+    """Distance by which most markers are off places on a board that is seen from its printed side [squares]."""
+    if min(np.linalg.matrix_rank(each - each.mean(axis=0)) for each in (places, centers)) < 2:
+        return np.inf
+    H, _ = cv2.findHomography(centers, places)
+    if H is None or np.linalg.det(H) * H[2, 2] <= 0:
+        return np.inf
+    off = np.linalg.norm(cv2.perspectiveTransform(centers[:, None], H)[:, 0] - places, axis=1)
+    return float(np.percentile(off, _MOST))

@@ -1,0 +1,69 @@
+"""Boards with markers that are not as described are named, and boards that are as described are not."""
+
+import cv2
+import numpy as np
+import pytest
+
+from calib.board.corners.description import mismatch
+from calib.board.corners.detection import detect
+from calib.board.corners.errors import NothingFoundError, OtherBoardError
+from calib.board.corners.to_8bit import grey
+from calib.board.target import AprilGrid, Charuco, Chessboard
+from tests.calib.board.boards import VGA, as_bytes, centered, photograph
+
+GRID = AprilGrid(6, 5, 0.03, 0.009)
+
+
+@pytest.fixture(scope="module")
+def grid() -> np.ndarray:
+    return as_bytes(photograph(GRID, VGA, centered(GRID, (0.2, 0.1, 0.3), 0.42)))
+
+
+@pytest.mark.parametrize("described", [AprilGrid(5, 6, 0.03, 0.009), AprilGrid(7, 5, 0.03, 0.009)])
+def test_a_grid_with_other_columns_is_refused(grid: np.ndarray, described: AprilGrid) -> None:
+    with pytest.raises(OtherBoardError, match=f"not stand as on a board of {described.columns} × {described.rows}"):
+        detect(described, grid)
+
+
+def test_a_grid_with_other_gaps_is_refused_with_both(grid: np.ndarray) -> None:
+    with pytest.raises(OtherBoardError, match=r"0\.30 of a tag wide, but 0\.50 as described"):
+        detect(AprilGrid(6, 5, 0.03, 0.015), grid)
+
+
+def test_a_grid_says_which_columns_it_has(grid: np.ndarray) -> None:
+    assert (
+        mismatch(AprilGrid(5, 6, 0.03, 0.009), grid) == "fits with columns and rows exchanged, 6 × 5 instead of 5 × 6"
+    )
+    assert mismatch(AprilGrid(6, 4, 0.03, 0.009), grid).endswith("ids up to 29, a board of 6 × 4 has 0 to 23")
+    assert mismatch(GRID, grid) == ""
+    assert mismatch(Charuco(7, 5, 0.03, 0.022, "apriltag_36h11"), grid) == "shows an AprilGrid"
+
+
+@pytest.mark.parametrize(("columns", "rows"), [(7, 6), (8, 6)])
+def test_the_pattern_of_an_older_opencv_is_named(columns: int, rows: int) -> None:
+    board = Charuco(columns, rows, 0.03, 0.022, "4x4_50")
+    printed = cv2.aruco.CharucoBoard((columns, rows), board.square, board.marker, board.markers())
+    printed.setLegacyPattern(True)
+    size = (60 * columns, 60 * rows)
+    assert "upper left square is white" in mismatch(board, grey(printed.generateImage(size, marginSize=20)))
+    printed.setLegacyPattern(False)
+    assert mismatch(board, grey(printed.generateImage(size, marginSize=20))) == ""
+
+
+def test_an_image_without_markers_says_nothing() -> None:
+    assert mismatch(GRID, np.full((120, 160), 128, np.uint8)) == ""
+
+
+def test_a_white_wall_around_another_board_is_not_said_to_saturate_it() -> None:
+    image = as_bytes(photograph(GRID, VGA, centered(GRID, (0, 0, 0), 0.4)))
+    image[image > 90] = 255
+    with pytest.raises(NothingFoundError, match="bright as the sensor can tell, which may be why"):
+        detect(Chessboard(9, 6, 0.03), image)
+
+
+def test_a_whole_board_of_another_size_near_the_border_is_not_said_to_be_cut_off() -> None:
+    board = Chessboard(9, 6, 0.03)
+    T_sb = centered(board, (0, 0, 0), 0.8)
+    T_sb[0, 3] -= 0.27
+    with pytest.raises(NothingFoundError):
+        detect(Chessboard(8, 5, 0.03), as_bytes(photograph(board, VGA, T_sb)))
