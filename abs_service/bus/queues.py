@@ -32,6 +32,10 @@ class LatestQueue(Generic[T]):
         with self._changed:
             return dict(self._dropped)
 
+    def __len__(self) -> int:
+        """Number of items that wait."""
+        return len(self._items)
+
     def put(self, key: str, item: T) -> None:
         """Adds an item; drops the key's oldest if there are `depth` already. Items put after `close` are ignored."""
         with self._changed:

@@ -12,15 +12,12 @@ Applications connect to bus.endpoint; the keys are abs/<rig>/<tracker>/state and
 import argparse
 import logging
 import os
-import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from functools import partial
 from pathlib import Path
 from urllib.parse import parse_qsl, urlencode, urlsplit, urlunsplit
-
-from rich.console import Console
 
 from abs_service import config
 from abs_service.bus import keys
@@ -29,10 +26,7 @@ from abs_service.bus.stamps import WallClock
 from abs_service.commands.parts import logs, rig_process
 from abs_service.commands.parts.rig_in_memory import in_memory
 from abs_service.commands.running import view
-from abs_service.display.terminal import journal
-from abs_service.display.terminal.journal import JournalDisplay
-from abs_service.display.terminal.lines import JsonDisplay, PlainDisplay
-from abs_service.display.terminal.table import TableDisplay
+from abs_service.display.terminal import choice
 from abs_service.recording.disk import folder
 from abs_service.supervision import forked, log_lines, metrics, systemd
 from abs_service.supervision.child import Child
@@ -77,7 +71,7 @@ def run(arguments: argparse.Namespace) -> int:
     with (
         rig_process.open_bus_at(rig.bus.endpoint, Role.ROUTER, rig, arguments) as bus,
         in_memory(rig) as file,
-        make_display(as_json=arguments.json) as display,
+        choice.shown(as_json=arguments.json) as display,
         _logging_to(display, logs.on_stderr(arguments)) if not arguments.log_file else nullcontext(),
         metrics.served(rig.run.metrics_port) as measure,
     ):
@@ -93,13 +87,14 @@ def run(arguments: argparse.Namespace) -> int:
         finally:
             notifier.stopping()
             session.stop()
-        display.close(session.view())
+        lost = display.close(session.view())
     refused = supervisor.misconfigured()
     if refused is not None:
         # The child has read a temporary file of ours.
         reason = log_lines.final_error(refused.reason)
         raise ChildError(reason.replace(str(file.path), str(arguments.config or "demo.toml")))
-    return supervisor.exit_code() or recording_code(supervisor.children.values())
+    missing = Exit.FAILED if lost else Exit.OK
+    return supervisor.exit_code() or recording_code(supervisor.children.values()) or missing
 
 
 def effective(rig: config.ServiceConfig, arguments: argparse.Namespace) -> config.ServiceConfig:
@@ -206,15 +201,6 @@ def _pass_on(display: Display, as_json: bool, component: str, line: str) -> None
         display.note(line if log_lines.parse(line) else log_lines.line(time.time(), "info", component, line, {}))
     else:
         display.note(f"{component}: {line}")
-
-
-def make_display(as_json: bool) -> Display:
-    """JSON, the live table in a terminal, the journal of systemd, or plain lines elsewhere."""
-    if as_json:
-        return JsonDisplay(sys.stdout, sys.stderr)
-    if journal.is_attached(os.environ, sys.stderr.fileno()):
-        return JournalDisplay(journal.send)
-    return TableDisplay(Console()) if sys.stdout.isatty() else PlainDisplay(sys.stdout, sys.stderr)
 
 
 class _Notes(logging.Handler):

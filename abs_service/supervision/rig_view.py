@@ -174,8 +174,8 @@ class Display(Protocol):
         """Shows a message once. May be called from any thread."""
         ...
 
-    def close(self, view: RigView) -> None:
-        """Shows the summary."""
+    def close(self, view: RigView) -> int:
+        """Shows the summary; returns the number of lines that a program was to read and that are lost."""
         ...
 
 

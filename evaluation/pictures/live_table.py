@@ -13,6 +13,8 @@ from rich.console import Console
 from rich.text import Text
 
 from abs_service.commands import run
+from abs_service.display.terminal import choice
+from abs_service.display.terminal.output import Output
 from abs_service.display.terminal.table import TableDisplay, draw
 from abs_service.supervision.rig_view import RigView
 
@@ -24,7 +26,8 @@ class _LastTable(TableDisplay):
     """Keeps the last table that was drawn while everything ran."""
 
     def __init__(self) -> None:
-        super().__init__(Console(file=io.StringIO(), force_terminal=True, width=108, height=40))
+        nowhere = io.StringIO()
+        super().__init__(Console(file=nowhere, force_terminal=True, width=108, height=40), Output(nowhere.write))
         self._recorder = Console(file=io.StringIO(), record=True, width=108)
 
     def update(self, view: RigView) -> None:
@@ -43,7 +46,7 @@ def main() -> None:
     display = _LastTable()
     options = argparse.ArgumentParser()
     run.add_arguments(options)
-    with tempfile.TemporaryDirectory() as folder, mock.patch.object(run, "make_display", return_value=display):
+    with tempfile.TemporaryDirectory() as folder, mock.patch.object(choice, "shown", return_value=display):
         run.run(options.parse_args(["--duration", str(DURATION_S), "--out", folder]))
     display.save(picture)
 

@@ -77,9 +77,10 @@ class JournalDisplay:
         priority = _LOG_PRIORITIES.get(record.get("level", ""), _INFORMATION)
         self._entry({"MESSAGE": message, "PRIORITY": priority, "ABS_COMPONENT": str(record.get("process", ""))})
 
-    def close(self, view: RigView) -> None:
+    def close(self, view: RigView) -> int:
         """See `Display`."""
         self.note("\n".join(view.summary()))
+        return 0
 
     def _tell_change(self, field: str, component: str, value: str, reason: str, priority: str) -> None:
         if self._told.get((field, component)) == value:

@@ -2,39 +2,19 @@
 
 import json
 from contextlib import suppress
-from typing import Self, TextIO
+from typing import Self
 
+from abs_service.display.terminal.output import Output
 from abs_service.supervision.rig_view import RigView, size
 from abs_service.tracking.log.tracker_log import EstimateReport
 
 PERIOD_NS = 1_000_000_000
 
 
-class _Lines:
-    """Lines of an output whose disk may be full: what cannot be written is counted, and the rig goes on."""
-
-    def __init__(self, out: TextIO) -> None:
-        self._out = out
-        self._lost, self._error = 0, ""
-
-    def write(self, *lines: str) -> None:
-        """Writes lines; raises BrokenPipeError if the reader is gone."""
-        try:
-            print(*lines, sep="\n", file=self._out, flush=True)
-        except BrokenPipeError:
-            raise
-        except OSError as error:
-            self._lost, self._error = self._lost + len(lines), error.strerror
-
-    def losses(self) -> list[str]:
-        """Says what was lost; empty if nothing was."""
-        return [f"up to {self._lost} lines of output are missing: {self._error}"] if self._lost else []
-
-
-def _note(text: str, notes: TextIO) -> None:
+def _note(text: str, notes: Output) -> None:
     # Notes come from the log, too, and from the threads that read what children say: none of them may end by it.
     with suppress(OSError):
-        print(text, file=notes, flush=True)
+        notes.write(f"{text}\n")
 
 
 class PlainDisplay:
@@ -45,8 +25,8 @@ class PlainDisplay:
         notes: where notes go.
     """
 
-    def __init__(self, out: TextIO, notes: TextIO) -> None:
-        self._out = _Lines(out)
+    def __init__(self, out: Output, notes: Output) -> None:
+        self._out = out
         self._notes = notes
         self._next_ns = 0
 
@@ -61,7 +41,7 @@ class PlainDisplay:
         if view.now_ns < self._next_ns:
             return
         self._next_ns = view.now_ns + PERIOD_NS
-        self._out.write(line(view))
+        self._out.write(f"{line(view)}\n")
 
     def estimate(self, report: EstimateReport) -> None:
         """Lines show the last estimate only."""
@@ -70,11 +50,12 @@ class PlainDisplay:
         """See `Display`."""
         _note(text, self._notes)
 
-    def close(self, view: RigView) -> None:
+    def close(self, view: RigView) -> int:
         """See `Display`."""
-        self._out.write(*view.summary())
-        for loss in self._out.losses():
-            self.note(loss)
+        self._out.write("\n".join([*view.summary(), ""]))
+        if missing := self._out.finish():
+            self.note(missing)
+        return self._out.lost
 
 
 class JsonDisplay:
@@ -85,8 +66,8 @@ class JsonDisplay:
         notes: where notes and the summary go.
     """
 
-    def __init__(self, out: TextIO, notes: TextIO) -> None:
-        self._out = _Lines(out)
+    def __init__(self, out: Output, notes: Output) -> None:
+        self._out = out
         self._notes = notes
 
     def __enter__(self) -> Self:
@@ -100,15 +81,17 @@ class JsonDisplay:
 
     def estimate(self, report: EstimateReport) -> None:
         """See `Display`."""
-        self._out.write(json.dumps(report.as_dict(), ensure_ascii=False))
+        self._out.write(f"{json.dumps(report.as_dict(), ensure_ascii=False)}\n")
 
     def note(self, text: str) -> None:
         """See `Display`."""
         _note(text, self._notes)
 
-    def close(self, view: RigView) -> None:
+    def close(self, view: RigView) -> int:
         """See `Display`."""
-        self.note("\n".join([*view.summary(), *self._out.losses()]))
+        missing = self._out.finish()
+        self.note("\n".join([*view.summary(), *([missing] if missing else [])]))
+        return self._out.lost
 
 
 def line(view: RigView) -> str:

@@ -11,11 +11,13 @@ from rich.spinner import Spinner
 from rich.table import Table
 from rich.text import Text
 
+from abs_service.display.terminal.output import Output
 from abs_service.supervision.child import State
 from abs_service.supervision.rig_view import RigView, size
 from abs_service.tracking.log.tracker_log import EstimateReport, TrackerLog
 
-REFRESH_HZ = 6
+#: Time between two tables [ns].
+PERIOD_NS = 160_000_000
 
 #: Colour of each status of an estimate.
 STATUS_COLORS = {"TRACKING": "green", "DEGRADED": "yellow", "LOST": "red", "INITIALIZING": "cyan"}
@@ -23,16 +25,19 @@ _STATE = {State.RUNNING: "green", State.FAILED: "red", State.STALLED: "red", Sta
 
 
 class TableDisplay:
-    """A table that is redrawn several times a second, below the notes.
+    """A table that is redrawn several times a second, below the notes; not while the terminal is halted (Ctrl-S).
 
     Args:
         console: the terminal.
+        output: that it writes to.
     """
 
-    def __init__(self, console: Console) -> None:
+    def __init__(self, console: Console, output: Output) -> None:
         self._console = console
+        self._output = output
         self._spinner = Spinner("dots", style="cyan")
-        self._region = LiveRegion(console=console, refresh_per_second=REFRESH_HZ, transient=True)
+        self._region = LiveRegion(console=console, auto_refresh=False, transient=True)
+        self._next_ns = 0
 
     def __enter__(self) -> Self:
         self._region.start()
@@ -44,8 +49,12 @@ class TableDisplay:
             self._region.stop()
 
     def update(self, view: RigView) -> None:
-        """See `Display`; the region redraws its last content by itself."""
-        self._region.update(draw(view, self._spinner))
+        """See `Display`."""
+        if view.now_ns < self._next_ns or not self._output.idle:
+            return
+        self._next_ns = view.now_ns + PERIOD_NS
+        with suppress(OSError):  # the terminal is gone, and the rig goes on
+            self._region.update(draw(view, self._spinner), refresh=True)
 
     def estimate(self, report: EstimateReport) -> None:
         """The table shows the last estimate only."""
@@ -55,12 +64,13 @@ class TableDisplay:
         with suppress(OSError):  # the terminal is gone, and the rig goes on
             self._console.print(Text(text, style="dim"))
 
-    def close(self, view: RigView) -> None:
+    def close(self, view: RigView) -> int:
         """See `Display`; leaves the last table in the terminal."""
         with suppress(OSError):
             self._region.stop()
             self._console.print(draw(view, Text("")))
             self._console.print("\n".join(view.summary()), highlight=False, markup=False)
+        return 0
 
 
 def draw(view: RigView, spinner: Spinner | Text) -> RenderableType:

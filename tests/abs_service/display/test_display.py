@@ -3,10 +3,15 @@
 import io
 import json
 import os
+import threading
 
 import pytest
+from rich.console import Console
 
+from abs_service.display.terminal import output
 from abs_service.display.terminal.lines import JsonDisplay, PlainDisplay, line
+from abs_service.display.terminal.output import Output
+from abs_service.display.terminal.table import TableDisplay
 from abs_service.supervision.rig_state import RigState
 from abs_service.supervision.rig_view import size
 from tests.abs_service.display.full_swing import Clock, S, recorder, report, take_health, view
@@ -36,7 +41,7 @@ def test_the_summary_says_what_there_is_of_a_recording_that_failed(live, tmp_pat
 
 def test_plain_output_is_one_line_a_second(live):
     out = io.StringIO()
-    with PlainDisplay(out, io.StringIO()) as display:
+    with Output(out.write) as file, PlainDisplay(file, Output(io.StringIO().write)) as display:
         for tenth in range(25):
             display.update(view(live, now_ns=S + tenth * S // 10))
     assert len(out.getvalue().splitlines()) == 3
@@ -50,7 +55,7 @@ def test_a_plain_line_shows_the_whole_state(live):
 
 def test_json_is_one_object_per_estimate_and_nothing_else():
     out, notes = io.StringIO(), io.StringIO()
-    with JsonDisplay(out, notes) as display:
+    with Output(notes.write) as said, JsonDisplay(Output(out.write), said) as display:
         display.estimate(report())
         display.note("something")
         display.update(view(RigState(["sheet"], Clock())))
@@ -72,22 +77,51 @@ def test_sizes(number, text):
 @pytest.mark.parametrize("kind", [PlainDisplay, JsonDisplay])
 def test_an_output_on_a_full_disk_does_not_end_the_rig_and_says_what_is_missing(live, kind):
     notes = io.StringIO()
-    out = open("/dev/full", "w", encoding="utf-8")  # noqa: SIM115 - closing it fails, as writing does
-    with kind(out, notes) as display:
+    with open("/dev/full", "w", encoding="utf-8") as full, Output(notes.write) as said:
+        display = kind(output.of(full), said)
         display.update(view(live))
         display.estimate(report())
-        display.close(view(live))
+        assert display.close(view(live)) > 0
     assert "lines of output are missing: No space left on device" in notes.getvalue()
-    with pytest.raises(OSError, match="No space"):
-        out.close()
 
 
 @pytest.mark.parametrize("kind", [PlainDisplay, JsonDisplay])
 def test_notes_that_nobody_can_read_do_not_end_the_rig(kind):
     reader, writer = os.pipe()
     os.close(reader)
-    notes = open(writer, "w", encoding="utf-8")  # noqa: SIM115 - closing it fails, as writing does
-    with kind(io.StringIO(), notes) as display:
+    with open(writer, "w", encoding="utf-8") as nobody, output.of(nobody) as notes:
+        display = kind(Output(io.StringIO().write), notes)
         display.note("record ended by signal 9")
-    with pytest.raises(BrokenPipeError):
-        notes.close()
+        with pytest.raises(BrokenPipeError):
+            notes.finish()
+        display.note("record ended by signal 9")
+
+
+def test_nobody_waits_for_a_reader_that_stands_still_and_what_it_misses_is_counted(monkeypatch):
+    monkeypatch.setattr(output, "END_S", 0.01)
+    reader, writer = os.pipe()
+    with open(reader, "rb"), open(writer, "w", encoding="utf-8") as pipe, output.of(pipe) as halted:
+        for number in range(output.DEPTH + 200):
+            halted.write(f"{number:<1000}\n")
+        missing = halted.finish()
+        assert not halted.idle
+        assert f"up to {halted.lost} lines of output are missing: its reader stands still" == missing
+        assert output.DEPTH < halted.lost < output.DEPTH + 200
+
+
+def test_a_halted_terminal_is_given_no_further_tables_but_all_notes(live):
+    go_on, written = threading.Event(), []
+
+    def write(text):
+        go_on.wait(5.0)
+        written.append(text)
+
+    with Output(write) as halted:
+        display = TableDisplay(Console(file=halted.file, force_terminal=True, width=100), halted)
+        for second in range(9):
+            display.update(view(live, now_ns=second * S))
+        display.note("capture: camera found")
+        go_on.set()
+        halted.finish()
+    assert len(written) == 2
+    assert "camera found" in written[-1]

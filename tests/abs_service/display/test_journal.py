@@ -10,8 +10,7 @@ import pytest
 from absmsg.v1.health_pb2 import Health
 
 from abs_service.bus.contract import Sample
-from abs_service.commands import run
-from abs_service.display.terminal import journal
+from abs_service.display.terminal import choice, journal
 from abs_service.supervision import log_lines
 from abs_service.supervision.child import Child, State
 from abs_service.supervision.rig_state import RigState
@@ -147,7 +146,9 @@ def test_run_writes_to_the_journal_if_systemd_has_connected_it(tmp_path, monkeyp
         monkeypatch.setattr(sys, "stderr", stream)
         status = os.fstat(stream.fileno())
         monkeypatch.setenv("JOURNAL_STREAM", f"{status.st_dev}:{status.st_ino}")
-        assert isinstance(run.make_display(as_json=False), journal.JournalDisplay)
+        with choice.shown(as_json=False) as display:
+            assert isinstance(display, journal.JournalDisplay)
         # Inherited by a shell that has sent its output elsewhere.
         monkeypatch.setenv("JOURNAL_STREAM", f"{status.st_dev}:{status.st_ino + 1}")
-        assert not isinstance(run.make_display(as_json=False), journal.JournalDisplay)
+        with choice.shown(as_json=False) as display:
+            assert not isinstance(display, journal.JournalDisplay)

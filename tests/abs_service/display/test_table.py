@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.spinner import Spinner
 
 from abs_service.display.terminal.lines import line
+from abs_service.display.terminal.output import Output
 from abs_service.display.terminal.table import STATUS_COLORS, TableDisplay, draw
 from abs_service.supervision.child import Child, State
 from abs_service.supervision.rig_state import RigState
@@ -119,7 +120,10 @@ def test_markup_in_what_others_say_is_only_text(live):
 
 def test_the_table_leaves_notes_above_and_the_summary_below(live):
     out = io.StringIO()
-    with TableDisplay(Console(file=out, width=100, force_terminal=False)) as display:
+    with (
+        Output(out.write) as file,
+        TableDisplay(Console(file=file.file, width=100), file) as display,
+    ):
         display.update(view(live))
         display.note("capture: [odd] camera found")
         display.estimate(report())

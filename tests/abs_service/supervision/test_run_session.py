@@ -17,6 +17,7 @@ from abs_service.bus.keys import KeyNameError
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.commands import run
 from abs_service.display.terminal.lines import PlainDisplay
+from abs_service.display.terminal.output import Output
 from abs_service.supervision.child import Child, State
 from abs_service.supervision.exit_codes import Exit
 from abs_service.supervision.run_session import RunSession
@@ -132,7 +133,7 @@ class Gone(io.StringIO):
 
 
 def test_health_of_a_child_is_a_sign_of_life_and_its_silence_is_noticed():
-    bench = Bench(PlainDisplay(io.StringIO(), io.StringIO()))
+    bench = Bench(PlainDisplay(Output(io.StringIO().write), Output(io.StringIO().write)))
     bench.supervisor.poll()
     bench.bus.publisher(keys.health("capture"), Health.DESCRIPTOR.full_name, EVENTS).put(
         Health(component="capture").SerializeToString()
@@ -145,7 +146,7 @@ def test_health_of_a_child_is_a_sign_of_life_and_its_silence_is_noticed():
 
 
 def test_a_topology_that_the_network_lost_is_queried():
-    bench = Bench(PlainDisplay(io.StringIO(), io.StringIO()), trackers=["sheet"])
+    bench = Bench(PlainDisplay(Output(io.StringIO().write), Output(io.StringIO().write)), trackers=["sheet"])
     asked = []
 
     def topology():
@@ -162,7 +163,7 @@ def test_a_topology_that_the_network_lost_is_queried():
 
 def test_a_tracker_that_falls_silent_is_an_error_whatever_the_cause(monkeypatch):
     monkeypatch.setattr(silence_monitor, "SILENCE_NS", 100_000_000)
-    bench = Bench(PlainDisplay(io.StringIO(), io.StringIO()), trackers=["sheet"])
+    bench = Bench(PlainDisplay(Output(io.StringIO().write), Output(io.StringIO().write)), trackers=["sheet"])
     state = DeformationState(tracker="sheet").SerializeToString()
     publisher = bench.bus.publisher(keys.state("sheet"), estimate_messages.STATE, EVENTS)
     publisher.put(state)
@@ -180,7 +181,7 @@ def test_a_tracker_that_falls_silent_is_an_error_whatever_the_cause(monkeypatch)
 
 
 def test_what_a_new_configuration_concerns_starts_again_and_capture_is_told():
-    bench = Bench(PlainDisplay(io.StringIO(), io.StringIO()))
+    bench = Bench(PlainDisplay(Output(io.StringIO().write), Output(io.StringIO().write)))
     bench.session.answer_reloads(lambda: (Path("other"), ("record",)))
     bench.supervisor.poll()
     capture, record = (child.process for child in bench.supervisor.children.values())
@@ -196,7 +197,7 @@ def test_what_a_new_configuration_concerns_starts_again_and_capture_is_told():
 
 
 def test_the_processes_are_stopped_also_when_the_output_is_closed():
-    bench = Bench(PlainDisplay(Gone(), io.StringIO()))
+    bench = Bench(PlainDisplay(Output(Gone().write), Output(io.StringIO().write)))
     with pytest.raises(BrokenPipeError):
         bench.session.run_until(lambda: False)
     bench.session.stop()

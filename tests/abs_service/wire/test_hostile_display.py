@@ -16,6 +16,7 @@ from rich.text import Text
 
 from abs_service.bus.stamps import WallClock
 from abs_service.display.terminal.lines import JsonDisplay, PlainDisplay
+from abs_service.display.terminal.output import Output
 from abs_service.display.terminal.table import draw
 from abs_service.supervision.rig_view import Display
 from abs_service.supervision.run_session import RunSession
@@ -28,13 +29,21 @@ from tests.abs_service.wire.test_edge import sample
 HOSTILE = st.lists(samples(), min_size=1, max_size=5)
 
 
+class Now(Output):
+    """Output that has arrived when it is written."""
+
+    def put(self, item):
+        self._act(item)
+
+
 class Everything(Display):
     """All displays at once, drawn to the last character."""
 
     def __init__(self):
         self.out, self.lines = io.StringIO(), io.StringIO()
         self._console = Console(file=self.out, width=120, color_system=None)
-        self._others = PlainDisplay(self.lines, self.lines), JsonDisplay(self.lines, self.lines)
+        lines = Now(self.lines.write)
+        self._others = PlainDisplay(lines, lines), JsonDisplay(lines, lines)
 
     def __enter__(self):
         return self
@@ -56,6 +65,7 @@ class Everything(Display):
 
     def close(self, view):
         self._console.print("\n".join(view.summary()), highlight=False, markup=False)
+        return 0
 
 
 class Run:
