@@ -17,7 +17,7 @@ from types import ModuleType
 
 import abs_service
 from abs_service.supervision import parent_watchdog, standard_files
-from abs_service.supervision.exit_codes import Exit
+from abs_service.supervision.exit_codes import Exit, lack_of_host
 
 #: One line of help for each command; kept here so that `--help` imports none of them.
 COMMANDS = {
@@ -78,11 +78,18 @@ abs-service COMMAND --help describes each command.
 def program() -> None:
     """Runs the command line as a process, which ends even if a thread does not, such as a callback that waits."""
     standard_files.secure()
-    _preload(sys.argv[1:])
     try:
+        standard_files.allow_files()
+        _preload(sys.argv[1:])
         code = main()
+    except standard_files.FileLimitError as error:
+        print(f"abs-service: error: {error}", file=sys.stderr)
+        code = Exit.USER
     except Exception as error:
-        sys.excepthook(type(error), error, error.__traceback__)
+        if lack := lack_of_host(error):
+            print(f"abs-service: error: {lack}", file=sys.stderr)
+        else:
+            sys.excepthook(type(error), error, error.__traceback__)
         code = Exit.FAILED
     deadline_s = time.monotonic() + THREADS_END_S
     others = [one for one in threading.enumerate() if one is not threading.main_thread() and not one.daemon]

@@ -1,6 +1,18 @@
-"""Exit codes of the commands, which the supervisor evaluates."""
+"""Exit codes of the commands, which the supervisor evaluates, and whose fault an error is."""
 
+import errno
 from enum import IntEnum
+
+_HOST = {
+    errno.EMFILE,
+    errno.ENFILE,
+    errno.ENOMEM,
+    errno.EAGAIN,
+    errno.ENOSPC,
+    errno.EDQUOT,
+    errno.EROFS,
+    errno.EIO,
+}
 
 
 class Exit(IntEnum):
@@ -18,3 +30,13 @@ class Exit(IntEnum):
 def is_for_user(error: Exception) -> bool:
     """True for exceptions of this project, which are user errors with an actionable message; others are bugs."""
     return type(error).__module__.partition(".")[0] in ("abs_service", "drivers", "calib")
+
+
+def lack_of_host(error: Exception) -> str:
+    """A lack of the host, such as of memory, descriptors or threads, in words; "" for an error of another kind."""
+    if isinstance(error, MemoryError):
+        return f"out of memory {error}".rstrip()
+    # The second is how Python says that there are too many threads.
+    if (isinstance(error, OSError) and error.errno in _HOST) or str(error) == "can't start new thread":
+        return str(error)
+    return ""

@@ -9,11 +9,15 @@ import ctypes
 import multiprocessing
 import os
 import shutil
+import signal
 import sys
+import tempfile
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from importlib import import_module
-from multiprocessing import forkserver, util
+from multiprocessing import current_process, forkserver, util
 from multiprocessing.connection import Connection
+from typing import Any
 
 from setproctitle import setproctitle
 
@@ -21,6 +25,9 @@ from abs_service.supervision import parent_watchdog
 
 #: Makes processes that the fork server forks.
 CONTEXT = multiprocessing.get_context("forkserver")
+
+#: Longest temporary folder in which the path of the fork server's socket is not too long for the kernel [bytes].
+LONGEST_PARENT = 70
 
 _PR_SET_CHILD_SUBREAPER = 36
 #: Environment variable with the folder of the fork server's socket.
@@ -33,14 +40,23 @@ def preload(module: str) -> None:
     Should it die, this process becomes the parent of its children: prctl(2), PR_SET_CHILD_SUBREAPER.
     """
     ctypes.CDLL(None).prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
-    os.environ[_FOLDER] = util.get_temp_dir()
+    parent = tempfile.gettempdir() if len(os.fsencode(tempfile.gettempdir())) <= LONGEST_PARENT else "/tmp"
+    os.environ[_FOLDER] = folder = tempfile.mkdtemp(prefix="abs-service-", dir=parent)
+    # Of one that multiprocessing makes for itself, it complains when somebody else has deleted it.
+    current_process()._config["tempdir"] = folder  # pyright: ignore # noqa: SLF001
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
     CONTEXT.set_forkserver_preload([module])
     forkserver.ensure_running()
 
 
 def ensure_running() -> None:
-    """Starts the fork server anew if it has died, so that it is ready when it is needed; its children live on."""
-    forkserver.ensure_running()
+    """Starts the fork server anew if it has died, or its folder was deleted, if that can be; its children live on."""
+    server: Any = forkserver._forkserver  # pyright: ignore # noqa: SLF001 - nothing public tells its address
+    with suppress(OSError):  # else the next start of a process says why
+        os.makedirs(util.get_temp_dir(), 0o700, exist_ok=True)
+        if server._forkserver_pid and not os.path.exists(server._forkserver_address):  # noqa: SLF001
+            os.kill(server._forkserver_pid, signal.SIGKILL)  # noqa: SLF001
+        forkserver.ensure_running()
 
 
 def detach() -> None:

@@ -1,7 +1,14 @@
-"""Standard input, output and error, which a caller may have closed, or given an encoding without our characters."""
+"""Standard input, output and error, which a caller may have closed, or given an encoding without our characters.
+
+Nor may a caller's limit of open files be too low, where zenoh would end the process.
+"""
 
 import os
+import resource
 import sys
+
+#: Limits of open files: that a process asks for, and the least with which it begins.
+FILES, FEWEST_FILES = 1024, 64
 
 #: The three, by their descriptors, with the mode in which Python opens each.
 _FILES = (("stdin", "r"), ("stdout", "w"), ("stderr", "w"))
@@ -9,6 +16,26 @@ _FILES = (("stdin", "r"), ("stdout", "w"), ("stderr", "w"))
 
 class OutputError(Exception):
     """Standard output cannot be written; the message has the reason."""
+
+
+class FileLimitError(Exception):
+    """A process may open too few files."""
+
+
+def allow_files() -> None:
+    """Raises the limit of open files of this process and its children to `FILES`, if it is lower and can be raised.
+
+    Raises:
+        FileLimitError: it stays below `FEWEST_FILES`.
+    """
+    limit, highest = resource.getrlimit(resource.RLIMIT_NOFILE)
+    files = FILES if highest == resource.RLIM_INFINITY else min(FILES, highest)
+    if limit != resource.RLIM_INFINITY and limit < files:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (files, highest))
+    if files < FEWEST_FILES:
+        raise FileLimitError(
+            f"the limit of open files is {files}, at least {FEWEST_FILES} are needed: ulimit -n {FILES}"
+        )
 
 
 def secure() -> None:

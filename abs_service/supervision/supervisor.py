@@ -147,7 +147,14 @@ class Supervisor:
 
     def _start(self, child: Child, now_ns: int) -> None:
         _end(child)
-        child.process = self._spawn(child.component, child.arguments)
+        try:
+            child.process = self._spawn(child.component, child.arguments)
+        except (OSError, EOFError, RuntimeError, MemoryError) as error:  # RuntimeError: too many threads
+            # The host lacks something, which is no failure of the process.
+            child.state, child.start_at_ns = State.BACKOFF, now_ns + LONGEST_BACKOFF_NS
+            child.reason = f"cannot be started: {error}"
+            _log.warning("%s %s; trying again", child.component, child.reason)
+            return
         started = {"component": child.component, "child": child.process.pid, "restarts": child.restarts}
         _log.info("%s is started", child.component, extra={"fields": started})
         child.state, child.reason = State.RUNNING, ""

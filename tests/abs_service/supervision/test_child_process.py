@@ -109,7 +109,8 @@ def test_no_child_outlives_a_supervisor_that_was_killed(handler):
 
 
 FORKED = """
-import os, signal
+import os, shutil, signal
+from multiprocessing import util
 from abs_service.supervision import forked
 from abs_service.supervision.child_process import ChildProcess
 from tests.abs_service.supervision import child_code
@@ -133,6 +134,11 @@ assert after.output_tail() == "works"
 before.wake()
 before.output_tail()
 print(before.poll(), after.poll(), flush=True)
+
+shutil.rmtree(util.get_temp_dir())
+(deaf,) = servers()
+assert eventually(lambda: forked.ensure_running() or not servers() & {deaf} and os.listdir(util.get_temp_dir()))
+print(ChildProcess("act", ["print('works again')"], lambda *_: None, child_code.run).output_tail(), flush=True)
 """
 
 
@@ -145,7 +151,7 @@ def test_children_outlive_the_fork_server():
         check=False,
         env=os.environ | {"PYTHONPATH": PATH},
     )
-    assert done.stdout == "7 0\n", done.stderr
+    assert done.stdout == "7 0\nworks again\n", done.stderr
 
 
 WOKEN = """

@@ -1,12 +1,13 @@
 """Commands whose caller has closed a standard file, gives it another encoding, or a disk that is full."""
 
+import errno
 import os
 import subprocess
 import sys
 
 import pytest
 
-from abs_service.supervision.exit_codes import Exit
+from abs_service.supervision.exit_codes import Exit, lack_of_host
 
 CHECK = f"{sys.executable} -m abs_service check"
 
@@ -15,6 +16,10 @@ def shell(command, **environment):
     kept = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)} | environment
     done = subprocess.run(["sh", "-c", command], capture_output=True, env=kept, check=False)
     return done.returncode, done.stdout, done.stderr
+
+
+def thread_limit():
+    return RuntimeError("can't start new thread")
 
 
 @pytest.mark.parametrize("closed", ["<&-", ">&-", "2>&-", "<&- >&- 2>&-"])
@@ -43,3 +48,21 @@ def test_an_output_on_a_full_disk_is_one_line():
     code, _, errors = shell(f"{CHECK} > /dev/full")
     assert code == Exit.USER
     assert errors == b"abs-service: error: standard output cannot be written: No space left on device\n"
+
+
+def test_too_few_open_files_are_refused_before_anything_is_opened():
+    code, _, errors = shell(f"ulimit -n 32; {CHECK}")
+    assert code == Exit.USER
+    assert errors == b"abs-service: error: the limit of open files is 32, at least 64 are needed: ulimit -n 1024\n"
+
+
+def test_a_low_limit_of_open_files_is_raised_if_it_can_be():
+    program = "from abs_service.supervision import standard_files as s; s.allow_files(); import resource as r"
+    code, output, _ = shell(f'ulimit -S -n 32; {sys.executable} -c "{program}; print(r.getrlimit(r.RLIMIT_NOFILE)[0])"')
+    assert (code, output) == (0, b"1024\n")
+
+
+@pytest.mark.parametrize("error", [MemoryError(), OSError(errno.EMFILE, "Too many open files"), thread_limit()])
+def test_what_a_host_lacks_is_no_mistake_of_ours(error):
+    assert lack_of_host(error)
+    assert not lack_of_host(KeyError("name"))

@@ -1,3 +1,5 @@
+import os
+
 import pytest
 
 from abs_service.supervision.child import State
@@ -170,6 +172,19 @@ def test_a_child_that_waits_for_ever_is_killed_in_the_end(world):
         world.latest("track/a").its_threads = {1: ThreadTimes(0, waited_s * S)}
         passes(world, supervisor, 1)
     assert ("kill", "track/a") in world.events
+
+
+def test_a_child_for_which_the_host_lacks_something_is_started_when_it_can_be(world, monkeypatch):
+    supervisor = world.supervisor("capture")
+    with monkeypatch.context() as full:
+        full.setattr(supervisor, "_spawn", lambda *_: os.stat("/nowhere/at/all"))
+        for _ in range(20):
+            ends(world, supervisor, "capture", 1)
+        capture = supervisor.children["capture"]
+        assert (capture.state, capture.restarts) == (State.BACKOFF, 1)
+        assert "cannot be started: [Errno 2]" in capture.reason
+    passes(world, supervisor, 4)
+    assert capture.state is State.RUNNING
 
 
 def test_health_of_unknown_components_is_ignored(world):
