@@ -82,6 +82,7 @@ def run(arguments: argparse.Namespace) -> int:
         watchers = (notifier.update, measure, lambda _: forked.ensure_running())
         session = RunSession(bus, *about, rig.trackers, supervisor, display, WallClock(), watchers)
         session.answer_reloads(lambda: file.exchange(partial(read_again, arguments), supervisor.children))
+        rig_process.on_hangup(session.reload)
         try:
             session.run_until(lambda: stop.is_set() or session.elapsed_s >= arguments.duration)
         finally:

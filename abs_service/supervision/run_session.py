@@ -26,6 +26,8 @@ DEPTH = 64
 PERIOD_S = 0.05
 #: Period and timeout of queries for lost topologies [s].
 QUERY_PERIOD_S, QUERY_TIMEOUT_S = 1.0, 0.2
+#: Time in which a rig file is read again, at most [s].
+RELOAD_TIMEOUT_S = 30.0
 
 _LEVELS: Mapping[State, Level] = {
     State.BACKOFF: Level.WARNING,
@@ -97,6 +99,10 @@ class RunSession:
             return renewal[1]
 
         commands.answer_reload(self._bus, self._headers, self._health, act)
+
+    def reload(self) -> None:
+        """Asks itself to read the rig file again; the log has the answer."""
+        commands.reload(self._bus, self._headers, RELOAD_TIMEOUT_S)
 
     def run_until(self, stop_requested: Callable[[], bool]) -> None:
         """Runs until `stop_requested` returns True or the supervisor has an exit code."""

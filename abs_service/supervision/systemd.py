@@ -74,8 +74,14 @@ def notifier(environment: Mapping[str, str]) -> Notifier:
     """A notifier for the systemd that started this process; one that sends nothing if none did."""
     address = environment.get("NOTIFY_SOCKET", "")
     own = environment.get("WATCHDOG_PID", str(os.getpid())) == str(os.getpid())
-    watchdog_us = environment.get("WATCHDOG_USEC", "0") if own else "0"
-    return Notifier(lambda message: _send(address, message), int(watchdog_us) * 1000)
+    return Notifier(lambda message: _send(address, message), _watchdog_ns(environment) if own else 0)
+
+
+def _watchdog_ns(environment: Mapping[str, str]) -> int:
+    try:
+        return max(0, int(environment.get("WATCHDOG_USEC", "0"))) * 1000
+    except ValueError:  # it is not systemd's
+        return 0
 
 
 def _send(address: str, message: str) -> None:

@@ -172,7 +172,7 @@ def _answer(
     """Answers commands on a topic.
 
     `act` gets the payload of those that are valid and returns what is particular of their answer, or raises
-    RefusedError; `details` makes what the log says of them.
+    RefusedError, or any other error, which is logged; `details` makes what the log says of them.
     """
 
     def reply(command: Sample) -> bytes:
@@ -184,6 +184,9 @@ def _answer(
                 answer = act(command.payload)
             except RefusedError as error:
                 reason = str(error)
+            except Exception as error:  # a mistake of ours, which whoever asks has to know of, too
+                reason = f"{type(error).__name__}: {error}"
+                _log.exception("%s", topic)
         count = health.counted("commands.refused" if reason else "commands.accepted")
         line = printable(f"{topic}{said} from {sender}: {reason or 'accepted'}")
         _log.warning("command %d: %s", count, line)

@@ -88,9 +88,9 @@ def end_with(error: Exception, arguments: argparse.Namespace) -> int:
 def _handler(file: Path | None) -> logging.Handler:
     if file is None:
         return logging.StreamHandler(sys.stderr)
-    from logging.handlers import WatchedFileHandler  # noqa: PLC0415 - needed for a file only
+    from abs_service.commands.parts.log_file import LogFile  # noqa: PLC0415 - needed for a file only
 
     try:
-        return WatchedFileHandler(file, encoding="utf-8")  # opens it again after it was moved by logrotate
+        return LogFile(file, encoding="utf-8")
     except OSError as error:
         raise LogFileError(f"--log-file {file}: cannot be written: {error.strerror}") from None

@@ -5,9 +5,10 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Iterator
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from pathlib import Path
+from queue import SimpleQueue
 from types import FrameType
 
 from abs_service import config
@@ -18,6 +19,9 @@ from abs_service.bus.zenoh_bus import ZenohBus
 from abs_service.commands.parts import library_output
 from abs_service.supervision import gc_tuning
 from abs_service.wire.checked_bus import CheckedBus
+
+#: Least time between two calls by SIGHUP [s].
+HANGUP_PERIOD_S = 1.0
 
 
 class SecurityError(Exception):
@@ -88,16 +92,45 @@ def stop_on_signals() -> threading.Event:
 
     SIGHUP says that the terminal is gone, often twice: by the kernel and by the shell. `nohup` lets it be ignored.
     """
-    stop, told = threading.Event(), threading.Event()
+    stop, told = threading.Event(), False
+    hand_over = _in_thread(stop.set)
 
     def on_signal(number: int, frame: FrameType | None) -> None:
-        if told.is_set():
+        nonlocal told
+        if told:
             os._exit(128 + number)
-        told.set()
-        stop.set()
+        told = True
+        hand_over(number, frame)
 
     signal.signal(signal.SIGTERM, on_signal)
     signal.signal(signal.SIGINT, on_signal)
     if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
-        signal.signal(signal.SIGHUP, lambda number, frame: stop.set())
+        signal.signal(signal.SIGHUP, hand_over)
     return stop
+
+
+def on_hangup(act: Callable[[], object]) -> None:
+    """Lets SIGHUP call a function, from a thread and once for all that have arrived, in a process without a terminal.
+
+    There it says nothing of a terminal, but is the usual wish that a service reads its configuration again.
+    """
+    with suppress(OSError):
+        os.close(os.open("/dev/tty", os.O_RDONLY))
+        return
+    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
+        signal.signal(signal.SIGHUP, _in_thread(lambda: (act(), time.sleep(HANGUP_PERIOD_S))))
+
+
+def _in_thread(act: Callable[[], object]) -> Callable[[int, FrameType | None], None]:
+    """A handler of signals that calls a function from a thread: one that waits for a lock may hold it itself."""
+    arrived: SimpleQueue[int] = SimpleQueue()
+
+    def follow() -> None:
+        while True:
+            arrived.get()
+            while not arrived.empty():
+                arrived.get()
+            act()
+
+    threading.Thread(target=follow, name="signals", daemon=True).start()
+    return lambda number, frame: arrived.put(number)

@@ -76,7 +76,7 @@ def test_a_terminal_that_is_closed_ends_in_order_unless_nohup_is_used(ignored, t
         f"signal.signal(signal.SIGHUP, signal.{'SIG_IGN' if ignored else 'SIG_DFL'})\n"
         "stop = rig_process.stop_on_signals()\n"
         "for _ in range(2):\n    os.kill(os.getpid(), signal.SIGHUP)\n"
-        "sys.exit(10 + stop.is_set())"
+        "sys.exit(10 + stop.wait(0.2))"
     )
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
     done = subprocess.run([sys.executable, "-c", program], env=environment, check=False)

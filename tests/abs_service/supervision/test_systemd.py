@@ -152,7 +152,15 @@ def test_systemd_hears_in_words_what_happens(start):
     assert manager.received() == ["STOPPING=1"]
 
 
-@pytest.mark.parametrize("environment", [{"WATCHDOG_USEC": "0"}, {"WATCHDOG_PID": str(os.getpid() + 1)}])
+@pytest.mark.parametrize(
+    "environment",
+    [
+        {"WATCHDOG_USEC": "0"},
+        {"WATCHDOG_USEC": "1e6 s"},
+        {"WATCHDOG_USEC": "-1"},
+        {"WATCHDOG_PID": str(os.getpid() + 1)},
+    ],
+)
 def test_without_a_watchdog_none_is_fed(start, environment):
     manager = start("sheet", **environment)
     manager.estimates("sheet")

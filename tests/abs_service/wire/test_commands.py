@@ -120,6 +120,19 @@ def test_anything_else_is_refused_with_the_reason(message, payload, reason):
     assert "\x1b" not in bench.said.labels["command"]
 
 
+def test_a_mistake_of_ours_is_an_answer_and_a_traceback_of_the_log(caplog):
+    bench = Bench()
+
+    def fails():
+        raise KeyError("no such name")
+
+    commands.answer_reload(bench.bus, bench.headers, bench.health, fails)
+    answer = commands.reload(bench.bus, bench.headers, 1.0)
+    assert answer is not None
+    assert (answer.accepted, answer.reason) == (False, "KeyError: 'no such name'")
+    assert "Traceback" in caplog.text
+
+
 def test_a_command_crosses_real_sessions(open_bus):
     open_bus()
     bench, asking = Bench(open_bus()), open_bus()

@@ -1,12 +1,15 @@
 """The log of a command, as a process of its own writes it."""
 
 import json
+import logging
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
+from abs_service.commands.parts.log_file import LogFile
 from abs_service.supervision.exit_codes import Exit
 
 #: A command that logs, and then does what its argument says.
@@ -94,3 +97,33 @@ def test_a_file_that_cannot_be_written_is_refused(tmp_path):
     code, lines = act("1", "--log-file", tmp_path / "no" / "log")
     assert code == Exit.USER
     assert lines == [f"abs-service: error: --log-file {tmp_path}/no/log: cannot be written: No such file or directory"]
+
+
+@pytest.fixture
+def log_file(tmp_path):
+    handler = LogFile(tmp_path / "logs" / "file", delay=True)
+    yield handler
+    handler.close()
+
+
+def test_a_log_file_that_cannot_be_written_ends_nobody_and_is_told_once(log_file, capsys):
+    log, record = logging.Logger("rig"), ("%s", "there")
+    log.addHandler(log_file)
+    for _ in range(3):
+        log.warning(*record)
+    path = Path(log_file.baseFilename)
+    assert capsys.readouterr().err == f"abs-service: --log-file {path} cannot be written: No such file or directory\n"
+    path.parent.mkdir()
+    log.warning(*record)
+    assert capsys.readouterr().err == f"abs-service: --log-file {path} can be written again, 3 records are missing\n"
+    assert path.read_text() == "there\n"
+
+
+def test_a_full_disk_does_no_more_than_that(capsys):
+    log, handler = logging.Logger("rig"), LogFile("/dev/full")
+    log.addHandler(handler)
+    for _ in range(3):
+        log.warning("there")
+    assert capsys.readouterr().err == "abs-service: --log-file /dev/full cannot be written: No space left on device\n"
+    with pytest.raises(OSError, match="No space"):
+        handler.close()

@@ -1,8 +1,10 @@
 """Endpoint and signals of a rig's processes."""
 
 import argparse
+import errno
 import os
 import signal
+from queue import SimpleQueue
 
 import pytest
 
@@ -29,10 +31,28 @@ def test_the_first_signal_asks_and_the_second_forces(handlers, monkeypatch, numb
     stop = rig_process.stop_on_signals()
     assert not stop.is_set()
     signal.raise_signal(number)
-    assert stop.is_set()
+    assert stop.wait(1.0)
     assert forced == []
     signal.raise_signal(number)
     assert forced == [128 + number]
+
+
+def test_many_hangups_without_a_terminal_are_one_wish(handlers, monkeypatch):
+    def no_terminal(path, mode):
+        raise OSError(errno.ENXIO, path)
+
+    monkeypatch.setattr(os, "open", no_terminal)
+    called, go_on = SimpleQueue(), SimpleQueue()
+    monkeypatch.setattr(rig_process.time, "sleep", lambda seconds: go_on.get(timeout=1.0))
+    rig_process.on_hangup(lambda: called.put("reload"))
+    signal.raise_signal(signal.SIGHUP)
+    assert called.get(timeout=1.0) == "reload"
+    for _ in range(100):
+        signal.raise_signal(signal.SIGHUP)
+    for _ in range(2):
+        go_on.put(None)
+    assert called.get(timeout=1.0) == "reload"
+    assert called.empty()
 
 
 def parse(*arguments):
