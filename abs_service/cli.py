@@ -79,10 +79,11 @@ def program() -> None:
     """Runs the command line as a process, which ends even if a thread does not, such as a callback that waits."""
     standard_files.secure()
     try:
+        standard_files.check_folder()
         standard_files.allow_files()
         _preload(sys.argv[1:])
         code = main()
-    except standard_files.FileLimitError as error:
+    except standard_files.StartError as error:
         print(f"abs-service: error: {error}", file=sys.stderr)
         code = Exit.USER
     except Exception as error:

@@ -67,6 +67,10 @@ def run(arguments: argparse.Namespace) -> int:
     rig = effective(rig_process.load_config(arguments), arguments)
     if rig.record.enabled:
         folder.check(rig.record.directory)
+    # A working directory can be deleted, and its names are read again.
+    arguments.config, arguments.out = (
+        path and Path(os.path.abspath(path)) for path in (arguments.config, arguments.out)
+    )
     stop = rig_process.stop_on_signals()
     with (
         rig_process.open_bus_at(rig.bus.endpoint, Role.ROUTER, rig, arguments) as bus,

@@ -53,10 +53,19 @@ def ensure_running() -> None:
     """Starts the fork server anew if it has died, or its folder was deleted, if that can be; its children live on."""
     server: Any = forkserver._forkserver  # pyright: ignore # noqa: SLF001 - nothing public tells its address
     with suppress(OSError):  # else the next start of a process says why
+        _leave_deleted_folder()
         os.makedirs(util.get_temp_dir(), 0o700, exist_ok=True)
         if server._forkserver_pid and not os.path.exists(server._forkserver_address):  # noqa: SLF001
             os.kill(server._forkserver_pid, signal.SIGKILL)  # noqa: SLF001
         forkserver.ensure_running()
+
+
+def _leave_deleted_folder() -> None:
+    """Changes to another working directory if it was deleted: processes can neither be started nor work in it."""
+    try:
+        os.getcwd()
+    except FileNotFoundError:
+        os.chdir("/")
 
 
 def detach() -> None:

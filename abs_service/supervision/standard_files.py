@@ -1,6 +1,6 @@
 """Standard input, output and error, which a caller may have closed, or given an encoding without our characters.
 
-Nor may a caller's limit of open files be too low, where zenoh would end the process.
+Nor may a caller's limit of open files be too low, where zenoh would end the process, nor its working directory be gone.
 """
 
 import os
@@ -18,24 +18,30 @@ class OutputError(Exception):
     """Standard output cannot be written; the message has the reason."""
 
 
-class FileLimitError(Exception):
-    """A process may open too few files."""
+class StartError(Exception):
+    """A process cannot work as it was started: with too few open files, or in a folder that was deleted."""
+
+
+def check_folder() -> None:
+    """Raises StartError if the working directory was deleted."""
+    try:
+        os.getcwd()
+    except FileNotFoundError:
+        raise StartError("the working directory was deleted; change to another one") from None
 
 
 def allow_files() -> None:
     """Raises the limit of open files of this process and its children to `FILES`, if it is lower and can be raised.
 
     Raises:
-        FileLimitError: it stays below `FEWEST_FILES`.
+        StartError: it stays below `FEWEST_FILES`.
     """
     limit, highest = resource.getrlimit(resource.RLIMIT_NOFILE)
     files = FILES if highest == resource.RLIM_INFINITY else min(FILES, highest)
     if limit != resource.RLIM_INFINITY and limit < files:
         resource.setrlimit(resource.RLIMIT_NOFILE, (files, highest))
     if files < FEWEST_FILES:
-        raise FileLimitError(
-            f"the limit of open files is {files}, at least {FEWEST_FILES} are needed: ulimit -n {FILES}"
-        )
+        raise StartError(f"the limit of open files is {files}, at least {FEWEST_FILES} are needed: ulimit -n {FILES}")
 
 
 def secure() -> None:

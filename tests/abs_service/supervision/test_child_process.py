@@ -135,6 +135,7 @@ before.wake()
 before.output_tail()
 print(before.poll(), after.poll(), flush=True)
 
+os.chdir(os.mkdir(path := util.get_temp_dir() + "/work") or path)
 shutil.rmtree(util.get_temp_dir())
 (deaf,) = servers()
 assert eventually(lambda: forked.ensure_running() or not servers() & {deaf} and os.listdir(util.get_temp_dir()))

@@ -56,6 +56,12 @@ def test_too_few_open_files_are_refused_before_anything_is_opened():
     assert errors == b"abs-service: error: the limit of open files is 32, at least 64 are needed: ulimit -n 1024\n"
 
 
+def test_a_working_directory_that_was_deleted_is_told(tmp_path):
+    code, _, errors = shell(f"mkdir {tmp_path}/gone; cd {tmp_path}/gone; rmdir {tmp_path}/gone; {CHECK}")
+    assert code == Exit.USER
+    assert errors == b"abs-service: error: the working directory was deleted; change to another one\n"
+
+
 def test_a_low_limit_of_open_files_is_raised_if_it_can_be():
     program = "from abs_service.supervision import standard_files as s; s.allow_files(); import resource as r"
     code, output, _ = shell(f'ulimit -S -n 32; {sys.executable} -c "{program}; print(r.getrlimit(r.RLIMIT_NOFILE)[0])"')
