@@ -2,6 +2,7 @@
 
 import json
 import logging
+import os
 import re
 from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
@@ -19,8 +20,13 @@ _log = logging.getLogger(__name__)
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 #: Timeout of a client's connection to its router [ms].
 CONNECT_TIMEOUT_MS = 3000
-#: Two publishing processes fit into the 64 MB that a container has by default; without room, TCP takes over.
+SHARED_MEMORY = "/dev/shm"
+#: Largest pool of a process; what it has no room for goes through sockets.
 SHARED_MEMORY_POOL_BYTES = 30 << 20
+#: Pools that have to fit into what is free, so that those of a rig do into the 64 MB that a container has by default.
+SHARED_MEMORY_POOLS = 8
+#: Free shared memory without which none is used: what zenoh needs beside the pools is 1.3 MB a process.
+LEAST_SHARED_MEMORY_BYTES = 32 << 20
 
 #: A larger message is refused before it is put together: an image of `message_check.LARGEST_IMAGE` and its attachment.
 LARGEST_MESSAGE_BYTES = LARGEST_IMAGE + (1 << 20)
@@ -76,7 +82,9 @@ def open_session(
         _log.warning('the certificate "%s" ends on %s; after that, nobody can connect', own.name, own.ends.date())
     zenoh.init_log_from_env_or(LOG_LEVELS)
     try:
-        settings = _settings(endpoint, role, shared_memory, connect_timeout_ms, security, routers)
+        settings = _settings(
+            endpoint, role, pool_bytes() if shared_memory else 0, connect_timeout_ms, security, routers
+        )
         return zenoh.open(zenoh.Config.from_json5(json.dumps(settings)))
     except zenoh.ZError as error:
         reason = _explain(str(error), role, connect_timeout_ms)
@@ -111,10 +119,26 @@ def _explain(error: str, role: Role, connect_timeout_ms: int) -> str:
     return "cannot listen there: " + re.sub(r"\s+at /\S+\.rs:\d+\.", "", error)
 
 
+def pool_bytes() -> int:
+    """Size of the pool for images in shared memory [bytes]; 0 if there is no room for those of all processes.
+
+    zenoh makes it when it is needed first, and may lose a connection for ever if it cannot.
+    """
+    try:
+        status = os.statvfs(SHARED_MEMORY)
+    except OSError:
+        return 0
+    free = 0 if status.f_flag & os.ST_RDONLY else status.f_bavail * status.f_frsize
+    if free < LEAST_SHARED_MEMORY_BYTES:
+        _log.warning("%s has %.0f MB free: images are copied through sockets", SHARED_MEMORY, free * 1e-6)
+        return 0
+    return min(SHARED_MEMORY_POOL_BYTES, free // SHARED_MEMORY_POOLS)
+
+
 def _settings(
     endpoint: str,
     role: Role,
-    shared_memory: bool,
+    pool: int,
     connect_timeout_ms: int,
     security: NoSecurity | MutualTls,
     routers: Sequence[str],
@@ -140,10 +164,10 @@ def _settings(
                 **security.link,
             },
             "shared_memory": {
-                "enabled": shared_memory,
+                "enabled": pool > 0,
                 "transport_optimization": {
-                    "enabled": shared_memory,
-                    "pool_size": SHARED_MEMORY_POOL_BYTES,
+                    "enabled": pool > 0,
+                    "pool_size": max(1, pool),
                     # Not queries: zenoh may lose those while the receiver stalls (eclipse-zenoh/zenoh #2628).
                     "messages": ["put"],
                 },

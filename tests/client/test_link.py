@@ -1,12 +1,15 @@
 """Threads of a connection: all are waited for when it is closed, whoever began and closes them."""
 
+import json
+import os
 import threading
 import time
+from types import SimpleNamespace
 from typing import ClassVar
 
 import pytest
 from abs_client.errors import UnreachableError
-from abs_client.link import Link
+from abs_client.link import Link, client_settings
 
 Thread = threading.Thread
 
@@ -81,3 +84,9 @@ def test_what_begins_as_the_connection_ends_is_told_in_words_of_this_package(bus
     monkeypatch.setattr(Link, "closed", False)  # it was closed by another thread after this one has looked
     with pytest.raises(UnreachableError, match="was closed"):
         act(link)
+
+
+@pytest.mark.parametrize(("free", "flags", "used"), [(9 << 20, 0, True), (0, 0, False), (9 << 20, os.ST_RDONLY, False)])
+def test_shared_memory_is_used_where_there_is_some(monkeypatch, free, flags, used):
+    monkeypatch.setattr(os, "statvfs", lambda path: SimpleNamespace(f_flag=flags, f_bavail=free, f_frsize=1))
+    assert f'"shared_memory": {{"enabled": {str(used).lower()}}}' in json.dumps(client_settings("tcp/host:1"))
