@@ -16,7 +16,7 @@ from importlib import import_module
 from types import ModuleType
 
 import abs_service
-from abs_service.supervision import parent_watchdog, standard_files
+from abs_service.supervision import kernel_cache, parent_watchdog, standard_files
 from abs_service.supervision.exit_codes import Exit, lack_of_host
 
 #: One line of help for each command; kept here so that `--help` imports none of them.
@@ -81,6 +81,7 @@ def program() -> None:
     try:
         standard_files.check_folder()
         standard_files.allow_files()
+        kernel_cache.ensure()
         _preload(sys.argv[1:])
         code = main()
     except standard_files.StartError as error:

@@ -58,6 +58,8 @@ def ensure_running() -> None:
         if server._forkserver_pid and not os.path.exists(server._forkserver_address):  # noqa: SLF001
             os.kill(server._forkserver_pid, signal.SIGKILL)  # noqa: SLF001
         forkserver.ensure_running()
+        # Whoever starts a process waits for it, without an end if somebody has stopped it.
+        os.kill(server._forkserver_pid, signal.SIGCONT)  # noqa: SLF001
 
 
 def _leave_deleted_folder() -> None:

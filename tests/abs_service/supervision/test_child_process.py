@@ -131,6 +131,9 @@ forked.ensure_running()
 assert eventually(servers)
 after = ChildProcess("act", ["print('works')"], lambda *_: None, child_code.run)
 assert after.output_tail() == "works"
+os.kill(*servers(), signal.SIGSTOP)
+forked.ensure_running()
+assert ChildProcess("act", ["print('goes on')"], lambda *_: None, child_code.run).output_tail() == "goes on"
 before.wake()
 before.output_tail()
 print(before.poll(), after.poll(), flush=True)

@@ -1,0 +1,40 @@
+"""Kernels are kept in a temporary folder where no other can be written."""
+
+import os
+import tempfile
+
+import pytest
+
+import abs_service
+from abs_service.supervision import kernel_cache
+
+
+@pytest.fixture
+def given(monkeypatch, tmp_path):
+    """Sets Numba's folder; only what is in `tmp_path` can be written."""
+    monkeypatch.setattr(os, "access", lambda path, mode: str(path).startswith(str(tmp_path)))
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setattr(abs_service, "__file__", "/usr/lib/abs_service/__init__.py")
+
+    def given(cache, user="/nonexistent"):
+        monkeypatch.setenv("XDG_CACHE_HOME", str(user))
+        monkeypatch.setenv(kernel_cache.VARIABLE, str(cache))
+        kernel_cache.ensure()
+        return os.environ[kernel_cache.VARIABLE]
+
+    return given
+
+
+@pytest.mark.parametrize("cache", ["", "/nonexistent/numba", "/dev/null/numba"])
+def test_a_temporary_folder_replaces_one_that_cannot_be_written(given, tmp_path, cache):
+    assert given(cache).startswith(f"{tmp_path}/abs-service-kernels-")
+
+
+def test_a_folder_that_can_be_written_is_kept(given, tmp_path):
+    assert given(tmp_path / "not" / "yet") == str(tmp_path / "not" / "yet")
+    assert given("", user=tmp_path) == ""
+
+
+def test_a_full_disk_is_replaced(given, tmp_path, monkeypatch):
+    monkeypatch.setattr(kernel_cache, "LEAST_BYTES", 1 << 62)
+    assert given(tmp_path) != str(tmp_path)
