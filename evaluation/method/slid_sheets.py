@@ -27,6 +27,10 @@ BLIND_CORNERS, CORNER_AT_M = ((0.24, 0.48), (0.23, 0.43)), (0.36, -0.2)
 #: How far a sheet that is cut is drawn in a frame [m].
 CUT_STEP_M = 5e-3
 
+#: First columns of the stripes without return that interrupt a sheet, their width [px], and how far it is drawn under
+#: them in a frame [m].
+STRIPES, STRIPE_PX, STRIPED_STEP_M = (72, 99), 5, 1e-3
+
 #: Distances beyond are no returns in the scene without a background [m].
 FARTHEST_M = 1.3
 
@@ -61,7 +65,7 @@ def _drawn(state: SheetState, by_m: float) -> SheetState:
 
 @dataclass(frozen=True)
 class Cut:
-    """A flat sheet beside the middle that is drawn along its long axis.
+    """A flat sheet that is drawn along its long axis.
 
     Attributes:
         at_m: right and down from the middle at the beginning [m].
@@ -94,6 +98,9 @@ def sequences(slides_m: Sequence[float]) -> Iterator[SlidSheet]:
         for way, step_m in (("out of", CUT_STEP_M), ("into", -CUT_STEP_M)):
             name = f"is drawn {way} {view}"
             yield name, SheetScene(name, Cut(at_m, step_m)), measured
+    for behind, measured in (("a wall", _as_it_is), ("no return", _without_background)):
+        name = f"is drawn under stripes without return, {behind} behind"
+        yield name, SheetScene(name, Cut((0.0, 0.0), STRIPED_STEP_M)), lambda frame, of=measured: _striped(of(frame))
 
 
 def _as_it_is(frame: SheetFrame) -> SheetFrame:
@@ -118,3 +125,13 @@ def _without_corners(frame: SheetFrame) -> SheetFrame:
     for (share, depth), away in zip(BLIND_CORNERS, (down, 1 - down), strict=True):
         blind |= sideways[None] / share + away[:, None] / depth < 1
     return replace(frame, distance=np.where(blind, np.float32(np.nan), frame.distance))
+
+
+def _striped(frame: SheetFrame) -> SheetFrame:
+    """Without the returns of the sheet in the stripes, as in the shadow of a projector."""
+    sheet, distance = frame.sheet.copy(), frame.distance.copy()
+    for first in STRIPES:
+        stripe = (slice(None), slice(first, first + STRIPE_PX))
+        distance[stripe][sheet[stripe]] = np.nan
+        sheet[stripe] = False
+    return replace(frame, distance=distance, sheet=sheet)

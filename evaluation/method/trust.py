@@ -12,6 +12,8 @@ and the simulator's ray casting.
   on it.
 - **Cut.** A flat sheet is cut by the end of the sensor's field of view, before the end of the image, and is drawn out
   of it or into it by 5 mm a frame. Added on 2026-11-26, before columns without return and in a hexagon's corner.
+- **Stripes.** A flat sheet is drawn along itself by 1 mm a frame under two stripes without return that stay where they
+  are, as the shadow of a projector. Added on 2026-11-26, before its first run.
 - **Coverage.** Share of the vertices' material points inside their 95 % regions, by quarters of a sequence, of a sheet,
   a rigid board and a hanging strip: with colour and without, with the outline and without.
 

@@ -59,3 +59,11 @@ def test_a_sheet_that_the_end_of_the_view_cuts_is_followed_into_it_and_not_wrong
         found = follow([measured(frame) for frame in frames], scene.sigma)
         assert not found.wrong.any()
         assert found.tracking.mean() > (0.9 if "into" in name else 0.5)
+
+
+def test_a_sheet_that_is_drawn_under_stripes_without_return_is_not_held_by_them():
+    name, scene, measured = next(one for one in sequences(()) if "stripes" in one[0])
+    frames = render_frames(scene, range(26), np.random.default_rng(6))
+    found = follow([measured(frame) for frame in frames], scene.sigma)
+    assert found.error_m[-1] < 0.01, name  # it is drawn by 25 mm
+    assert found.tracking.all()

@@ -24,12 +24,17 @@ def connected_surfaces(distance: NDArray[np.float32], largest_step: float) -> tu
         distance: radial distances (height, width) [m], NaN without return.
         largest_step: largest difference between connected neighbours [m].
     """
-    known = np.isfinite(distance)
-    smooth = cv2.medianBlur(np.where(known, distance, 0).astype(np.float32, copy=False), 5)
+    smooth = smoothed(distance)
     highest, lowest = cv2.dilate(smooth, _AROUND), cv2.erode(smooth, _AROUND)
-    surface = (known & (lowest > 0) & (highest - lowest < largest_step)).view(np.uint8)
+    surface = (np.isfinite(distance) & (lowest > 0) & (highest - lowest < largest_step)).view(np.uint8)
     count, labels = cv2.connectedComponents(surface, connectivity=4)
     return np.asarray(labels, np.int32), count
+
+
+def smoothed(distance: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Medians of the squares of five pixels a side (height, width) [m], zero where most have no return."""
+    known = np.where(np.isfinite(distance), distance, 0).astype(np.float32, copy=False)
+    return np.asarray(cv2.medianBlur(known, 5), np.float32)
 
 
 def large_surfaces(

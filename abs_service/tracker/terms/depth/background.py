@@ -55,13 +55,13 @@ class Background:
             window: of the image; the first one should be the whole image.
             shape: of the image (height, width).
         """
-        if not missing.any():
-            return missing
         if not self._begun:
             self._begun = True
             near = cv2.dilate(expected.view(np.uint8), np.ones((2 * MARGIN_PX + 1, 2 * MARGIN_PX + 1)))
             self._empty = np.zeros(shape[:2], np.bool_)
             self._empty[window] = missing & (near == 0)
+        if not missing.any():
+            return missing
         empty = self._empty[window]
         count, labels = cv2.connectedComponents(missing.view(np.uint8), connectivity=4)
         shared, result = np.zeros(count, np.int64), np.empty(missing.shape, np.bool_)

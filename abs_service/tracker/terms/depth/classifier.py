@@ -1,11 +1,14 @@
 """Classification of the depth images of one sensor, with what its first image tells of missing returns."""
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.pairing.images import Window
 from abs_service.tracker.terms.depth.background import Background, dropouts
 from abs_service.tracker.terms.depth.beyond_view import BeyondView
+from abs_service.tracker.terms.depth.interruption import interruptions
 from abs_service.tracker.terms.depth.visibility import Visibility, classify
 
 
@@ -19,6 +22,7 @@ class Classifier:
     def __init__(self, focal: float) -> None:
         self._focal = focal
         self._background, self._beyond_view = Background(), BeyondView()
+        self._begun, self._is_interrupted = False, True
 
     def classify(
         self, distance: NDArray[np.float32], expected: NDArray[np.float32], window: Window, shape: tuple[int, ...]
@@ -33,5 +37,11 @@ class Classifier:
         """
         missing, silhouette = np.isnan(distance), np.isfinite(expected)
         beyond, single = self._beyond_view.observe(missing, silhouette, window), dropouts(missing)
-        empty = self._background.observe(missing & ~(single | beyond), silhouette, window, shape)
-        return classify(distance, expected, self._focal, empty, single, beyond)
+        areas = missing & ~(single | beyond)
+        # What the surface goes on beyond is a hole, not the background. If there is none at first, none is looked for.
+        hole = interruptions(distance, areas, silhouette) if self._is_interrupted else np.False_
+        if not self._begun:
+            self._begun, self._is_interrupted = True, bool(hole.any())
+        empty = self._background.observe(areas & ~hole, silhouette, window, shape)
+        seen = classify(distance, expected, self._focal, empty, single, beyond)
+        return replace(seen, hole=seen.hole | hole)

@@ -10,7 +10,7 @@ from abs_service.tracker.terms.depth.visibility import Visibility
 from calib.jit import kernel
 
 
-def _around(mask: NDArray[np.bool_], reach: int) -> Window:
+def around(mask: NDArray[np.bool_], reach: int) -> Window:
     """Rows and columns within so many pixels of those of a mask (height, width), which is not empty."""
     axes = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     rows, columns = (slice(max(int(at[0]) - reach, 0), int(at[-1]) + reach + 1) for at in axes)
@@ -34,7 +34,7 @@ def inwards(distance: NDArray[np.float32], seen: Visibility, reach: int) -> tupl
         beside |= outvoted(seen.dropout, beside)
     if not (beside.any() and seen.object.any()):
         return WHOLE, np.full(distance.shape, np.nan, np.float32)
-    part = _around(~beside, reach)
+    part = around(~beside, reach)
     outside = beside[part]
     to_inside, to_outside = (
         cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5) for mask in (outside, ~outside)

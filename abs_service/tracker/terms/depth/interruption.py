@@ -1,0 +1,89 @@
+"""Missing returns that interrupt a surface: it goes on beyond them, so it does not end there.
+
+A dark or shiny stripe, or the shadow of a projector, has no return although the object has no end there.
+"""
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.tracker.detection.segments.depth_segments import connected_surfaces, smoothed
+from abs_service.tracker.terms.depth.background import dropouts
+from abs_service.tracker.terms.depth.outline_distance import around
+from abs_service.tracker.terms.depth.visibility import AGREEMENT_M, LARGEST_STEP_M, MIN_PIXELS
+from calib.jit import kernel
+
+#: They are no wider than this share of the mesh's side, if it were square: beyond more of them may be anything.
+WIDEST = 0.5
+
+#: Labelled surfaces end up to so many pixels inside their outlines, and so do the interruptions between them.
+EDGE_PX = 2
+_AROUND = np.ones((2 * EDGE_PX + 1, 2 * EDGE_PX + 1))
+
+
+def interruptions(
+    distance: NDArray[np.float32], missing: NDArray[np.bool_], expected: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """Missing returns (height, width) beyond which, along the row or the column, the object's surface goes on.
+
+    Args:
+        distance: radial distances (height, width) [m], NaN without return.
+        missing: those of the missing returns that may interrupt a surface.
+        expected: silhouette of the mesh.
+    """
+    result = np.zeros(missing.shape, np.bool_)
+    if not (missing.any() and expected.any()):
+        return result
+    reach = int(WIDEST * np.sqrt(np.count_nonzero(expected)))
+    part = around(expected, reach + EDGE_PX)
+    labels, count = connected_surfaces(distance[part], LARGEST_STEP_M)
+    ours = np.bincount(labels[expected[part]], minlength=count) >= MIN_PIXELS
+    ours[0] = False
+    smooth, between = smoothed(distance[part]), np.zeros(labels.shape, np.bool_)
+    across = np.zeros(labels.T.shape, np.bool_)
+    _fill(smooth, labels, ours, reach, between)
+    _fill(np.ascontiguousarray(smooth.T), np.ascontiguousarray(labels.T), ours, reach, across)
+    areas = missing[part] & (between | across.T)
+    areas &= ~dropouts(areas)  # notches of a ragged outline
+    result[part] = missing[part] & (cv2.dilate(areas.view(np.uint8), _AROUND) > 0)
+    return result
+
+
+@kernel
+def _fill(
+    distance: NDArray[np.float32],
+    labels: NDArray[np.int32],
+    ours: NDArray[np.bool_],
+    reach: int,
+    between: NDArray[np.bool_],
+) -> None:
+    """Marks what lies in a row between two surfaces, at least one of them the object's, that continue each other.
+
+    Args:
+        distance, labels: of the image (rows, columns), without much noise.
+        ours: True for labels (count,) of the object.
+        reach: largest width of a gap [px].
+        between: False before (rows, columns).
+    """
+    for row in range(labels.shape[0]):
+        last, of = -1, labels[row]
+        for column in range(labels.shape[1]):
+            if of[column] == 0:
+                continue
+            wide = 1 < column - last <= reach and last >= 0 and (ours[of[last]] or ours[of[column]])
+            if wide and _continues(distance[row], of, last, column):
+                between[row, last + 1 : column] = True
+            last = column
+
+
+@kernel
+def _continues(distance: NDArray[np.float32], labels: NDArray[np.int32], left: int, right: int) -> bool:
+    """True if the surfaces on both sides of a gap, extrapolated across it as far as they are known, meet."""
+    width = right - left
+    for here, there, back in ((left, right, left - width), (right, left, right + width)):
+        expected = distance[here]
+        if back >= 0 and back < labels.size and labels[back] == labels[here]:
+            expected += distance[here] - distance[back]
+        if not abs(distance[there] - expected) < AGREEMENT_M:
+            return False
+    return True
