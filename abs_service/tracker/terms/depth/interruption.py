@@ -32,7 +32,7 @@ def interruptions(
         expected: silhouette of the mesh.
     """
     result = np.zeros(missing.shape, np.bool_)
-    if not (missing.any() and expected.any()):
+    if not expected.any():
         return result
     reach = int(WIDEST * np.sqrt(np.count_nonzero(expected)))
     part = around(expected, reach + EDGE_PX)
