@@ -64,6 +64,10 @@ class AttributeGradients(Protocol):
         """Derivatives to the right and down [1/px] (n, channels, 2), for values (channels, n); NaN where unknown."""
         ...
 
+    def noise_gains(self, vertices: int) -> NDArray[np.float64]:
+        """Variances of these derivatives (n, 2) [1/px²] by independent noise of variance 1 of the pixels."""
+        ...
+
     def look(self, predicted: Surface) -> None:
         """Updates the gradients for the predicted surface, a population of one, of this frame."""
         ...
@@ -96,6 +100,10 @@ class Constant:
         """NaN (n, channels, 2): an unknown gradient is not a gradient of zero."""
         return np.full((*values.T.shape, 2), np.nan, np.float32)
 
+    def noise_gains(self, vertices: int) -> NDArray[np.float64]:
+        """Zeros: what is unknown has no noise."""
+        return np.zeros((vertices, 2))
+
     def look(self, predicted: Surface) -> None:
         """No effect: the values do not depend on the pose of the surface."""
 
@@ -119,6 +127,8 @@ class FirstOrder:
         steps = beside.reshape(4, len(mesh.vertices), -1).astype(np.float64)
         change = np.stack([steps[0] - steps[1], steps[2] - steps[3]], axis=-1)
         self._per_metre = np.nan_to_num(change / (2 * step_m))
+        self._noise = _noise_per_metre(camera, mesh, step_m)
+        self._gains = np.zeros((len(mesh.vertices), 2))
         self._per_pixel = np.zeros(change.shape, np.float32)
         self._planes = np.zeros((*change.shape[1:], len(change)), np.float32)
         self._camera = camera
@@ -137,6 +147,10 @@ class FirstOrder:
         """Gradients of the last call of `look`; 0 at vertices whose surroundings were not visible."""
         return self._per_pixel
 
+    def noise_gains(self, vertices: int) -> NDArray[np.float64]:
+        """Those of the last call of `look`."""
+        return self._gains
+
     def look(self, predicted: Surface) -> None:
         """Computes the gradients in the image for the predicted surface, a population of one.
 
@@ -144,6 +158,7 @@ class FirstOrder:
         """
         flat = metres_per_pixel(self._camera, predicted.vertices[0].T, self._edges, self._lengths)
         self._per_pixel = np.ascontiguousarray(self._per_metre @ flat, np.float32)
+        self._gains = self._noise * np.square(flat).sum(axis=1)
         self._planes = np.ascontiguousarray(self._per_pixel.transpose(1, 2, 0))
 
     def at_centers(self, values: NDArray[np.float32], steps: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -151,6 +166,16 @@ class FirstOrder:
         result = np.empty((steps.shape[1], *values.shape), np.float32)
         at_centers(steps, values, self._planes, result)
         return result
+
+
+def _noise_per_metre(camera: Camera, mesh: Mesh, step_m: float) -> float:
+    """Variance of a difference quotient over two steps in the first image [1/m²], by noise of variance 1 of its pixels.
+
+    Values are interpolated between pixels, at all phases alike: along the difference of points d ≤ 1 pixels apart the
+    variance is 2 − d per pixel, and across it two thirds of that remain.
+    """
+    pixel_m = float(np.median(np.linalg.norm(mesh.vertices - camera.center, axis=1))) / camera.fx
+    return 2 / 3 * (2 - min(2 * step_m / pixel_m, 1.0)) / pixel_m**2
 
 
 def _tangents(mesh: Mesh) -> NDArray[np.float64]:

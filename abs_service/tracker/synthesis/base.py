@@ -58,6 +58,10 @@ class View(Protocol):
         """
         ...
 
+    def gradient_noise_gains(self, surface: Surface) -> NDArray[np.float64]:
+        """Variances of these gradients (m, 2) [1/px²] by noise of variance 1 of the pixels, see `noise_deviation`."""
+        ...
+
     def spread(self, surface: Surface, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Interpolates values (n, …) of the vertices at the samples (m, …) of a population of one."""
         ...

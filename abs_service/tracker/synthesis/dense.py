@@ -126,6 +126,10 @@ class DenseView:
         samples, _ = self._render(surface)
         return np.full((samples.pixel.shape[1], self._attributes.shape[1], 2), np.nan, np.float32)
 
+    def gradient_noise_gains(self, surface: Surface) -> NDArray[np.float64]:
+        """Zeros: no gradients are known."""
+        return np.zeros((self._render(surface)[0].pixel.shape[1], 2))
+
     def spread(self, surface: Surface, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Values (n, …) of the vertices, interpolated at the samples (m, …) of a population of one."""
         samples, _ = self._render(surface)

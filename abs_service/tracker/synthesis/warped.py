@@ -160,6 +160,10 @@ class _SharedView:
         """NaN: only the vertices' own attributes are known."""
         return np.full((*self._attributes[0].T.shape, 2), np.nan, np.float32)
 
+    def gradient_noise_gains(self, surface: Surface) -> NDArray[np.float64]:
+        """Zeros: no gradients are known."""
+        return np.zeros((surface.vertices.shape[2], 2))
+
     def spread(self, surface: Surface, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """The values themselves: the samples are the vertices."""
         return values

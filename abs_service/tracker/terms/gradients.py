@@ -18,8 +18,9 @@ _REGRESSION = _BELL / np.sum(_BELL * _STEPS**2)
 #: Variance of an image gradient, along one axis, by independent noise of the pixels of variance 1 [1/px²].
 _NOISE_GAIN = float(np.sum((_REGRESSION * _STEPS) ** 2))
 
-#: Some more is taken away than the noise is known to add: a mean square of some hundred rows scatters by a tenth.
-_NOISE_EXCESS = 1.15
+#: The noise's deviation is a median, so its share in the mean square of m rows is known to 2.5/√m. Two such deviations
+#: more are taken away.
+_NOISE_SCATTER = 5.0
 
 #: Second difference; and the median of the sum of the products of two with noise of deviation 1, without its sign.
 _SECOND, _MEDIAN_LEFT = np.array([1.0, -2.0, 1.0]), 6 * 0.6745
@@ -83,8 +84,18 @@ def noiseless_color_rows(
     places, projection = project_with_jacobian(camera, vertices)
     rows = _image_rows(image, places, projection) * weight[..., None]
     weighted = np.square(noise_deviation(image, places) * weight).sum(axis=1)
-    noise = _NOISE_EXCESS * _NOISE_GAIN * float(weighted @ np.square(projection).sum(axis=(1, 2)))
-    return rows * np.sqrt(max(1 - noise / max(float(np.vdot(rows, rows)), 1e-300), 0.0))
+    return shortened(rows, _NOISE_GAIN * float(weighted @ np.square(projection).sum(axis=(1, 2))))
+
+
+def shortened(rows: NDArray[np.float64], noise: float) -> NDArray[np.float64]:
+    """Rows without the share that noise has in the sum of their squares, taken away from all alike.
+
+    Args:
+        rows: (…, 3).
+        noise: what it adds to the sum of their squares.
+    """
+    most = noise * (1 + _NOISE_SCATTER / max(np.sqrt(rows.size / 3), 1.0))
+    return rows * np.sqrt(max(1 - most / max(float(np.vdot(rows, rows)), 1e-300), 0.0))
 
 
 def _image_rows(
@@ -96,13 +107,16 @@ def _image_rows(
     return rows
 
 
-def noise_deviation(image: NDArray[np.float32] | NDArray[np.uint8], places: NDArray[np.float64]) -> NDArray[np.float64]:
+def noise_deviation(
+    image: NDArray[np.float32] | NDArray[np.uint8], places: NDArray[np.float64], period: int = 1
+) -> NDArray[np.float64]:
     """Standard deviation (channels,) of the noise of an image's pixels, from those around places (n, 2); 0 if unknown.
 
     The difference of two Laplacians leaves noise, and little of a picture (J. Immerkær: Fast noise variance estimation.
     Computer Vision and Image Understanding 64, 1996); here its median, which edges hardly change.
+    Pixels that show the same are `period` apart, two in a mosaic.
     """
-    corner = np.floor(places + 0.5).astype(np.intp)[:, None] + np.arange(-1, 2)[:, None]
+    corner = np.floor(places + 0.5).astype(np.intp)[:, None] + period * np.arange(-1, 2)[:, None]
     column, row = (np.clip(corner[..., axis], 0, image.shape[1 - axis] - 1) for axis in (0, 1))
     patches = image[row[:, :, None], column[:, None]].astype(np.float64)
     left = np.abs(np.einsum("i,j,nijc->nc", _SECOND, _SECOND, patches))
@@ -115,8 +129,10 @@ def channel_gradients(
     channels: NDArray[np.float32],
     camera: Camera,
     vertices: NDArray[np.floating],
-) -> NDArray[np.float64]:
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Image gradient at a vertex's pixel, to the right and down (n, 2) [image unit / px].
+
+    And its variance by independent noise of the pixels of variance 1 (n, 2) [1/px²].
 
     In a Bayer mosaic the gradient is that of the pixels with the same channel; differences between channels are no
     gradient of the surface.
@@ -132,18 +148,21 @@ def channel_gradients(
     same = channels[row, column] == channels[row[:, RADIUS_PX], column[:, :, RADIUS_PX]][..., None]
     weights = _BELL * (same & np.isfinite(patches))
     patches = np.where(weights > 0, patches, 0.0)
-    return np.stack([_slope(patches, weights, _STEPS), _slope(patches, weights, _STEPS[:, None])], axis=-1)
+    slopes = [_slope(patches, weights, steps) for steps in (_STEPS, _STEPS[:, None])]
+    gradients, gains = (np.stack(parts, axis=-1) for parts in zip(*slopes, strict=True))
+    return gradients, gains
 
 
 def _slope(
     patches: NDArray[np.float64], weights: NDArray[np.float64], steps: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Weighted regression slope (n,) of patches (n, rows, columns) along one axis; 0 without data."""
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Weighted regression slope (n,) of patches (n, rows, columns) along one axis, and its gain; 0 without data."""
     total = np.maximum(weights.sum(axis=(1, 2)), 1e-12)
     mean = (weights * steps).sum(axis=(1, 2)) / total
-    centered = steps - mean[:, None, None]
-    spread = (weights * centered**2).sum(axis=(1, 2))
-    return np.where(spread > 1e-6, (weights * centered * patches).sum(axis=(1, 2)) / np.maximum(spread, 1e-6), 0.0)
+    centered = weights * (steps - mean[:, None, None])
+    spread = (centered * (steps - mean[:, None, None])).sum(axis=(1, 2))
+    regression = np.where(spread > 1e-6, 1 / np.maximum(spread, 1e-6), 0.0)[:, None, None] * centered
+    return (regression * patches).sum(axis=(1, 2)), np.square(regression).sum(axis=(1, 2))
 
 
 def _pixels(camera: Camera, vertices: NDArray[np.floating]) -> NDArray[np.intp]:

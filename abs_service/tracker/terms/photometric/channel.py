@@ -8,9 +8,10 @@ from numpy.typing import NDArray
 from abs_service.pairing.images import ChannelImage, Image, limits
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import Synthesis, Synthesizer
+from abs_service.tracker.synthesis.perspective import project_with_jacobian
 from abs_service.tracker.synthesis.window import NOTHING_HAS, Bordered, corner
 from abs_service.tracker.terms.base import Bounds, SensorFit, facing, summarize
-from abs_service.tracker.terms.gradients import channel_gradients
+from abs_service.tracker.terms.gradients import channel_gradients, noise_deviation, shortened
 from abs_service.tracker.terms.linearization import PointLinearization
 from abs_service.tracker.terms.photometric.channel_cost import (
     CHANNEL,
@@ -63,7 +64,7 @@ class ChannelTerm:
         self._bounds = bounds
         self._registration_noise = registration_noise
         self._widening = NO_WIDENING
-        self._image = np.zeros((1, 1, 4), np.float32)
+        self._image, self._period = np.zeros((1, 1, 4), np.float32), 1
         self._texels = np.zeros((0, 0, 4), np.float32)
         self._texture = np.zeros((0, 4), np.float32)
         self._bordered = Bordered(UNKNOWN, np.array([NOTHING_HAS, 0, 1, 0], np.float32))
@@ -75,6 +76,7 @@ class ChannelTerm:
         window = self._synthesizer.window(self.sensor, predicted, reach_m)
         if self._texels.shape[:2] != image.values.shape:  # new memory takes as long as filling it
             self._texels = np.full((*image.values.shape, 4), UNKNOWN, np.float32)
+        self._period = len(image.channels)
         values, constant = np.ascontiguousarray(image.values[window]), LOG_SQRT_2PI + self._bounds.inlier
         fill(values, image.channels, self._noise.deviation(values), constant, *corner(window), self._texels)
         self._image = self._synthesizer.image(self.sensor, self._texels)
@@ -120,8 +122,14 @@ class ChannelTerm:
         residual, inverse, normalizer = self._residuals(seen, surface)
         use = 0.5 * residual**2 + normalizer < self._bounds.outlier
         vertices = self._view.spread(surface, surface.vertices[0].T)
-        gradients = self._gradients(seen, surface)[use] * inverse[use, None]
-        rows = (gradients[:, None] @ self._view.camera.projection_jacobian(vertices[use]))[:, 0]
+        gradients, gains = self._gradients(seen, surface)
+        places, projection = project_with_jacobian(self._view.camera, vertices)
+        rows = np.einsum("mi,mij->mj", gradients[use] * inverse[use, None], projection[use])
+        # Noise has gradients as a print has, and the more of it there is, the better it would seem to hold a surface.
+        # Its deviation is that at all samples: where the value agrees, there is less of it by chance.
+        deviation = noise_deviation(self._image[..., VALUE, None], places, self._period)[0] * inverse[use]
+        noise = deviation**2 @ np.einsum("mi,mij->m", gains[use], projection[use] ** 2)
+        rows = shortened(rows, float(noise))
         samples = self._view.follow(surface, sparse_jacobian)
         return PointLinearization(residual[use], rows, np.flatnonzero(use), samples, vertices)
 
@@ -146,8 +154,10 @@ class ChannelTerm:
         values[np.arange(len(texels)), texels[:, CHANNEL].astype(int)] = texels[:, VALUE]
         return values
 
-    def _gradients(self, seen: Synthesis, surface: Surface) -> NDArray[np.float64]:
+    def _gradients(self, seen: Synthesis, surface: Surface) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Image gradient of each sample in its pixel's channel, to the right and down (m, 2) [1/px].
+
+        And its variance by independent noise of the pixels of variance 1 (m, 2) [1/px²].
 
         A mosaic shows each channel in every other pixel, too far apart to measure the slope of a fine texture. So it is
         the surface's own where that is known, which is also exactly how a residual changes within a pixel.
@@ -158,10 +168,11 @@ class ChannelTerm:
         gradients = shining[:, channel, np.arange(len(channel))].T.astype(np.float64)
         unknown = np.isnan(gradients).any(axis=1)
         samples = self._view.spread(surface, surface.vertices[0].T.astype(np.float64))[unknown]
-        gradients[unknown] = channel_gradients(
+        gains = self._view.gradient_noise_gains(surface)
+        gradients[unknown], gains[unknown] = channel_gradients(
             self._image[..., VALUE], self._image[..., CHANNEL], self._view.camera, samples
         )
-        return gradients
+        return gradients, gains
 
     def _residuals(
         self, seen: Synthesis, surface: Surface

@@ -3,8 +3,19 @@
 import numpy as np
 import pytest
 
-from abs_service.tracker.terms.gradients import color_rows, noise_deviation, noiseless_color_rows
+from abs_service.pairing.images import BAYER_ORDERS, ONE_CHANNEL, ChannelImage
+from abs_service.tracker.models.rigid import Rigid
+from abs_service.tracker.objectives import likelihood
+from abs_service.tracker.synthesis.sparse import Sparse
+from abs_service.tracker.terms.gradients import channel_gradients, color_rows, noise_deviation, noiseless_color_rows
+from abs_service.tracker.terms.photometric.channel import ChannelTerm
+from abs_service.tracker.terms.photometric.illumination import Passive
+from abs_service.tracker.terms.photometric.vertex_values import at_vertices
 from calib.camera import Camera
+from calib.noise.images.bayer import GaussianBayer
+from calib.noise.images.grey import GaussianGrey
+from calib.rig import Rig, Sensor
+from tests.abs_service.tracker.scenes import flat, sheet
 
 CAMERA = Camera(160, 120, 150.0, 150.0, 79.5, 59.5)
 COLUMNS, ROWS = np.meshgrid(np.arange(160.0), np.arange(120.0))
@@ -52,3 +63,38 @@ def test_a_print_keeps_what_it_has_without_noise():
         assert length(picture(40, 3, seed)) == pytest.approx(clean, rel=0.05)
     assert length(picture(40, 10), corrected=False) > 1.05 * clean
     assert length(picture(40, 10)) == pytest.approx(clean, rel=0.05)
+
+
+NOISES = {"grey": (GaussianGrey(5.0), ONE_CHANNEL), "rggb": (GaussianBayer(5.0), BAYER_ORDERS["rggb"])}
+
+
+def held(name: str, print_levels: float, noise: float) -> float:
+    """Root mean square of the rows of a term of one channel, for the image after the one that the mesh was made of."""
+    model, (sensor, pattern) = Rigid(sheet(17, 23, flat, (0.8, 0.6))), NOISES[name]
+    rig = Rig("r", {name: Sensor(name, CAMERA, sensor)})
+    synthesizer = Sparse(rig, model.mesh)
+    first, now = (ChannelImage(picture(print_levels, noise, seed)[..., 0], pattern) for seed in (3, 4))
+    looks = at_vertices(first, CAMERA, synthesizer.canvas).astype(np.float32)
+    bounds = likelihood.Settings().bounds(rig.sensors[name])
+    term, surface = ChannelTerm(name, synthesizer, looks, sensor, Passive(), bounds), model.deform(model.rest[None])
+    term.observe(now, surface)
+    linear = term.linearize(surface, model.sparse_jacobian(model.rest))
+    assert len(linear.residual) > 0.9 * len(model.mesh.vertices)
+    return float(np.sqrt(np.mean(linear.rows**2)))
+
+
+@pytest.mark.parametrize("name", NOISES)
+def test_noise_in_one_channel_holds_nothing_on_a_blank_ground_and_a_print_keeps_what_it_has(name):
+    """Regression: a wall without print was said to be tracked while the mesh was 14 to 130 mm off."""
+    clean = held(name, 40, 0)
+    assert held(name, 40, 3) == pytest.approx(clean, rel=0.08)
+    for noise in (1.0, 3.0, 5.0):
+        assert held(name, 0, noise) < 0.02 * clean
+
+
+def test_the_gain_of_noise_in_gradients_of_a_mosaic_is_their_variance():
+    places = np.stack(np.meshgrid(np.arange(20.0, 140, 6), np.arange(20.0, 100, 6)), axis=-1).reshape(-1, 2)
+    channel = BAYER_ORDERS["rggb"][np.arange(120)[:, None] % 2, np.arange(160) % 2].astype(np.float32)
+    gradients, gains = channel_gradients(picture(0, 3)[..., 0], channel, CAMERA, CAMERA.directions(places))
+    slope = gradients - (0.1, 0.05)
+    np.testing.assert_allclose(np.mean(slope**2), 9 * gains.mean(), rtol=0.15)
