@@ -18,9 +18,10 @@ from abs_service.tracker.synthesis.projection import Projection
 from abs_service.tracker.synthesis.window import WHOLE, corner
 from abs_service.tracker.terms.base import RimFit
 from abs_service.tracker.terms.depth.outline_distance import inwards
-from abs_service.tracker.terms.depth.rim import Rim, chain, displacement, locate, read, shared_by_side
+from abs_service.tracker.terms.depth.rim import Rim, chain, locate, read, shared_by_side
 from abs_service.tracker.terms.depth.rim_classes import LARGEST_GAP_STEPS, RimClass, classify_rim
 from abs_service.tracker.terms.depth.rim_cost import FARTHEST, rim_cost
+from abs_service.tracker.terms.depth.rim_motion import displacement, motion
 from abs_service.tracker.terms.depth.visibility import Visibility
 from abs_service.tracker.terms.linearization import Linearization
 from calib.camera import Camera
@@ -36,7 +37,6 @@ _HIDING_STEPS = (0.5, 1.0, 1.5, LARGEST_GAP_STEPS)
 
 #: A free edge is off the outline if it is farther from it than so many pixels, and than the bound of its cost.
 OFF_PX = 3.0
-
 
 #: Outer and inner vertices and share of a rim, and what `projection.project` takes of a camera.
 Ends = tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float32]]
@@ -135,8 +135,7 @@ class RimOutline:
         self._corner = np.zeros(2, np.float32)
         self._beyond = np.zeros(len(rim.outer), np.float32)
         self._ends: Ends = (rim.outer, rim.inner, self._beyond)
-        self._hidden = 0
-        self._begun = False
+        self._hidden, self._begun = 0, False
 
     def observe(
         self,
@@ -188,29 +187,32 @@ class RimOutline:
         """Agreement of the edges of a population of one with the outline."""
         far, points = max(OFF_PX, FARTHEST * self._deviation), self._locate(surface)[0].astype(np.float64)
         away = self._inside_at(points)
-        known, off = ~np.isnan(away), np.abs(away) > far
-        # Outside, distances are known up to `far`; how much farther, nothing tells.
+        known = ~np.isnan(away)
         pixel_m = np.linalg.norm(points - self._camera.center, axis=1) / self._camera.fx
-        off_m = np.where(off, np.maximum(away, -far), 0.0) * pixel_m
         covered = np.flatnonzero(self.classes == RimClass.OCCLUDED)
         beyond = self._beyond_by(surface, covered, (LARGEST_GAP_STEPS,))
         return RimFit(
             visible=int(np.count_nonzero(known)),
             outside=int(np.count_nonzero(away < -far)),
             inside=int(np.count_nonzero(away > far)),
-            off_m=self._displacement(surface, points, off_m, known) if off[known].any() else 0.0,
+            off_m=self._displacement(surface, points, away, pixel_m) if known.any() else 0.0,
             occluded=self._hidden + int(np.count_nonzero(~known)),
             covered=len(covered),
             uncovered=int(np.count_nonzero(beyond > 0)),
         )
 
     def _displacement(
-        self, surface: Surface, points: NDArray[np.float64], off_m: NDArray[np.float64], known: NDArray[np.bool_]
+        self, surface: Surface, points: NDArray[np.float64], away: NDArray[np.float64], pixel_m: NDArray[np.float64]
     ) -> float:
-        """See `rim.displacement`, of those of the free edges (k, 3) whose distances (k,) are known [m]."""
+        """The larger of `displacement` and `motion` [m], of free edges (k, 3) at known distances (k,) [px]."""
+        far, bound = max(OFF_PX, FARTHEST * self._deviation), FARTHEST * self._deviation
         inner = surface.vertices[0].T[self._ends[1]].astype(np.float64)
-        directions = self._camera.project(points) - self._camera.project(inner)
-        return displacement(off_m[known], directions[known])
+        places, known = self._camera.project(points), ~np.isnan(away)
+        directions = (places - self._camera.project(inner))[known]
+        # Outside, distances are known up to `far`; how much farther, nothing tells.
+        off_m = np.where(np.abs(away) > far, np.maximum(away, -far), 0.0) * pixel_m
+        moved = motion(np.clip(away[known], -bound, bound), directions, places[known])
+        return max(displacement(off_m[known], directions), moved * float(np.mean(pixel_m)))
 
     def _beyond_by(self, surface: Surface, which: NDArray[np.intp], steps: Sequence[float]) -> NDArray[np.float64]:
         """Distances inside the outline (steps, m) some steps beyond outer vertices (m,), see `_inside_at`."""

@@ -9,9 +9,6 @@ from abs_service.tracker.mesh import Mesh, edges_of
 from abs_service.tracker.synthesis.projection import project
 from calib.jit import kernel
 
-#: Edges that face one side of the image are judged together if there are so many of them.
-LEAST_OF_A_SIDE = 8
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rim:
@@ -176,40 +173,12 @@ def shared_by_side(
         jacobian, residual: of the free edges.
         gradients: image gradients (k, 2) of their distances from the outline, which tell the side.
     """
-    sides = _by_side(gradients)
+    sides = by_side(gradients)
     mean_square = sides @ residual**2 / np.maximum(sides.sum(axis=1), 1)
     return np.sqrt(np.maximum(mean_square, 1.0))[:, None] * (sides @ jacobian)
 
 
-def displacement(away: NDArray[np.float64], directions: NDArray[np.float64]) -> float:
-    """Distance of edges from the outline: the mean of all, or what shows that the mesh has slid if that is larger.
-
-    A slide is seen by the edges across it only: those of one side end inside the object, those of the other beside it.
-    Where only one of the two sides is in sight, that side tells it. The median of a side is taken, and both sides must
-    agree, because something may lie against the edges of a side.
-
-    Args:
-        away: signed distances (k,) of the edges from the outline.
-        directions: out of the mesh, in the image (k, 2).
-    """
-    right, down, left, up = (_typical(away[side]) for side in _by_side(directions))
-    mean = float(np.mean(np.abs(away))) if len(away) else 0.0
-    return max(mean, _slide(right, left), _slide(down, up))
-
-
-def _typical(away: NDArray[np.float64]) -> float:
-    """Median of the edges of a side; NaN if there are too few."""
-    return float(np.median(away)) if len(away) >= LEAST_OF_A_SIDE else np.nan
-
-
-def _slide(one: float, other: float) -> float:
-    """Slide that two opposite sides show by their signed distances, of which one may be unknown; 0 if they disagree."""
-    if np.isnan(one) or np.isnan(other):
-        return float(np.nan_to_num(np.fmax(abs(one), abs(other))))
-    return max(0.0, min(one, -other), min(-one, other))
-
-
-def _by_side(directions: NDArray[np.float64]) -> NDArray[np.bool_]:
+def by_side(directions: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Masks (4, k) of image directions (k, 2) that are nearest to right, down, left and up."""
     quarter = np.floor(np.arctan2(directions[:, 1], directions[:, 0]) / (np.pi / 2) + 0.5).astype(np.intp) % 4
     return quarter == np.arange(4)[:, None]

@@ -1,0 +1,65 @@
+"""Motion of a mesh that the distances of its edges from the outline show: a slide, or a turn."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.tracker.terms.depth.rim import by_side
+
+#: Edges that face one side of the image are judged together if there are so many of them.
+LEAST_OF_A_SIDE = 8
+
+#: Share of the squared distances from the outline that a motion of the mesh explains at least, if it has moved.
+LEAST_EXPLAINED = 0.7
+
+
+def displacement(away: NDArray[np.float64], directions: NDArray[np.float64]) -> float:
+    """Distance of edges from the outline: the mean of all, or what shows that the mesh has slid if that is larger.
+
+    A slide is seen by the edges across it only: those of one side end inside the object, those of the other beside it.
+    Where only one of the two sides is in sight, that side tells it. The median of a side is taken, and both sides must
+    agree, because something may lie against the edges of a side.
+
+    Args:
+        away: signed distances (k,) of the edges from the outline.
+        directions: out of the mesh, in the image (k, 2).
+    """
+    right, down, left, up = (_typical(away[side]) for side in by_side(directions))
+    mean = float(np.mean(np.abs(away))) if len(away) else 0.0
+    return max(mean, _slide(right, left), _slide(down, up))
+
+
+def motion(away: NDArray[np.float64], directions: NDArray[np.float64], places: NDArray[np.float64]) -> float:
+    """Slide and turn of the mesh in the image that explain the distances of its edges from the outline: their median.
+
+    A turn leaves half of every side inside the object and half beside it, which neither mean nor sides tell. It counts
+    if it explains most of the squared distances: what lies against one side, or a bend, does not look like a motion.
+
+    Args:
+        away: signed distances (k,) of the edges from the outline [px].
+        directions: out of the mesh, in the image (k, 2).
+        places: of the edges in the image (k, 2) [px].
+
+    Returns:
+        Length of the motion of an edge [px]; 0 if there is none or too few edges tell.
+    """
+    if len(away) < LEAST_OF_A_SIDE or not away.any():
+        return 0.0
+    x, y = (places - places.mean(axis=0)).T
+    right, down = (directions / np.linalg.norm(directions, axis=1, keepdims=True)).T
+    rows = np.stack([right, down, down * x - right * y], axis=1)
+    (along, across, turn), *_ = np.linalg.lstsq(rows, away)
+    left = away - rows @ (along, across, turn)
+    explained = left @ left < (1 - LEAST_EXPLAINED) * (away @ away)
+    return float(np.median(np.hypot(along - turn * y, across + turn * x))) if explained else 0.0
+
+
+def _typical(away: NDArray[np.float64]) -> float:
+    """Median of the edges of a side; NaN if there are too few."""
+    return float(np.median(away)) if len(away) >= LEAST_OF_A_SIDE else np.nan
+
+
+def _slide(one: float, other: float) -> float:
+    """Slide that two opposite sides show by their signed distances, of which one may be unknown; 0 if they disagree."""
+    if np.isnan(one) or np.isnan(other):
+        return float(np.nan_to_num(np.fmax(abs(one), abs(other))))
+    return max(0.0, min(one, -other), min(-one, other))

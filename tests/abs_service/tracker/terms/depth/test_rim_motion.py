@@ -1,0 +1,37 @@
+"""A slide and a turn of a mesh are told by all its edges; what lies against one side is no motion."""
+
+import numpy as np
+import pytest
+
+from abs_service.tracker.terms.depth.rim_motion import motion
+
+ALONG = np.linspace(-30, 30, 15)
+#: Edges of a square of 60 pixels: places and directions out of it, right, down, left and up.
+PLACES = 100 + np.concatenate([
+    np.stack([np.full(15, 30), ALONG], axis=1), np.stack([ALONG, np.full(15, 30)], axis=1),
+    np.stack([np.full(15, -30), ALONG], axis=1), np.stack([ALONG, np.full(15, -30)], axis=1),
+])  # fmt: skip
+OUT = np.repeat([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]], 15, axis=0)
+
+
+def off(slide: tuple[float, float] = (0.0, 0.0), turn: float = 0.0) -> np.ndarray:
+    """Distances of the edges from the outline of an object that moved by so much [px], [rad]."""
+    x, y = (PLACES - 100).T
+    moved = np.array(slide) + turn * np.stack([-y, x], axis=1)
+    return np.einsum("ki,ki->k", OUT, moved)
+
+
+def test_the_motion_is_found_with_noise_and_bounded_distances():
+    noise = 0.4 * np.random.default_rng(1).standard_normal(60)
+    for slide, turn, expected in (((3.0, 0.0), 0.0, 3.0), ((1.0, -2.0), 0.0, 5**0.5), ((0.0, 0.0), 0.1, 3.4)):
+        assert motion(off(slide, turn), OUT, PLACES) == pytest.approx(expected, rel=0.05)
+        assert motion(np.clip(off(slide, turn) + noise, -4, 4), OUT, PLACES) == pytest.approx(expected, rel=0.15)
+
+
+def test_noise_and_what_lies_against_a_side_and_a_few_edges_are_no_motion():
+    assert motion(0.4 * np.random.default_rng(2).standard_normal(60), OUT, PLACES) == 0
+    for sides in ((0,), (1,), (0, 2), (0, 1, 2, 3)):
+        against = np.where(np.isin(np.arange(60) // 15, sides), 4.0, 0.0)
+        assert motion(against, OUT, PLACES) == 0
+    assert motion(off((3.0, 0.0))[:7], OUT[:7], PLACES[:7]) == 0
+    assert motion(np.zeros(60), OUT, PLACES) == 0
