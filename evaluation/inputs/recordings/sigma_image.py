@@ -79,8 +79,7 @@ class _Surface:
         return self
 
     def select(self, view: DepthView) -> NDArray[np.bool_]:
-        labels, _ = connected_surfaces(view.distance, LARGEST_STEP_M)
-        return labels == self.label
+        return connected_surfaces(view.distance, LARGEST_STEP_M).labels == self.label
 
 
 def read(folder: Path) -> O3rExposure:
@@ -135,8 +134,8 @@ def _without(exposure: O3rExposure, hidden: NDArray[np.bool_]) -> O3rExposure:
 
 def _hidden(seen: O3rExposure, noise: DepthNoise, whole: O3rExposure) -> Iterator[Samples]:
     """Of every surface the pixels that the tracker did not see, with the mesh that it found as the true surface."""
-    labels, count = connected_surfaces(seen.frames[Kind.DEPTH].si(), LARGEST_STEP_M)
-    sizes = np.bincount(labels.ravel(), minlength=count)
+    labels = connected_surfaces(seen.frames[Kind.DEPTH].si(), LARGEST_STEP_M).labels
+    sizes = np.bincount(labels.ravel())
     distance, own = whole.image(Kind.DEPTH), whole.image(Kind.DEVIATION)
     unseen = ~np.isfinite(seen.image(Kind.DEPTH)) & np.isfinite(distance) & np.isfinite(own)
     for label in np.flatnonzero(sizes >= MIN_PIXELS)[1:]:

@@ -1,5 +1,7 @@
 """Connected components of a depth image: pixels that belong to the same surface."""
 
+from dataclasses import dataclass
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -14,27 +16,38 @@ _AROUND = np.ones((3, 3))
 REACH_PX = 10
 
 
-def connected_surfaces(distance: NDArray[np.float32], largest_step: float) -> tuple[NDArray[np.int32], int]:
-    """Label of every pixel's surface, 0 for none, and the number of labels.
+@dataclass(frozen=True, slots=True, eq=False)
+class Surfaces:
+    """Connected surfaces of a depth image.
 
-    Surfaces are separated at jumps in distance; the image is smoothed first, because a single noisy pixel would
-    otherwise connect or split surfaces.
+    Attributes:
+        distance: radial distances (height, width) [m], NaN without return.
+        smooth: medians of squares of five pixels a side [m], zero where most have no return.
+        labels: label of every pixel's surface, 0 for none.
+        count: number of labels, that for none included.
+    """
+
+    distance: NDArray[np.float32]
+    smooth: NDArray[np.float32]
+    labels: NDArray[np.int32]
+    count: int
+
+
+def connected_surfaces(distance: NDArray[np.float32], largest_step: float) -> Surfaces:
+    """Surfaces that are separated at jumps in distance.
+
+    The image is smoothed first, because a single noisy pixel would otherwise connect or split surfaces.
 
     Args:
         distance: radial distances (height, width) [m], NaN without return.
         largest_step: largest difference between connected neighbours [m].
     """
-    smooth = smoothed(distance)
+    known = np.isfinite(distance)
+    smooth = cv2.medianBlur(np.where(known, distance, 0).astype(np.float32, copy=False), 5)
     highest, lowest = cv2.dilate(smooth, _AROUND), cv2.erode(smooth, _AROUND)
-    surface = (np.isfinite(distance) & (lowest > 0) & (highest - lowest < largest_step)).view(np.uint8)
+    surface = (known & (lowest > 0) & (highest - lowest < largest_step)).view(np.uint8)
     count, labels = cv2.connectedComponents(surface, connectivity=4)
-    return np.asarray(labels, np.int32), count
-
-
-def smoothed(distance: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Medians of the squares of five pixels a side (height, width) [m], zero where most have no return."""
-    known = np.where(np.isfinite(distance), distance, 0).astype(np.float32, copy=False)
-    return np.asarray(cv2.medianBlur(known, 5), np.float32)
+    return Surfaces(distance, np.asarray(smooth, np.float32), np.asarray(labels, np.int32), count)
 
 
 def large_surfaces(
@@ -50,8 +63,9 @@ def large_surfaces(
     Raises:
         DetectionError: no surface is large enough.
     """
-    labels, count = connected_surfaces(distance, largest_step)
-    sizes = np.bincount(labels.ravel(), minlength=count)[1:]
+    surfaces = connected_surfaces(distance, largest_step)
+    labels = surfaces.labels
+    sizes = np.bincount(labels.ravel(), minlength=surfaces.count)[1:]
     by_size = 1 + np.argsort(-sizes, kind="stable")
     large = by_size[sizes[by_size - 1] >= minimum_pixels]
     if not len(large):

@@ -9,7 +9,7 @@ from abs_service.pairing.images import Window
 from abs_service.tracker.terms.depth.background import Background, dropouts
 from abs_service.tracker.terms.depth.beyond_view import BeyondView
 from abs_service.tracker.terms.depth.interruption import interruptions
-from abs_service.tracker.terms.depth.visibility import Visibility, classify
+from abs_service.tracker.terms.depth.visibility import Visibility, classify, surfaces_of
 
 
 class Classifier:
@@ -37,11 +37,11 @@ class Classifier:
         """
         missing, silhouette = np.isnan(distance), np.isfinite(expected)
         beyond, single = self._beyond_view.observe(missing, silhouette, window), dropouts(missing)
-        areas = missing & ~(single | beyond)
+        surfaces, areas = surfaces_of(distance), missing & ~(single | beyond)
         # What the surface goes on beyond is a hole, not the background. If there is none at first, none is looked for.
-        hole = interruptions(distance, areas, silhouette) if self._is_interrupted else np.False_
+        hole = interruptions(surfaces, areas, silhouette) if self._is_interrupted else np.False_
         if not self._begun:
             self._begun, self._is_interrupted = True, bool(hole.any())
         empty = self._background.observe(areas & ~hole, silhouette, window, shape)
-        seen = classify(distance, expected, self._focal, empty, single, beyond)
+        seen = classify(surfaces, expected, self._focal, empty, single, beyond)
         return replace(seen, hole=seen.hole | hole)

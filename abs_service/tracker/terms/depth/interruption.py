@@ -7,10 +7,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.detection.segments.depth_segments import connected_surfaces, smoothed
+from abs_service.tracker.detection.segments.depth_segments import Surfaces
 from abs_service.tracker.terms.depth.background import dropouts
 from abs_service.tracker.terms.depth.outline_distance import around
-from abs_service.tracker.terms.depth.visibility import AGREEMENT_M, LARGEST_STEP_M, MIN_PIXELS
+from abs_service.tracker.terms.depth.visibility import AGREEMENT_M, MIN_PIXELS
 from calib.jit import kernel
 
 #: They are no wider than this share of the mesh's side, if it were square: beyond more of them may be anything.
@@ -21,13 +21,11 @@ EDGE_PX = 2
 _AROUND = np.ones((2 * EDGE_PX + 1, 2 * EDGE_PX + 1))
 
 
-def interruptions(
-    distance: NDArray[np.float32], missing: NDArray[np.bool_], expected: NDArray[np.bool_]
-) -> NDArray[np.bool_]:
+def interruptions(surfaces: Surfaces, missing: NDArray[np.bool_], expected: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Missing returns (height, width) beyond which, along the row or the column, the object's surface goes on.
 
     Args:
-        distance: radial distances (height, width) [m], NaN without return.
+        surfaces: of the measured distances (height, width), see `surfaces_of`.
         missing: those of the missing returns that may interrupt a surface.
         expected: silhouette of the mesh.
     """
@@ -36,11 +34,10 @@ def interruptions(
         return result
     reach = int(WIDEST * np.sqrt(np.count_nonzero(expected)))
     part = around(expected, reach + EDGE_PX)
-    labels, count = connected_surfaces(distance[part], LARGEST_STEP_M)
-    ours = np.bincount(labels[expected[part]], minlength=count) >= MIN_PIXELS
+    smooth, labels = np.ascontiguousarray(surfaces.smooth[part]), np.ascontiguousarray(surfaces.labels[part])
+    ours = np.bincount(labels[expected[part]], minlength=surfaces.count) >= MIN_PIXELS
     ours[0] = False
-    smooth, between = smoothed(distance[part]), np.zeros(labels.shape, np.bool_)
-    across = np.zeros(labels.T.shape, np.bool_)
+    between, across = np.zeros(labels.shape, np.bool_), np.zeros(labels.T.shape, np.bool_)
     _fill(smooth, labels, ours, reach, between)
     _fill(np.ascontiguousarray(smooth.T), np.ascontiguousarray(labels.T), ours, reach, across)
     areas = missing[part] & (between | across.T)

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.detection.segments.depth_segments import connected_surfaces
+from abs_service.tracker.detection.segments.depth_segments import Surfaces, connected_surfaces
 from abs_service.tracker.terms.depth.background import DEEPEST_M
 from calib.jit import kernel
 
@@ -53,8 +53,13 @@ class Visibility:
     free_m: NDArray[np.float32]
 
 
+def surfaces_of(distance: NDArray[np.floating]) -> Surfaces:
+    """Surfaces of radial distances (height, width) [m], NaN without return, separated at `LARGEST_STEP_M`."""
+    return connected_surfaces(np.ascontiguousarray(distance, np.float32), LARGEST_STEP_M)
+
+
 def classify(
-    distance: NDArray[np.float32],
+    surfaces: Surfaces,
     predicted: NDArray[np.float32],
     focal: float,
     empty: NDArray[np.bool_] | np.bool_ = np.False_,
@@ -66,16 +71,15 @@ def classify(
     If no surface agrees with the prediction, it is the prediction that is wrong, and nothing is classified.
 
     Args:
-        distance: measured radial distances (height, width) [m], NaN without return.
+        surfaces: of the measured distances (height, width), see `surfaces_of`.
         predicted: radial distances of the predicted mesh [m], infinite beside it.
         focal: focal length of the camera [px].
         empty: missing returns (height, width) that show the background, see `Background`.
         dropout: missing returns of single pixels, see `dropouts`.
         beyond: missing returns beyond the field of view, see `BeyondView`; they count as a hole.
     """
-    distance, predicted = (np.ascontiguousarray(image, np.float32) for image in (distance, predicted))
-    labels, count = connected_surfaces(distance, LARGEST_STEP_M)
-    is_object = np.zeros(count, np.bool_)
+    distance, labels, predicted = surfaces.distance, surfaces.labels, np.ascontiguousarray(predicted, np.float32)
+    is_object = np.zeros(surfaces.count, np.bool_)
     _recognize(distance, predicted, labels, is_object)
     nothing = np.zeros(distance.shape, np.bool_)
     if not is_object.any():

@@ -6,7 +6,7 @@ from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.terms.depth.outline import RimOutline
 from abs_service.tracker.terms.depth.rim import Rim
-from abs_service.tracker.terms.depth.visibility import classify
+from abs_service.tracker.terms.depth.visibility import classify, surfaces_of
 from calib.camera import Camera
 from tests.abs_service.tracker.scenes import as_surface, flat, sheet, sparse
 
@@ -38,4 +38,4 @@ def look(at: RimOutline, distance: np.ndarray, mesh: Mesh = MESH) -> np.ndarray:
     view = sparse(CAMERA, mesh).view("tof", np.zeros((len(mesh.vertices), 0), np.float32))
     predicted = moved(mesh, 0.0)
     expected = view.render(predicted)
-    return at.observe(distance, classify(distance, expected, CAMERA.fx), expected, predicted)
+    return at.observe(distance, classify(surfaces_of(distance), expected, CAMERA.fx), expected, predicted)

@@ -9,6 +9,7 @@ from abs_service.tracker.terms.depth.classifier import Classifier
 from abs_service.tracker.terms.depth.first_rim import classified_rim
 from abs_service.tracker.terms.depth.interruption import interruptions
 from abs_service.tracker.terms.depth.rim_classes import RimClass
+from abs_service.tracker.terms.depth.visibility import surfaces_of
 from tests.abs_service.tracker.terms.depth.outline_scene import BESIDE_M, CAMERA, MESH, moved, picture
 
 RAYS = CAMERA.unproject(np.ones((CAMERA.height, CAMERA.width)))
@@ -64,9 +65,9 @@ def test_a_steep_noisy_surface_is_continued_across_a_stripe_and_a_step_is_not():
     mesh = columns < np.full((60, 1), 60)
     for seen in (steep, (steep + noise).astype(np.float32)):
         seen[:, 60:70] = np.nan
-        assert interruptions(seen, np.isnan(seen), mesh)[:, 60:70].all()
+        assert interruptions(surfaces_of(seen), np.isnan(seen), mesh)[:, 60:70].all()
     step = (steep + 0.05 * (columns > 64)).astype(np.float32)
-    assert not interruptions(step, np.isnan(step), mesh).any()
+    assert not interruptions(surfaces_of(step), np.isnan(step), mesh).any()
 
 
 def test_a_stripe_of_the_first_image_is_no_background_of_the_later_ones():

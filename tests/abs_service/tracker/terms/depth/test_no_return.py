@@ -10,7 +10,7 @@ from abs_service.tracker.terms.base import Bounds
 from abs_service.tracker.terms.depth.background import AREA_PX, dropouts
 from abs_service.tracker.terms.depth.depth import DepthTerm
 from abs_service.tracker.terms.depth.outline_distance import inwards
-from abs_service.tracker.terms.depth.visibility import classify
+from abs_service.tracker.terms.depth.visibility import classify, surfaces_of
 from calib.camera import Camera
 from calib.no_return import NEVER, NoReturn
 from calib.noise.constant import Constant
@@ -107,7 +107,7 @@ def test_the_outline_stays_where_it_is_if_single_returns_are_missing():
         away = []
         for distance in (whole, np.where(lost, np.float32(np.nan), whole)):
             single = dropouts(np.isnan(distance))
-            seen = classify(distance, expected, CAMERA.fx, np.isnan(whole) & ~single, single)
+            seen = classify(surfaces_of(distance), expected, CAMERA.fx, np.isnan(whole) & ~single, single)
             part, image = inwards(distance, seen, CAMERA.width)
             assert image.shape == whole[part].shape
             away.append(image)

@@ -18,7 +18,7 @@ from abs_service.tracker.terms.base import Bounds
 from abs_service.tracker.terms.depth.outline_distance import inwards, outvoted
 from abs_service.tracker.terms.depth.rim import Rim, look_up, read
 from abs_service.tracker.terms.depth.rim_cost import FARTHEST, rim_cost
-from abs_service.tracker.terms.depth.visibility import classify
+from abs_service.tracker.terms.depth.visibility import classify, surfaces_of
 from calib.lenses.fisheye import KannalaBrandt
 from calib.lenses.lens import Lens
 from calib.noise.constant import Constant
@@ -107,7 +107,9 @@ def test_a_rim_beside_an_image_part_of_one_row_is_far_away():
 def test_the_outline_is_zero_and_distances_grow_inwards():
     distance = picture()
     view = sparse(CAMERA, MESH).view("tof", np.zeros((len(MESH.vertices), 0), np.float32))
-    part, away = inwards(distance, classify(distance, view.render(moved(MESH, 0.0)), CAMERA.fx), CAMERA.width)
+    part, away = inwards(
+        distance, classify(surfaces_of(distance), view.render(moved(MESH, 0.0)), CAMERA.fx), CAMERA.width
+    )
     assert distance[part].shape == distance.shape
     row, on = CAMERA.height // 2, distance[CAMERA.height // 2] < 1.3
     assert np.all(away[row, on] > 0)
@@ -203,7 +205,7 @@ def test_distances_near_the_outline_do_not_depend_on_how_far_the_image_goes_on()
     distance = picture()
     distance[20:24, 30:60] = np.nan
     view = sparse(CAMERA, MESH).view("tof", np.zeros((len(MESH.vertices), 0), np.float32))
-    seen = classify(distance, view.render(moved(MESH, 0.0)), CAMERA.fx)
+    seen = classify(surfaces_of(distance), view.render(moved(MESH, 0.0)), CAMERA.fx)
     _, everywhere = inwards(distance, seen, CAMERA.width)
     part, near = inwards(distance, seen, 3)
     assert near.size < 0.8 * everywhere.size

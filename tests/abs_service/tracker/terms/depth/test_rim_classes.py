@@ -10,7 +10,7 @@ from abs_service.tracker.terms.depth.rim import Rim
 from abs_service.tracker.terms.depth.rim_classes import RimClass
 from abs_service.tracker.terms.depth.rim_cost import FARTHEST
 from abs_service.tracker.terms.depth.rim_motion import displacement
-from abs_service.tracker.terms.depth.visibility import classify
+from abs_service.tracker.terms.depth.visibility import classify, surfaces_of
 from tests.abs_service.tracker.scenes import flat, sheet, sparse
 from tests.abs_service.tracker.terms.depth.outline_scene import CAMERA, MESH, look, moved, outline, picture
 
@@ -103,7 +103,7 @@ def test_the_surface_hides_its_own_edge():
     view = sparse(CAMERA, MESH).view("tof", np.zeros((len(MESH.vertices), 0), np.float32))
     expected = view.render(moved(MESH, 0.0))
     distance = picture()
-    result.observe(distance, classify(distance, expected, CAMERA.fx), expected, moved(rolled, 0.0))
+    result.observe(distance, classify(surfaces_of(distance), expected, CAMERA.fx), expected, moved(rolled, 0.0))
     assert result.fit(moved(rolled, 0.0)).occluded >= 11
 
 

@@ -14,7 +14,7 @@ from abs_service.tracker.synthesis.window import WHOLE
 from abs_service.tracker.terms.base import Bounds
 from abs_service.tracker.terms.depth.background import MIN_PIXELS, Background
 from abs_service.tracker.terms.depth.depth import FREE_SCALE_M, DepthTerm
-from abs_service.tracker.terms.depth.visibility import classify, where
+from abs_service.tracker.terms.depth.visibility import classify, surfaces_of, where
 from abs_service.tracker.terms.photometric.color import ColorTerm
 from abs_service.tracker.terms.photometric.shadow import Shadow
 from calib import pose
@@ -38,7 +38,7 @@ EXPECTED = np.isfinite(PREDICTED)
 
 
 def test_a_sheet_before_a_wall_is_the_object_and_the_wall_is_free():
-    seen = classify(board(STRAIGHT).astype(np.float32), PREDICTED, STRAIGHT.fx)
+    seen = classify(surfaces_of(board(STRAIGHT).astype(np.float32)), PREDICTED, STRAIGHT.fx)
     assert np.count_nonzero(seen.object) > 0.8 * np.count_nonzero(EXPECTED)  # all but its rim
     assert not (seen.object & ~EXPECTED).any()
     assert not seen.foreground.any()
@@ -50,7 +50,7 @@ def test_a_sheet_before_a_wall_is_the_object_and_the_wall_is_free():
 def test_what_stands_before_the_sheet_is_foreground_also_beside_it():
     distance = board(STRAIGHT).astype(np.float32)
     distance[20:45, :62] = 0.85
-    seen = classify(distance, PREDICTED, STRAIGHT.fx)
+    seen = classify(surfaces_of(distance), PREDICTED, STRAIGHT.fx)
     hand = np.zeros_like(EXPECTED)
     hand[20:45, :62] = True
     assert seen.foreground[22:43, 2:60].all()
@@ -62,7 +62,7 @@ def test_a_hole_inside_the_outline_is_told_from_missing_returns_at_its_rim():
     distance = board(STRAIGHT).astype(np.float32)
     distance[~EXPECTED] = np.nan  # a background out of range
     distance[:, 82:] = np.nan
-    seen = classify(distance, PREDICTED, STRAIGHT.fx)
+    seen = classify(surfaces_of(distance), PREDICTED, STRAIGHT.fx)
     assert seen.hole[30:42, 84:96].all()
     assert not seen.hole[:9].any()
     assert (seen.free_m == 0).all()
@@ -80,7 +80,7 @@ def test_a_missing_return_beside_the_sheet_is_free_space_where_the_background_ha
     empty = background.observe(missing, EXPECTED, WHOLE, first.shape)
     assert not empty[30:33, 60:64].any()
     assert np.array_equal(empty, missing & ~np.pad(np.ones((3, 4), bool), ((30, 39), (60, 76))))
-    seen = classify(moved, PREDICTED, STRAIGHT.fx, empty)
+    seen = classify(surfaces_of(moved), PREDICTED, STRAIGHT.fx, empty)
     row = seen.free_m[36]
     assert np.all(row[97:102] > 0)
     assert np.all(np.diff(row[97:102]) > 0)  # farther from the sheet, more to be pushed back
@@ -88,7 +88,9 @@ def test_a_missing_return_beside_the_sheet_is_free_space_where_the_background_ha
     # Deeper than the object can move between two frames, a missing return is a hole all the same.
     deep = first.copy()
     deep[:, 70:] = np.nan
-    deep_seen = classify(deep, PREDICTED, STRAIGHT.fx, background.observe(np.isnan(deep), EXPECTED, WHOLE, deep.shape))
+    deep_seen = classify(
+        surfaces_of(deep), PREDICTED, STRAIGHT.fx, background.observe(np.isnan(deep), EXPECTED, WHOLE, deep.shape)
+    )
     assert deep_seen.hole[36, 80:92].all()
     assert np.all(deep_seen.free_m[36, 99:102] > 0)
 
@@ -97,7 +99,7 @@ def test_a_hole_goes_on_to_the_rim_that_it_reaches():
     distance = board(STRAIGHT).astype(np.float32)
     distance[~EXPECTED] = np.nan
     distance[:, 82:] = np.nan
-    seen = classify(distance, PREDICTED, STRAIGHT.fx)
+    seen = classify(surfaces_of(distance), PREDICTED, STRAIGHT.fx)
     assert seen.hole[30:42, 84:104].all()  # the sheet ends at column 102.5
     assert not seen.hole[:, 107:].any()
     assert not seen.hole[:, :60].any()
@@ -105,7 +107,7 @@ def test_a_hole_goes_on_to_the_rim_that_it_reaches():
 
 def test_a_prediction_that_nothing_agrees_with_classifies_nothing():
     distance = (board(STRAIGHT) - 0.2).astype(np.float32)
-    seen = classify(distance, PREDICTED, STRAIGHT.fx)
+    seen = classify(surfaces_of(distance), PREDICTED, STRAIGHT.fx)
     assert not seen.object.any()
     assert not seen.foreground.any()
     assert not seen.hole.any()
@@ -116,7 +118,7 @@ def test_a_surface_that_moved_as_a_whole_is_still_the_object():
     distance = board(STRAIGHT).astype(np.float32)
     columns = np.arange(STRAIGHT.width)
     turned = np.where(EXPECTED, distance - 0.0012 * (columns - 52), distance).astype(np.float32)
-    seen = classify(turned, PREDICTED, STRAIGHT.fx)
+    seen = classify(surfaces_of(turned), PREDICTED, STRAIGHT.fx)
     assert not seen.foreground.any()
 
 
@@ -207,7 +209,7 @@ def test_points_behind_a_camera_cast_no_shadow():
 def test_missing_returns_of_an_object_that_fills_the_image_are_holes():
     distance = np.full((48, 64), 1.0, np.float32)
     distance[10:14, 20:30] = np.nan
-    seen = classify(distance, np.full((48, 64), 1.0, np.float32), 150.0)
+    seen = classify(surfaces_of(distance), np.full((48, 64), 1.0, np.float32), 150.0)
     assert np.array_equal(seen.hole, np.isnan(distance))
 
 
