@@ -15,7 +15,7 @@ from abs_service.tracker.detection.segmentation import detect_object
 from abs_service.tracker.detection.templates.base import Template
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import ModelError
-from abs_service.tracker.terms.depth.first_rim import classified_rim
+from abs_service.tracker.terms.depth.outline.first_rim import classified_rim
 from abs_service.tracking.observer import Observer
 from abs_service.tracking.plan import Plan, build_template, derived, make_tracker
 from calib.camera import Camera

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.report import plots
-from abs_service.tracker.terms.depth.rim_classes import RimClass
+from abs_service.tracker.terms.depth.outline.rim_classes import RimClass
 from abs_service.tracking.preview import FoundMesh, Preview
 from calib.camera import Camera
 

@@ -10,8 +10,8 @@ from abs_service.tracker.posterior.posterior import Posterior
 from abs_service.tracker.shape_quality import ShapeComparison
 from abs_service.tracker.synthesis.sparse import Sparse, SparseView
 from abs_service.tracker.terms.depth import texels
-from abs_service.tracker.terms.depth.classifier import Classifier
-from abs_service.tracker.terms.depth.outline import RimOutline
+from abs_service.tracker.terms.depth.classification.classifier import Classifier
+from abs_service.tracker.terms.depth.outline.rim_outline import RimOutline
 from abs_service.tracker.terms.photometric.color import ColorTerm
 from abs_service.tracker.tracker import Tracker
 from abs_service.tracking.observer import Observer

@@ -10,7 +10,7 @@ import pytest
 from abs_service import config, wiring
 from abs_service.tracker.detection.regions import box
 from abs_service.tracker.detection.segmentation import detect_object
-from abs_service.tracker.terms.depth.rim_classes import RimClass
+from abs_service.tracker.terms.depth.outline.rim_classes import RimClass
 from abs_service.tracking.observer import Observer
 from abs_service.tracking.plan import make_posterior
 from abs_service.tracking.preview import PreviewError, preview

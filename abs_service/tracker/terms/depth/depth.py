@@ -11,17 +11,17 @@ from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import Synthesis, Synthesizer
 from abs_service.tracker.synthesis.window import WHOLE, Placed, corner
 from abs_service.tracker.terms.base import Bounds, SensorFit, facing, summarize
-from abs_service.tracker.terms.depth.classifier import Classifier
-from abs_service.tracker.terms.depth.continuation import Continuation, NoContinuation
+from abs_service.tracker.terms.depth.classification.classifier import Classifier
+from abs_service.tracker.terms.depth.classification.visibility import Visibility, where
 from abs_service.tracker.terms.depth.depth_cost import (
     FREE_SCALE_M,
     depth_cost,
     missing_cost,
     normalize,
 )
-from abs_service.tracker.terms.depth.outline import NoOutline, Outline
+from abs_service.tracker.terms.depth.outline.continuation import Continuation, NoContinuation
+from abs_service.tracker.terms.depth.outline.rim_outline import NoOutline, Outline
 from abs_service.tracker.terms.depth.texels import Unusable, texels
-from abs_service.tracker.terms.depth.visibility import Visibility, where
 from abs_service.tracker.terms.gradients import color_rows, depth_rows
 from abs_service.tracker.terms.linearization import NO_ROWS, PointLinearization, Together
 from abs_service.tracker.terms.vertex_counts import Sight

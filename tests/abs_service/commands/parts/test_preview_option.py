@@ -13,7 +13,7 @@ from abs_service.display.pictures import preview_picture
 from abs_service.display.pictures.preview_picture import CLASS_COLORS, LEGEND, LINE, NO_RETURN, REGION, WARNING
 from abs_service.supervision.exit_codes import Exit
 from abs_service.tracker.mesh import Mesh
-from abs_service.tracker.terms.depth.rim_classes import RimClass
+from abs_service.tracker.terms.depth.outline.rim_classes import RimClass
 from abs_service.tracking.preview import FoundMesh, Preview
 from calib.camera import Camera
 from drivers.simulated.address import parse

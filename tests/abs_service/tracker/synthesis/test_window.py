@@ -17,8 +17,8 @@ from abs_service.tracker.synthesis.rasterization.raster import Raster
 from abs_service.tracker.synthesis.window import WHOLE, Bordered, Placed, around
 from abs_service.tracker.terms.base import Bounds
 from abs_service.tracker.terms.depth.depth import DepthTerm
-from abs_service.tracker.terms.depth.outline import RimOutline
-from abs_service.tracker.terms.depth.rim import Rim
+from abs_service.tracker.terms.depth.outline.rim import Rim
+from abs_service.tracker.terms.depth.outline.rim_outline import RimOutline
 from abs_service.tracker.terms.photometric.channel import ChannelTerm
 from abs_service.tracker.terms.photometric.color import ColorTerm
 from abs_service.tracker.terms.photometric.illumination import Passive

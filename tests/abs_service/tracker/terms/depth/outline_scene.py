@@ -4,9 +4,9 @@ import numpy as np
 
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import Surface
-from abs_service.tracker.terms.depth.outline import RimOutline
-from abs_service.tracker.terms.depth.rim import Rim
-from abs_service.tracker.terms.depth.visibility import classify, surfaces_of
+from abs_service.tracker.terms.depth.classification.visibility import classify, surfaces_of
+from abs_service.tracker.terms.depth.outline.rim import Rim
+from abs_service.tracker.terms.depth.outline.rim_outline import RimOutline
 from calib.camera import Camera
 from tests.abs_service.tracker.scenes import as_surface, flat, sheet, sparse
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from abs_service.tracker.synthesis.window import WHOLE
-from abs_service.tracker.terms.depth.beyond_view import BeyondView, beyond
+from abs_service.tracker.terms.depth.classification.beyond_view import BeyondView, beyond
 
 HEIGHT, WIDTH = 120, 160
 ROWS, COLUMNS = np.indices((HEIGHT, WIDTH))

@@ -5,11 +5,11 @@ import pytest
 
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.synthesis.window import WHOLE
-from abs_service.tracker.terms.depth.classifier import Classifier
-from abs_service.tracker.terms.depth.first_rim import classified_rim
-from abs_service.tracker.terms.depth.interruption import interruptions
-from abs_service.tracker.terms.depth.rim_classes import RimClass
-from abs_service.tracker.terms.depth.visibility import surfaces_of
+from abs_service.tracker.terms.depth.classification.classifier import Classifier
+from abs_service.tracker.terms.depth.classification.interruption import interruptions
+from abs_service.tracker.terms.depth.classification.visibility import surfaces_of
+from abs_service.tracker.terms.depth.outline.first_rim import classified_rim
+from abs_service.tracker.terms.depth.outline.rim_classes import RimClass
 from tests.abs_service.tracker.terms.depth.outline_scene import BESIDE_M, CAMERA, MESH, moved, picture
 
 RAYS = CAMERA.unproject(np.ones((CAMERA.height, CAMERA.width)))

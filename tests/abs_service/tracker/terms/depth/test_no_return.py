@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 
 from abs_service.tracker.synthesis import dense
 from abs_service.tracker.terms.base import Bounds
-from abs_service.tracker.terms.depth.background import AREA_PX, dropouts
+from abs_service.tracker.terms.depth.classification.background import AREA_PX, dropouts
+from abs_service.tracker.terms.depth.classification.outline_distance import inwards
+from abs_service.tracker.terms.depth.classification.visibility import classify, surfaces_of
 from abs_service.tracker.terms.depth.depth import DepthTerm
-from abs_service.tracker.terms.depth.outline_distance import inwards
-from abs_service.tracker.terms.depth.visibility import classify, surfaces_of
 from calib.camera import Camera
 from calib.no_return import NEVER, NoReturn
 from calib.noise.constant import Constant

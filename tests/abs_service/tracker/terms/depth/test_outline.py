@@ -15,10 +15,10 @@ from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.objectives import likelihood
 from abs_service.tracker.synthesis.projection import optics
 from abs_service.tracker.terms.base import Bounds
-from abs_service.tracker.terms.depth.outline_distance import inwards, outvoted
-from abs_service.tracker.terms.depth.rim import Rim, look_up, read
-from abs_service.tracker.terms.depth.rim_cost import FARTHEST, rim_cost
-from abs_service.tracker.terms.depth.visibility import classify, surfaces_of
+from abs_service.tracker.terms.depth.classification.outline_distance import inwards, outvoted
+from abs_service.tracker.terms.depth.classification.visibility import classify, surfaces_of
+from abs_service.tracker.terms.depth.outline.rim import Rim, look_up, read
+from abs_service.tracker.terms.depth.outline.rim_cost import FARTHEST, rim_cost
 from calib.lenses.fisheye import KannalaBrandt
 from calib.lenses.lens import Lens
 from calib.noise.constant import Constant

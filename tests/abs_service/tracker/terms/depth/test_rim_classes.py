@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from abs_service.tracker.mesh import Mesh
-from abs_service.tracker.terms.depth.rim import Rim
-from abs_service.tracker.terms.depth.rim_classes import RimClass
-from abs_service.tracker.terms.depth.rim_cost import FARTHEST
-from abs_service.tracker.terms.depth.rim_motion import displacement
-from abs_service.tracker.terms.depth.visibility import classify, surfaces_of
+from abs_service.tracker.terms.depth.classification.visibility import classify, surfaces_of
+from abs_service.tracker.terms.depth.outline.rim import Rim
+from abs_service.tracker.terms.depth.outline.rim_classes import RimClass
+from abs_service.tracker.terms.depth.outline.rim_cost import FARTHEST
+from abs_service.tracker.terms.depth.outline.rim_motion import displacement
 from tests.abs_service.tracker.scenes import flat, sheet, sparse
 from tests.abs_service.tracker.terms.depth.outline_scene import CAMERA, MESH, look, moved, outline, picture
 

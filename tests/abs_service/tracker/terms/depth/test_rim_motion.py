@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from abs_service.tracker.terms.depth.rim_motion import motion
+from abs_service.tracker.terms.depth.outline.rim_motion import motion
 
 ALONG = np.linspace(-30, 30, 15)
 #: Edges of a square of 60 pixels: places and directions out of it, right, down, left and up.

@@ -12,9 +12,9 @@ from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.synthesis.rasterization.raster import Raster
 from abs_service.tracker.synthesis.window import WHOLE
 from abs_service.tracker.terms.base import Bounds
-from abs_service.tracker.terms.depth.background import MIN_PIXELS, Background
+from abs_service.tracker.terms.depth.classification.background import MIN_PIXELS, Background
+from abs_service.tracker.terms.depth.classification.visibility import classify, surfaces_of, where
 from abs_service.tracker.terms.depth.depth import FREE_SCALE_M, DepthTerm
-from abs_service.tracker.terms.depth.visibility import classify, surfaces_of, where
 from abs_service.tracker.terms.photometric.color import ColorTerm
 from abs_service.tracker.terms.photometric.shadow import Shadow
 from calib import pose

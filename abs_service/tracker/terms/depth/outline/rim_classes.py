@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.models.base import Surface
-from abs_service.tracker.terms.depth.rim import Rim
+from abs_service.tracker.terms.depth.outline.rim import Rim
 from calib.camera import Camera
 
 #: The object continues beyond the outermost vertices by no more than so many times their distance from the next ones.

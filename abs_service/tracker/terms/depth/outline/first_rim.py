@@ -7,9 +7,9 @@ from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.synthesis.rasterization.raster import Raster
 from abs_service.tracker.synthesis.window import WHOLE
-from abs_service.tracker.terms.depth.classifier import Classifier
-from abs_service.tracker.terms.depth.outline import RimOutline
-from abs_service.tracker.terms.depth.rim import Rim
+from abs_service.tracker.terms.depth.classification.classifier import Classifier
+from abs_service.tracker.terms.depth.outline.rim import Rim
+from abs_service.tracker.terms.depth.outline.rim_outline import RimOutline
 from calib.camera import Camera
 
 

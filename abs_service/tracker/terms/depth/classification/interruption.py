@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.detection.segments.depth_segments import Surfaces
-from abs_service.tracker.terms.depth.background import dropouts
-from abs_service.tracker.terms.depth.outline_distance import around
-from abs_service.tracker.terms.depth.visibility import AGREEMENT_M, MIN_PIXELS
+from abs_service.tracker.terms.depth.classification.background import dropouts
+from abs_service.tracker.terms.depth.classification.outline_distance import around
+from abs_service.tracker.terms.depth.classification.visibility import AGREEMENT_M, MIN_PIXELS
 from calib.jit import kernel
 
 #: They are no wider than this share of the mesh's side, if it were square: beyond more of them may be anything.

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.detection.segments.depth_segments import Surfaces, connected_surfaces
-from abs_service.tracker.terms.depth.background import DEEPEST_M
+from abs_service.tracker.terms.depth.classification.background import DEEPEST_M
 from calib.jit import kernel
 
 #: Measurements this near to the predicted distance show the object; it may have moved by as much since [m].

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.terms.depth.rim import by_side
+from abs_service.tracker.terms.depth.outline.rim import by_side
 
 #: Edges that face one side of the image are judged together if there are so many of them.
 LEAST_OF_A_SIDE = 8

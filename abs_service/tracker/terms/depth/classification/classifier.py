@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.pairing.images import Window
-from abs_service.tracker.terms.depth.background import Background, dropouts
-from abs_service.tracker.terms.depth.beyond_view import BeyondView
-from abs_service.tracker.terms.depth.interruption import interruptions
-from abs_service.tracker.terms.depth.visibility import Visibility, classify, surfaces_of
+from abs_service.tracker.terms.depth.classification.background import Background, dropouts
+from abs_service.tracker.terms.depth.classification.beyond_view import BeyondView
+from abs_service.tracker.terms.depth.classification.interruption import interruptions
+from abs_service.tracker.terms.depth.classification.visibility import Visibility, classify, surfaces_of
 
 
 class Classifier:

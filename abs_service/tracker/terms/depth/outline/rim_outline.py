@@ -17,12 +17,12 @@ from abs_service.tracker.synthesis.perspective import project_with_jacobian
 from abs_service.tracker.synthesis.projection import Projection
 from abs_service.tracker.synthesis.window import WHOLE, corner
 from abs_service.tracker.terms.base import RimFit
-from abs_service.tracker.terms.depth.outline_distance import inwards
-from abs_service.tracker.terms.depth.rim import Rim, chain, locate, read, shared_by_side
-from abs_service.tracker.terms.depth.rim_classes import LARGEST_GAP_STEPS, RimClass, classify_rim
-from abs_service.tracker.terms.depth.rim_cost import FARTHEST, rim_cost
-from abs_service.tracker.terms.depth.rim_motion import displacement, motion
-from abs_service.tracker.terms.depth.visibility import Visibility
+from abs_service.tracker.terms.depth.classification.outline_distance import inwards
+from abs_service.tracker.terms.depth.classification.visibility import Visibility
+from abs_service.tracker.terms.depth.outline.rim import Rim, chain, locate, read, shared_by_side
+from abs_service.tracker.terms.depth.outline.rim_classes import LARGEST_GAP_STEPS, RimClass, classify_rim
+from abs_service.tracker.terms.depth.outline.rim_cost import FARTHEST, rim_cost
+from abs_service.tracker.terms.depth.outline.rim_motion import displacement, motion
 from abs_service.tracker.terms.linearization import Linearization
 from calib.camera import Camera
 

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 from abs_service.pairing.images import Window
 from abs_service.tracker.synthesis.window import WHOLE
-from abs_service.tracker.terms.depth.visibility import Visibility
+from abs_service.tracker.terms.depth.classification.visibility import Visibility
 from calib.jit import kernel
 
 
