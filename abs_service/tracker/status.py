@@ -106,7 +106,7 @@ def _seen(fits: Sequence[SensorFit], lost: bool, limits: Settings) -> Iterator[s
 
 def _contradicted(fits: Sequence[SensorFit]) -> Iterator[str]:
     """Reasons by sensors of distances most of which contradict the others: colours that agree do not outvote them."""
-    for fit in (fit for fit in fits if fit.is_surprised or np.isfinite(fit.remainder.share)):
+    for fit in (fit for fit in fits if fit.is_surprised or np.isfinite(fit.remainder.at_first)):
         judged = fit.counts.agreeing + fit.counts.disagreeing
         if judged >= MIN_JUDGED and fit.counts.agreeing < judged / 2:
             yield f"only {fit.counts.agreeing / judged:.0%} of the distances of {fit.sensor} agree – {_FOLLOW}"

@@ -176,6 +176,8 @@ def test_colors_that_agree_do_not_outvote_distances_that_do_not():
     assert judge([depth("tof", 151, 149), colors], (), SHAPE, 0.0, SETTINGS) == (Status.TRACKING, ())
     status, reasons = judge([depth("tof", 115, 185), colors], (), SHAPE, 0.0, SETTINGS)
     assert (status, facts(reasons)) == (Status.DEGRADED, ("only 38% of the distances of tof agree",))
+    beside = depth("tof", 0, 44, float("nan"))
+    assert judge([beside, colors], (), SHAPE, 0.0, SETTINGS)[0] == Status.DEGRADED, "none of the object is on the mesh"
     assert judge([depth("tof", 5, 14), colors], (), SHAPE, 0.0, SETTINGS)[0] == Status.TRACKING, "too few say nothing"
     dark = replace(colors, counts=VertexCounts(facing=10_000, agreeing=4_000, disagreeing=6_000))
     assert judge([depth("tof", 300, 0), dark], (), SHAPE, 0.0, SETTINGS)[0] == Status.TRACKING, "a lamp went out"
