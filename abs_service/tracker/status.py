@@ -116,6 +116,16 @@ def _contradicted(fits: Sequence[SensorFit]) -> Iterator[str]:
 _FOLLOW = "take away what touches the object, move it more slowly, or give the model more control points"
 _FIND = "bring the object back into sight; it is looked for again, at once by abs-service reinitialize"
 
+#: What may have happened where the free edges lie off the outline, and what to do.
+_SLID = (
+    "the mesh has slid or turned on it – it is made anew if that lasts; a print that a colour camera sees would hold it"
+)
+_GOES_ON = (
+    "nearly all of these end inside it, as where a side comes into sight that the first image did not show, where "
+    "something lies against it, or where the mesh has shrunk or slid – take away what lies against it; a new mesh "
+    "is made if that lasts"
+)
+
 #: Why a vertex is not seen to agree, and what to do.
 _ABSENT = {
     "disagreeing": f"disagree – {_FOLLOW}",
@@ -130,8 +140,8 @@ def _placed(fits: Sequence[SensorFit], shape: ShapeQuality, innovation: float, l
     if is_misplaced(fits, shape, limits):
         yield (
             f"{rim_share(fits):.0%} of the free edges lie off the object's outline, by "
-            f"{rim_distance(fits) * 1e3:.0f} mm together or across a slide: the mesh has slid or turned on it – "
-            "it is made anew if that lasts; a print that a colour camera sees would hold it"
+            f"{rim_distance(fits) * 1e3:.0f} mm together or across a slide: "
+            + (_SLID if _hangs_over(fits) else _GOES_ON)
         )
     if any(fit.is_surprised for fit in fits) and not any(np.isfinite(fit.remainder.share) for fit in fits):
         yield (
@@ -197,6 +207,11 @@ def rim_share(fits: Sequence[SensorFit]) -> float:
 def rim_distance(fits: Sequence[SensorFit]) -> float:
     """Distance [m] of the visible free edges from the outline, see `RimFit.off_m`; the smallest of the sensors."""
     return min((rim.off_m for rim in _rims(fits)), default=0.0)
+
+
+def _hangs_over(fits: Sequence[SensorFit]) -> bool:
+    """True if a mesh off its outline hangs over it: one that slides does so on the side that it slides to."""
+    return any(4 * rim.outside >= rim.inside for rim in _rims(fits))
 
 
 def _rims(fits: Sequence[SensorFit]) -> list[RimFit]:

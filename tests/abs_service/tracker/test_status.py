@@ -123,6 +123,9 @@ def test_a_mesh_off_its_outline_is_degraded():
     status, reasons = judge([on_the_rim(visible=60, outside=15, inside=9)], (), SHAPE, 0.0, SETTINGS)
     assert (status, len(reasons)) == (Status.DEGRADED, 1)
     assert reasons[0].startswith("40% of the free edges lie off the object's outline")
+    assert "slid or turned" in reasons[0]
+    (reason,) = judge([on_the_rim(visible=60, outside=2, inside=22)], (), SHAPE, 0.0, SETTINGS)[1]
+    assert "nearly all of these end inside it" in reason, "the top of a box that is seen from above now"
     few = [on_the_rim(visible=4, outside=4), fit(1.0)]
     assert judge(few, (), SHAPE, 0.0, SETTINGS)[0] == Status.TRACKING
 
