@@ -113,7 +113,9 @@ def _contradicted(fits: Sequence[SensorFit]) -> Iterator[str]:
 
 
 #: What to do if the mesh does not agree.
-_FOLLOW = "take away what touches the object, move it more slowly, or give the model more control points"
+_FOLLOW = (
+    "take away what touches the object, move it more slowly, give the model more control points, or measure the noise"
+)
 _FIND = "bring the object back into sight; it is looked for again, at once by abs-service reinitialize"
 
 #: What may have happened where the free edges lie off the outline, and what to do.

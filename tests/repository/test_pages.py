@@ -50,14 +50,15 @@ def test_troubleshooting_has_every_reason_of_a_status():
     doubtful = replace(nothing_right, inliers=50)
     out_of_sight = replace(nothing_right, inliers=100, occluded=50)
     surprised = replace(nothing_right, remainder=Remainder(), is_surprised=True)
+    within = replace(nothing_right, rim=RimFit(20, 0, 20))
     bad = ShapeQuality(folded_share=0.5, deviation_m=1.0, single_frame_deviation_m=1.0)
     found = [
         status.judge([fit], ["color"], bad, 9.9, status.Settings())[1]
-        for fit in (nothing_right, doubtful, out_of_sight, surprised)
+        for fit in (nothing_right, doubtful, out_of_sight, surprised, within)
     ]
-    assert [len(reasons) for reasons in found] == [8, 8, 8, 8]
+    assert [len(reasons) for reasons in found] == [8, 8, 8, 8, 8]
     reasons = {reason for of in found for reason in of}
-    assert len(reasons) == 12
+    assert len(reasons) == 13
     page = _without_numbers(TROUBLESHOOTING)
     assert [reason for reason in reasons if _without_numbers(reason.partition(" so far")[0]) not in page] == []
 
