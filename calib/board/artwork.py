@@ -31,7 +31,7 @@ def artwork(target: Target) -> Artwork:
     if isinstance(target, Chessboard):
         return Artwork(_black_squares(target.columns + 1, target.rows + 1, target.square), np.zeros((0, 3)))
     if isinstance(target, Charuco):
-        squares = _black_squares(target.columns, target.rows, target.square)
+        squares = _squares(target.columns, target.rows, target.square, odd=int(not target.is_first_black))
         return Artwork(np.concatenate([squares, _markers(target)]), np.zeros((0, 3)))
     if isinstance(target, AprilGrid):
         return Artwork(target.black_rectangles(), np.zeros((0, 3)))
@@ -57,7 +57,7 @@ def _markers(target: Charuco) -> NDArray[np.float64]:
     dictionary = target.markers()
     cells = dictionary.markerSize + 2 * _FRAME
     cell = target.marker / cells
-    white = _squares(target.columns, target.rows, target.square, odd=1)
+    white = _squares(target.columns, target.rows, target.square, odd=int(target.is_first_black))
     found = []
     for number, (left, top, edge, _) in enumerate(white):
         black = cv2.aruco.generateImageMarker(dictionary, number, cells) < 128

@@ -73,6 +73,7 @@ class Charuco:
         columns, rows: squares along x and y; there is one corner less each way.
         square, marker: edge lengths of a square and of a marker [m].
         dictionary: OpenCV's marker dictionary.
+        legacy: as OpenCV printed it before 4.6: with an even number of rows, the upper left square is white.
     """
 
     columns: int
@@ -80,6 +81,7 @@ class Charuco:
     square: float
     marker: float
     dictionary: Dictionary = "5x5_250"
+    legacy: bool = False
 
     def __post_init__(self) -> None:
         check_counts(self.columns, self.rows, 3)
@@ -107,6 +109,11 @@ class Charuco:
     def margin(self) -> float:
         """Extent of the print beyond the outer points [m]."""
         return self.square
+
+    @property
+    def is_first_black(self) -> bool:
+        """True if the upper left square is black and without a marker."""
+        return not (self.legacy and self.rows % 2 == 0)
 
     def points(self) -> Points:
         """Corners row by row (n, 3) [m]; the row index is OpenCV's corner id."""

@@ -1,7 +1,7 @@
 """Board description in TOML: `kind = "charuco"`, counts, lengths in metres, or in millimetres as `square_mm`."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, fields
+from dataclasses import MISSING, asdict, fields
 from pathlib import Path
 from typing import Any
 
@@ -68,7 +68,7 @@ def from_table(table: Mapping[str, Any], path: str) -> Target:
         checked = _checked(path, key, name, value)
         values[name] = 1e-3 * checked if in_mm else checked
     for field in fields(Kind):
-        if field.name not in values and field.name != "dictionary":
+        if field.name not in values and field.default is MISSING:
             shown = f"{field.name}_mm" if field.name in _LENGTHS else field.name
             raise _error(path, Problem((shown,), f"missing, but a {kind} needs it"))
     try:
@@ -80,12 +80,12 @@ def from_table(table: Mapping[str, Any], path: str) -> Target:
 
 
 def to_table(target: Target) -> dict[str, Any]:
-    """TOML table of a board, the inverse of `from_table`, with lengths in millimetres."""
+    """TOML table of a board, the inverse of `from_table`, with lengths in millimetres and without `legacy = false`."""
     kind = next(name for name, Kind in KINDS.items() if type(target) is Kind)
     shown = {
         f"{k}_mm" if k in _LENGTHS else k: round(1e3 * v, 6) if k in _LENGTHS else v for k, v in asdict(target).items()
     }
-    return {"kind": kind, **shown}
+    return {"kind": kind, **{key: value for key, value in shown.items() if value is not False}}
 
 
 def write(target: Target, path: Path) -> None:
@@ -102,7 +102,7 @@ def write(target: Target, path: Path) -> None:
 
 _EXAMPLES: Mapping[str, Target] = {
     "chessboard": Chessboard(9, 6, 0.025),
-    "charuco": Charuco(9, 6, 0.03, 0.022),
+    "charuco": Charuco(9, 6, 0.03, 0.022, legacy=True),
     "circles": Circles(7, 5, 0.03, 0.015),
     "asymmetric_circles": AsymmetricCircles(4, 11, 0.02, 0.015),
     "april_grid": AprilGrid(6, 6, 0.088, 0.0264),
@@ -124,6 +124,10 @@ def _checked(path: str, key: str, name: str, value: Any) -> Any:
         if isinstance(value, int | float) and not isinstance(value, bool):
             return value
         raise _error(path, Problem((key,), "must be a number", value))
+    if name == "legacy":
+        if isinstance(value, bool):
+            return value
+        raise _error(path, Problem((key,), "must be true or false", value))
     if isinstance(value, int) and not isinstance(value, bool):
         return value
     raise _error(path, Problem((key,), "must be a whole number", value))

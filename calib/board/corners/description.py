@@ -36,6 +36,15 @@ _APRIL_GRID = "apriltag_36h11"
 #: Dictionaries with so many markers that a search for others than the described one leaves them out.
 _SLOW = re.compile("_1000|36h10")
 
+#: Said of a board whose upper left square is of the other colour, by whether that is black.
+_OTHER_PATTERN = {
+    True: "shows a ChArUco whose upper left square is black; leave legacy out of its description",
+    False: (
+        "shows a ChArUco whose upper left square is white, as OpenCV before 4.6 printed it with an even number of "
+        "rows; set legacy = true in its description"
+    ),
+}
+
 
 @dataclass(frozen=True)
 class _Markers:
@@ -134,11 +143,8 @@ def _misplaced(target: Charuco | AprilGrid, seen: _Markers) -> str:
     columns, is_first_black = _layout(target, seen)
     if not columns:
         return ids if largest >= count else ""
-    if not is_first_black:
-        return (
-            "shows a ChArUco whose upper left square is white, as in the pattern of OpenCV before 4.6 (legacy) with an "
-            "even number of rows; print one with a black square there: abs-service calibrate target charuco"
-        )
+    if is_first_black != _is_first_black(target):
+        return _OTHER_PATTERN[is_first_black]
     if columns == target.columns:
         return ids if largest >= count else ""
     if columns == target.rows and largest < count:
@@ -148,6 +154,7 @@ def _misplaced(target: Charuco | AprilGrid, seen: _Markers) -> str:
 
 def _layout(target: Charuco | AprilGrid, seen: _Markers) -> tuple[int, bool]:
     """Number of columns, and whether the upper left square is black; 0 columns if the markers do not tell."""
+    own = target.columns, _is_first_black(target)
     if len(seen.ids) < LEAST_PLACED:
         return 0, True
     colors = (True, False) if isinstance(target, Charuco) else (True,)
@@ -156,11 +163,15 @@ def _layout(target: Charuco | AprilGrid, seen: _Markers) -> tuple[int, bool]:
         for columns in range(2, _MAX_COLUMNS + 1)
         for black in colors
     }
-    given = tried.get((target.columns, True), np.inf)
+    given = tried.get(own, np.inf)
     best = min(tried, key=lambda key: tried[key])
     if given < _OFF or tried[best] > _OFF or given < _CLEARLY * tried[best]:
-        return (target.columns, True) if given < _OFF else (0, True)
+        return own if given < _OFF else (0, True)
     return best
+
+
+def _is_first_black(target: Charuco | AprilGrid) -> bool:
+    return target.is_first_black if isinstance(target, Charuco) else True
 
 
 def _places(target: Charuco | AprilGrid, ids: NDArray[np.intp], columns: int, black: bool) -> NDArray[np.float64]:

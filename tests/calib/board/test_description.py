@@ -1,5 +1,7 @@
 """Boards with markers that are not as described are named, and boards that are as described are not."""
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -44,10 +46,16 @@ def test_the_pattern_of_an_older_opencv_is_named(columns: int, rows: int) -> Non
     board = Charuco(columns, rows, 0.03, 0.022, "4x4_50")
     printed = cv2.aruco.CharucoBoard((columns, rows), board.square, board.marker, board.markers())
     printed.setLegacyPattern(True)
+    older = replace(board, legacy=True)
     size = (60 * columns, 60 * rows)
-    assert "upper left square is white" in mismatch(board, grey(printed.generateImage(size, marginSize=20)))
+    image = grey(printed.generateImage(size, marginSize=20))
+    assert mismatch(board, image).endswith("set legacy = true in its description")
+    assert mismatch(older, image) == ""
+    assert len(detect(older, image).ids) == len(board.points())
     printed.setLegacyPattern(False)
-    assert mismatch(board, grey(printed.generateImage(size, marginSize=20))) == ""
+    image = grey(printed.generateImage(size, marginSize=20))
+    assert mismatch(board, image) == ""
+    assert mismatch(older, image).endswith("leave legacy out of its description")
 
 
 def test_an_image_without_markers_says_nothing() -> None:

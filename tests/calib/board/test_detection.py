@@ -19,6 +19,7 @@ TARGETS = [
     Chessboard(7, 7, 0.03),
     CHARUCO,
     Charuco(8, 8, 0.03, 0.022, "5x5_250"),
+    Charuco(8, 6, 0.03, 0.022, "4x4_50", legacy=True),
     Circles(7, 5, 0.04, 0.02),
     Circles(6, 6, 0.04, 0.02),
     AsymmetricCircles(4, 9, 0.025, 0.02),

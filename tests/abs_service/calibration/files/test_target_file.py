@@ -22,6 +22,7 @@ dictionary = "5x5_250"
     [
         Chessboard(9, 6, 0.025),
         Charuco(14, 9, 0.04, 0.03, "5x5_250"),
+        Charuco(9, 6, 0.04, 0.03, "5x5_250", legacy=True),
         Circles(10, 10, 0.0254, 0.0127),
         AsymmetricCircles(4, 11, 0.02, 0.015),
     ],
@@ -32,6 +33,7 @@ def test_what_is_written_is_read_back(target: Target, tmp_path: Path) -> None:
     assert "_mm = " in path.read_text(encoding="utf-8")
     read = target_file.read(path)
     assert type(read) is type(target)
+    assert getattr(read, "legacy", False) == getattr(target, "legacy", False)
     assert read.points() == pytest.approx(target.points(), abs=1e-9)
 
 
@@ -55,6 +57,7 @@ def test_lengths_are_metres_or_millimetres(tmp_path: Path) -> None:
         ("marker = 0.022", "marker = 0.05", ["marker = 0.05", "less than the square of 0.03 m"]),
         ('"5x5_250"', '"5x5_251"', ['dictionary = "5x5_251"', "4x4_50"]),
         ("columns = 9", "columns = 90", ["dictionary", "250 markers, this board needs 270"]),
+        ("rows = 6", "rows = 6\nlegacy = 1", ["legacy = 1", "true or false"]),
         ("rows = 6", "row = 6", ["row = 6", 'did you mean "rows"?']),
         ("rows = 6", "rows = ", ["is not TOML"]),
     ],
