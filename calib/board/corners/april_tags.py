@@ -8,8 +8,8 @@ from calib.board.april_grid import BORDER, TAGS, AprilGrid
 from calib.board.corners.to_8bit import Grey
 
 #: Factors by which the image is enlarged, and widths by which white grows, of every attempt. Black squares touch the
-#: tags, which hides their outlines: each of these separates some that the others do not.
-_ATTEMPTS = ((2, 1), (2, 2), (1, 1))
+#: tags, which hides their outlines or cuts corners off: each of these separates some that the others do not.
+_ATTEMPTS = ((2, 1), (2, 2), (1, 1), (1, 2))
 
 #: Half width of the area in which a corner is looked for, relative to the tag; OpenCV's outlines cut corners off.
 _AROUND = 0.12
@@ -17,20 +17,15 @@ _CRITERIA = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 30, 0.01)
 
 
 def find_april_grid(target: AprilGrid, levels: Grey) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-    """Indices (n,) and pixels (n, 2) of the corners of all tags that some attempt detects."""
-    tags: dict[int, NDArray[np.float64]] = {}
+    """Indices (n,) and pixels (n, 2) of the corners of tags, each from the first attempt that comes close to it."""
+    pixels = np.full((len(target.points()), 2), np.nan)
     for enlarged, grown in _ATTEMPTS:
         for number, corners in _tags(levels, enlarged, grown).items():
             if number < target.columns * target.rows:
-                tags.setdefault(number, corners)
-    if not tags:
-        return np.zeros(0, np.intp), np.zeros((0, 2))
-    ids = np.concatenate([target.ids_of_tag(number) for number in tags])
-    pixels = np.concatenate([_at_the_corners(levels, corners) for corners in tags.values()])
-    there = np.isfinite(pixels).all(axis=1)
-    ids, pixels = ids[there], pixels[there]
-    order = np.argsort(ids)
-    return ids[order], pixels[order]
+                ids = target.ids_of_tag(number)
+                pixels[ids] = np.where(np.isnan(pixels[ids]), _at_the_corners(levels, corners), pixels[ids])
+    ids = np.flatnonzero(np.isfinite(pixels).all(axis=1))
+    return ids, pixels[ids]
 
 
 def _tags(levels: Grey, enlarged: int, grown: int) -> dict[int, NDArray[np.float64]]:

@@ -55,6 +55,13 @@ def test_an_april_grid_is_found_in_part_and_where_it_is(rotation) -> None:
     assert 1.0 < found.edge_px < 2.5
 
 
+def test_corners_of_tags_whose_black_has_spread_are_found() -> None:
+    grid = AprilGrid(6, 6, 0.03, 0.009)
+    image = photograph(grid, VGA, centered(grid, (0.2, 0.0, np.pi / 4), 0.42))
+    spread = cv2.GaussianBlur(cv2.erode(as_bytes(image), np.ones((2, 2), np.uint8)), (0, 0), 0.5)
+    assert len(detect(grid, spread).ids) > 0.95 * len(grid.points())  # of 144, it was 65
+
+
 def test_tag_0_of_an_april_grid_is_in_its_lower_left_corner_as_in_kalibr() -> None:
     grid = AprilGrid(6, 5, 0.03, 0.009)
     image = as_bytes(photograph(grid, VGA, centered(grid, (0, 0, 0), 0.5)))
