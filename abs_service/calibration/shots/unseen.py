@@ -41,7 +41,7 @@ def reason(target: Target, seen: BoardObservations, shown: Sequence[Shot]) -> st
     parts = reasons(seen.rejected.values())
     advice = f". {STILLS}" if mostly_moved(seen) else ""
     found = _instead(target, shown)
-    found = f". {found}: correct the description of the board" if found else ""
+    found = f". {found}: correct the description of the board, or the images" if found else ""
     return f"no {_name(target)} in any of {count} images: {parts}{found}{advice}"
 
 

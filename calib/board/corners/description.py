@@ -38,10 +38,10 @@ _SLOW = re.compile("_1000|36h10")
 
 #: Said of a board whose upper left square is of the other colour, by whether that is black.
 _OTHER_PATTERN = {
-    True: "shows a ChArUco whose upper left square is black; leave legacy out of its description",
+    True: "shows a ChArUco whose upper left square is black (without legacy)",
     False: (
         "shows a ChArUco whose upper left square is white, as OpenCV before 4.6 printed it with an even number of "
-        "rows; set legacy = true in its description"
+        "rows (legacy = true)"
     ),
 }
 
@@ -77,6 +77,8 @@ def mismatch(target: Target, levels: Grey) -> str:
     every = [(name, 1) for name in dict.fromkeys(map(_family, DICTIONARIES)) if not _SLOW.search(name)]
     seen = _markers(image, *own)
     if len(seen.ids) < LEAST:
+        if len(_markers(255 - image, *own).ids) >= LEAST:
+            return "shows markers in white on black instead of black on white"
         seen = max((_markers(image, *each) for each in (*every, (_APRIL_GRID, BORDER))), key=lambda each: len(each.ids))
     if len(seen.ids) < LEAST:
         return ""

@@ -49,13 +49,17 @@ def test_the_pattern_of_an_older_opencv_is_named(columns: int, rows: int) -> Non
     older = replace(board, legacy=True)
     size = (60 * columns, 60 * rows)
     image = grey(printed.generateImage(size, marginSize=20))
-    assert mismatch(board, image).endswith("set legacy = true in its description")
+    assert mismatch(board, image).endswith("even number of rows (legacy = true)")
     assert mismatch(older, image) == ""
     assert len(detect(older, image).ids) == len(board.points())
     printed.setLegacyPattern(False)
     image = grey(printed.generateImage(size, marginSize=20))
     assert mismatch(board, image) == ""
-    assert mismatch(older, image).endswith("leave legacy out of its description")
+    assert mismatch(older, image).endswith("is black (without legacy)")
+
+
+def test_black_and_white_exchanged_are_named(grid: np.ndarray) -> None:
+    assert mismatch(GRID, 255 - grid) == "shows markers in white on black instead of black on white"
 
 
 def test_an_image_without_markers_says_nothing() -> None:
