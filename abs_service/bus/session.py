@@ -2,7 +2,6 @@
 
 import json
 import logging
-import os
 import re
 from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
@@ -20,7 +19,6 @@ _log = logging.getLogger(__name__)
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 #: Timeout of a client's connection to its router [ms].
 CONNECT_TIMEOUT_MS = 3000
-SHARED_MEMORY = "/dev/shm"
 #: Largest pool of a process; what it has no room for goes through sockets.
 SHARED_MEMORY_POOL_BYTES = 30 << 20
 #: Pools that have to fit into what is free, so that those of a rig do into the 64 MB that a container has by default.
@@ -38,7 +36,7 @@ _ENDPOINT = re.compile(r"(tcp|tls|quic|udp|ws)/(?P<host>\[[0-9a-fA-F:.]+\]|[^\s:
 
 
 #: Least levels of zenoh's log, which tells of refused clients in warnings.
-LOG_LEVELS = "error,zenoh_link_tls=warn"
+LOG_LEVELS = f"{connection.LOG_LEVELS},zenoh_link_tls=warn"
 
 
 class BusError(Exception):
@@ -124,13 +122,9 @@ def pool_bytes() -> int:
 
     zenoh makes it when it is needed first, and may lose a connection for ever if it cannot.
     """
-    try:
-        status = os.statvfs(SHARED_MEMORY)
-    except OSError:
-        return 0
-    free = 0 if status.f_flag & os.ST_RDONLY else status.f_bavail * status.f_frsize
+    free = connection.free_shared_memory()
     if free < LEAST_SHARED_MEMORY_BYTES:
-        _log.warning("%s has %.0f MB free: images are copied through sockets", SHARED_MEMORY, free * 1e-6)
+        _log.warning("%s has %.0f MB free: images are copied through sockets", connection.SHARED_MEMORY, free * 1e-6)
         return 0
     return min(SHARED_MEMORY_POOL_BYTES, free // SHARED_MEMORY_POOLS)
 

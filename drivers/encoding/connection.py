@@ -1,6 +1,9 @@
-"""Times of a connection to a router, in zenoh's configuration: those of the bus and of a rig elsewhere."""
+"""A connection to a router, in zenoh's configuration: that of the bus and of a rig elsewhere."""
 
+import os
 from collections.abc import Mapping
+
+SHARED_MEMORY = "/dev/shm"
 
 #: A peer without a keep-alive for this long is disconnected [ms].
 LEASE_MS = 2000
@@ -9,3 +12,15 @@ RETRY: Mapping[str, int] = {"period_init_ms": 250, "period_max_ms": 1000}
 #: Longest time of a try [ms]. One that begins while the network is cut would, by default, wait for 10 s: TCP repeats
 #: its question after 1, 3, 7 s and so does not know that the network is back.
 UNICAST: Mapping[str, int] = {"open_timeout": 2000}
+#: Levels of zenoh's log. What is off says of each message that the wall clock of its sender is ahead, as another host's,
+#: or that one's own was set back. Only caches need these times, and zenoh mends those.
+LOG_LEVELS = "error,zenoh::net::routing::dispatcher::pubsub=off"
+
+
+def free_shared_memory() -> int:
+    """Free shared memory [bytes]; 0 where there is none, or none that can be written."""
+    try:
+        status = os.statvfs(SHARED_MEMORY)
+    except OSError:
+        return 0
+    return 0 if status.f_flag & os.ST_RDONLY else status.f_bavail * status.f_frsize

@@ -18,6 +18,9 @@ from drivers.remote.address import Address
 #: Timeout of queries [s].
 ANSWER_S = 3.0
 
+#: Free shared memory without which zenoh does not connect with it [bytes]; what is received needs no room.
+LEAST_SHARED_BYTES = 1 << 20
+
 #: Callback with topic, payload and attachment of a message, from a zenoh thread; must not block.
 OnMessage = Callable[[str, bytes, bytes], None]
 
@@ -101,10 +104,12 @@ def open_link(address: Address, timeout_s: float = ANSWER_S) -> Link:
         "transport": {
             "unicast": {**connection.UNICAST},
             "link": {"tx": {"lease": connection.LEASE_MS}},
-            "shared_memory": {"enabled": address.shared_memory},
+            "shared_memory": {
+                "enabled": address.shared_memory and connection.free_shared_memory() >= LEAST_SHARED_BYTES
+            },
         },
     }
-    zenoh.init_log_from_env_or("error")
+    zenoh.init_log_from_env_or(connection.LOG_LEVELS)
     try:
         return Link(zenoh.open(zenoh.Config.from_json5(json.dumps(settings))))
     except zenoh.ZError as error:

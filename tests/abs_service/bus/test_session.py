@@ -1,6 +1,9 @@
 """Sessions of the bus: endpoints, and errors in opening one that are understood."""
 
+import threading
+
 import pytest
+import zenoh
 
 from abs_service.bus.session import BusError, Role, check_endpoint, open_session
 
@@ -35,3 +38,13 @@ def test_an_unknown_host_is_explained_without_the_source_of_zenoh():
     with pytest.raises(BusError, match="cannot listen there") as error:
         open_session("tcp/no-such-host.invalid:7447", Role.ROUTER)
     assert ".rs" not in str(error.value)
+
+
+def test_a_sender_whose_wall_clock_is_ahead_fills_no_log(endpoint, capfd):
+    with open_session(endpoint, Role.ROUTER) as router, open_session(endpoint, Role.CLIENT) as client:
+        arrived = threading.Event()
+        subscriber = router.declare_subscriber("abs/x/y", lambda _: arrived.set())
+        client.put("abs/x/y", b"", timestamp=zenoh.Timestamp.parse_rfc3339("2099-01-01T00:00:00.000000000Z/33"))
+        assert arrived.wait(5)
+        subscriber.undeclare()
+    assert capfd.readouterr() == ("", "")
