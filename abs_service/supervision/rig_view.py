@@ -53,6 +53,7 @@ class RigView:
         now_ns: CLOCK_MONOTONIC [ns].
         host_clock: which host's clock that is, see `drivers.contract.host_clock`; ages on others are not shown.
         refused: messages that this process did not take, in words.
+        rivals: topics that another process publishes, too, in words.
     """
 
     rig: str
@@ -64,6 +65,7 @@ class RigView:
     now_ns: int
     host_clock: str
     refused: str = ""
+    rivals: str = ""
 
     @property
     def streams(self) -> list[Stream]:
@@ -112,6 +114,7 @@ class RigView:
             if received.health.level >= Health.LEVEL_WARNING and received.health.message and name != "run"
         ]
         found += [("run", Health.LEVEL_WARNING, self.refused)] if self.refused else []
+        found += [("run", Health.LEVEL_ERROR, self.rivals)] if self.rivals else []
         failed = [child for child in self.children if child.state is State.FAILED]
         return found + [(child.component, Health.LEVEL_ERROR, f"given up: {child.reason}") for child in failed]
 

@@ -19,6 +19,7 @@ from abs_service.supervision.supervisor import Supervisor
 from abs_service.tracking.monitors.silence_monitor import SilenceMonitor
 from abs_service.wire import commands
 from abs_service.wire.checked_bus import CheckedBus
+from abs_service.wire.sole_publishers import SolePublishers
 
 #: Messages per topic that may wait to be shown.
 DEPTH = 64
@@ -28,6 +29,9 @@ PERIOD_S = 0.05
 QUERY_PERIOD_S, QUERY_TIMEOUT_S = 1.0, 0.2
 #: Time in which a rig file is read again, at most [s].
 RELOAD_TIMEOUT_S = 30.0
+
+#: Topics that one process of a rig publishes. Several may capture or record, but not the same sensor.
+SOLE = (keys.health("run"), keys.health("track/*"), keys.model("*"))
 
 _LEVELS: Mapping[State, Level] = {
     State.BACKOFF: Level.WARNING,
@@ -77,6 +81,7 @@ class RunSession:
         self._live = rig_state.RigState(trackers, clock.monotonic)
         self._headers = HeaderFactory(rig, clock)
         self._health = Health(bus, "run", self._headers)
+        self._publishers = SolePublishers(bus, SOLE, clock.monotonic)
         self._inbox: LatestQueue[Sample] = LatestQueue(DEPTH)
         for pattern in rig_state.PATTERNS:
             bus.subscribe(pattern, lambda sample: self._inbox.put(sample.topic, sample))
@@ -140,6 +145,7 @@ class RunSession:
             now_ns=self._clock.monotonic(),
             host_clock=self._headers.host_clock,
             refused=self._bus.trouble,
+            rivals=self._publishers.trouble,
         )
 
     def _listen(self, seconds: float) -> None:
@@ -198,6 +204,8 @@ class RunSession:
         self._health.count_up_to({"malformed": self._live.malformed, "not_shown": sum(self._inbox.dropped.values())})
         if self._health.due():
             self._bus.report(self._health)
+            rivals = self._publishers.trouble
+            self._health.report("publishers", Level.ERROR if rivals else Level.OK, rivals)
         self._health.tick()
 
 

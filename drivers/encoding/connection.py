@@ -12,7 +12,7 @@ RETRY: Mapping[str, int] = {"period_init_ms": 250, "period_max_ms": 1000}
 #: Longest time of a try [ms]. One that begins while the network is cut would, by default, wait for 10 s: TCP repeats
 #: its question after 1, 3, 7 s and so does not know that the network is back.
 UNICAST: Mapping[str, int] = {"open_timeout": 2000}
-#: Levels of zenoh's log. What is off says of each message that the wall clock of its sender is ahead, as another host's,
+#: Levels of zenoh's log. What is off says of each message that its sender's wall clock is ahead, as another host's is,
 #: or that one's own was set back. Only caches need these times, and zenoh mends those.
 LOG_LEVELS = "error,zenoh::net::routing::dispatcher::pubsub=off"
 
