@@ -42,8 +42,7 @@ def ask(endpoint: str, rig: str = "*", security: NoSecurity | MutualTls = NO_SEC
         for reply in session.liveliness().get(keys.key(rig, keys.live("**")), timeout=PATIENCE_S):
             if reply.ok is not None:
                 name, component = _rig_and_component(reply.ok)
-                # `run` itself has no token: without it there is no bus.
-                health.setdefault(name, {"run": None})[component] = None
+                health.setdefault(name, {})[component] = None
         while time.monotonic() < deadline_s and not _complete(health):
             while (sample := subscriber.try_recv()) is not None:
                 _take(sample, health)

@@ -81,6 +81,7 @@ class RunSession:
         self._live = rig_state.RigState(trackers, clock.monotonic)
         self._headers = HeaderFactory(rig, clock)
         self._health = Health(bus, "run", self._headers)
+        bus.declare_liveliness("run")
         self._publishers = SolePublishers(bus, SOLE, clock.monotonic)
         self._inbox: LatestQueue[Sample] = LatestQueue(DEPTH)
         for pattern in rig_state.PATTERNS:

@@ -99,7 +99,7 @@ class Rig:
         raise NothingReceivedError(f"nobody tells the calibration of sensor {sensor!r}")
 
     def processes(self) -> tuple[str, ...]:
-        """The processes of the rig that live: `capture`, `record`, `track/<tracker>`."""
+        """The processes of the rig that live: `run`, `capture`, `record`, `track/<tracker>`."""
         prefix = self._link.key("live/")
         return tuple(sorted(key.removeprefix(prefix) for key in self._link.tokens("live/**")))
 

@@ -19,8 +19,7 @@ def rig(open_bus):
     headers = HeaderFactory("demo", WallClock())
     components = {name: Health(bus, name, headers) for name in ("run", "capture", "track/sheet", "record")}
     for name in components:
-        if name != "run":
-            bus.declare_liveliness(name)
+        bus.declare_liveliness(name)
 
     def publish():
         while not ended.wait(0.05):
@@ -70,6 +69,13 @@ def test_a_part_that_runs_and_says_nothing_is_an_error(rig, endpoint, capsys):
     code, said = status(endpoint, capsys)
     assert code == 1
     assert "track/sheet  silent   runs, but sent no health for 1.5 s" in said.out
+
+
+def test_a_bus_that_capture_hosts_lacks_no_run(open_bus, endpoint, capsys):
+    bus = open_bus()
+    bus.declare_liveliness("capture")
+    code, said = status(endpoint, capsys)
+    assert (code, said.out) == (1, "demo  capture  silent   runs, but sent no health for 1.5 s\n")
 
 
 def test_scripts_get_counters_too(rig, endpoint, capsys):
