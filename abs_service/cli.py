@@ -87,6 +87,8 @@ def program() -> None:
     except standard_files.StartError as error:
         print(f"abs-service: error: {error}", file=sys.stderr)
         code = Exit.USER
+    except KeyboardInterrupt:  # while it imports
+        code = Exit.INTERRUPTED
     except Exception as error:
         if lack := lack_of_host(error):
             print(f"abs-service: error: {lack}", file=sys.stderr)

@@ -40,7 +40,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     what.add_argument("--watch", action="store_true", help="follow who comes and goes")
     what.add_argument("--udev", action="store_true", help="print the udev rules")
     parser.add_argument("--json", action="store_true", help="print JSON")
-    parser.add_argument("--timeout", metavar="S", type=float, default=2.0, help="time to look for devices (default: 2)")
+    parser.add_argument(
+        "--timeout", metavar="S", type=rig_process.seconds, default=2.0, help="time to look for devices (default: 2)"
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -48,7 +48,10 @@ class ChildError(Exception):
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the arguments of `abs-service run`."""
     rig_process.add_config(parser)
-    parser.add_argument("--duration", metavar="S", type=float, default=float("inf"), help="end after this many seconds")
+    forever = rig_process.LONGEST_S
+    parser.add_argument(
+        "--duration", metavar="S", type=rig_process.seconds, default=forever, help="end after this many seconds"
+    )
     parser.add_argument("--no-record", action="store_true", help="keep nothing on disk")
     parser.add_argument("--out", metavar="DIR", type=Path, help="folder of the recordings instead of record.directory")
     parser.add_argument("--rig", metavar="NAME", help="name on the wire instead of the configuration's")

@@ -22,10 +22,27 @@ from abs_service.wire.checked_bus import CheckedBus
 
 #: Least time between two calls by SIGHUP [s].
 HANGUP_PERIOD_S = 1.0
+#: What longer times are taken for, which the interpreter could not wait for [s]: thirty years.
+LONGEST_S = 1e9
 
 
 class SecurityError(Exception):
     """A file of `[bus.tls]` that cannot be used; the message names the rig file, key, value and error."""
+
+
+def seconds(text: str) -> float:
+    """Reads a time from 0 to `LONGEST_S` [s]; the type of an argument.
+
+    Raises:
+        argparse.ArgumentTypeError: it is none.
+    """
+    try:
+        value = float(text)
+    except ValueError:
+        value = -1.0
+    if not value >= 0:
+        raise argparse.ArgumentTypeError(f"{text!r} must be a number of seconds, 0 or more")
+    return min(value, LONGEST_S)
 
 
 def add_config(parser: argparse.ArgumentParser, what: str = "TOML file of the rig") -> None:

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
@@ -37,6 +38,23 @@ def test_1_for_what_did_not_happen(endpoint, monkeypatch):
 
 def test_2_for_what_has_to_be_changed(tmp_path):
     assert cli.main(["check", str(tmp_path / "none.toml")]) == Exit.USER
+
+
+@pytest.mark.parametrize("command", [("run", "--duration"), ("devices", "--timeout")])
+@pytest.mark.parametrize("text", ["nan", "-1", "soon"])
+def test_2_for_a_time_that_is_none(command, text, capsys):
+    with pytest.raises(SystemExit) as ended:
+        cli.main([*command, text])
+    assert ended.value.code == Exit.USER
+    assert f"{command[1]}: {text!r} must be a number of seconds, 0 or more" in capsys.readouterr().err
+
+
+def test_130_for_ctrl_c_while_a_command_is_imported(monkeypatch, capsys):
+    monkeypatch.setattr(cli, "import_module", Mock(side_effect=KeyboardInterrupt))
+    monkeypatch.setattr(cli.threading, "enumerate", list)
+    with pytest.raises(SystemExit) as ended:
+        cli.program()
+    assert (ended.value.code, capsys.readouterr().err) == (Exit.INTERRUPTED, "")
 
 
 def test_130_for_ctrl_c(monkeypatch):
