@@ -122,6 +122,24 @@ def _cross_validation(found: Assessment) -> Section:
     )
 
 
+def cameras(solution: Solution) -> Iterator[str]:
+    """A line for each sensor: focal lengths and principal point with their deviations [px], and how corners fit."""
+    for name in solution.task.sensors:
+        own = {each.name: each for each in solution.parameters}
+        free = [(key, own[f"{name}.{key}"]) for key in ("fx", "fy", "cx", "cy") if f"{name}.{key}" in own]
+        known = [
+            f"{key} {each.value:.{(digits := _digits(each.sigma))}f} ± {each.sigma:.{digits}f}" for key, each in free
+        ]
+        rms = [view.rms for view in solution.views if (view.sensor, view.of) == (name, "corners")]
+        fit = [f"corners miss by {np.sqrt(np.mean(np.square(rms))):.2g} px"] if rms else []
+        yield f"{name}: {', '.join([*known, *fit])}"
+
+
+def _digits(sigma: float) -> int:
+    """Decimals that show two digits of a deviation."""
+    return int(np.clip(1 - np.floor(np.log10(max(sigma, 1e-4))), 0, 4))
+
+
 def _sensor(name: str, solution: Solution, found: Assessment) -> Section:
     rows = tuple(
         (each.name.partition(".")[2], each.value, each.sigma)

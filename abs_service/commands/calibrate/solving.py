@@ -141,7 +141,7 @@ def finish(title: str, task: Task, arguments: argparse.Namespace, found: Materia
         files = [str(path) for path in written]
         print(json.dumps({"trusted": assessment.trusted, "verdict": assessment.verdict, "files": files}))
     else:
-        for line in itertools.chain([assessment.verdict], assessment.reasons[1:]):
+        for line in itertools.chain([assessment.verdict], assessment.reasons[1:], report.cameras(solution)):
             print(line)
         for pair, (length, angle) in baselines(solution.cameras).items():
             print(f"{pair}: {length * 1e3:.1f} mm apart, turned by {math.degrees(angle):.2f}°")
