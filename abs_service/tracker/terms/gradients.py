@@ -22,8 +22,11 @@ _NOISE_GAIN = float(np.sum((_REGRESSION * _STEPS) ** 2))
 #: more are taken away.
 _NOISE_SCATTER = 5.0
 
+#: Median of the absolute value of a normal distribution, in standard deviations.
+NORMAL_MEDIAN = 0.6745
+
 #: Second difference; and the median of the sum of the products of two with noise of deviation 1, without its sign.
-_SECOND, _MEDIAN_LEFT = np.array([1.0, -2.0, 1.0]), 6 * 0.6745
+_SECOND, _MEDIAN_LEFT = np.array([1.0, -2.0, 1.0]), 6 * NORMAL_MEDIAN
 
 #: Smallest cosine between line of sight and normal; at grazing views a row would grow without bound.
 MIN_COSINE = 0.2
@@ -107,16 +110,13 @@ def _image_rows(
     return rows
 
 
-def noise_deviation(
-    image: NDArray[np.float32] | NDArray[np.uint8], places: NDArray[np.float64], period: int = 1
-) -> NDArray[np.float64]:
+def noise_deviation(image: NDArray[np.float32] | NDArray[np.uint8], places: NDArray[np.float64]) -> NDArray[np.float64]:
     """Standard deviation (channels,) of the noise of an image's pixels, from those around places (n, 2); 0 if unknown.
 
     The difference of two Laplacians leaves noise, and little of a picture (J. Immerkær: Fast noise variance estimation.
     Computer Vision and Image Understanding 64, 1996); here its median, which edges hardly change.
-    Pixels that show the same are `period` apart, two in a mosaic.
     """
-    corner = np.floor(places + 0.5).astype(np.intp)[:, None] + period * np.arange(-1, 2)[:, None]
+    corner = np.floor(places + 0.5).astype(np.intp)[:, None] + np.arange(-1, 2)[:, None]
     column, row = (np.clip(corner[..., axis], 0, image.shape[1 - axis] - 1) for axis in (0, 1))
     patches = image[row[:, :, None], column[:, None]].astype(np.float64)
     left = np.abs(np.einsum("i,j,nijc->nc", _SECOND, _SECOND, patches))

@@ -11,7 +11,7 @@ from abs_service.tracker.synthesis.base import Synthesis, Synthesizer
 from abs_service.tracker.synthesis.perspective import project_with_jacobian
 from abs_service.tracker.synthesis.window import NOTHING_HAS, Bordered, corner
 from abs_service.tracker.terms.base import Bounds, SensorFit, facing, summarize
-from abs_service.tracker.terms.gradients import channel_gradients, noise_deviation, shortened
+from abs_service.tracker.terms.gradients import NORMAL_MEDIAN, channel_gradients, noise_deviation, shortened
 from abs_service.tracker.terms.linearization import PointLinearization
 from abs_service.tracker.terms.photometric.channel_cost import (
     CHANNEL,
@@ -64,7 +64,7 @@ class ChannelTerm:
         self._bounds = bounds
         self._registration_noise = registration_noise
         self._widening = NO_WIDENING
-        self._image, self._period = np.zeros((1, 1, 4), np.float32), 1
+        self._image, self._is_mosaic = np.zeros((1, 1, 4), np.float32), False
         self._texels = np.zeros((0, 0, 4), np.float32)
         self._texture = np.zeros((0, 4), np.float32)
         self._bordered = Bordered(UNKNOWN, np.array([NOTHING_HAS, 0, 1, 0], np.float32))
@@ -76,7 +76,7 @@ class ChannelTerm:
         window = self._synthesizer.window(self.sensor, predicted, reach_m)
         if self._texels.shape[:2] != image.values.shape:  # new memory takes as long as filling it
             self._texels = np.full((*image.values.shape, 4), UNKNOWN, np.float32)
-        self._period = len(image.channels)
+        self._is_mosaic = len(image.channels) > 1
         values, constant = np.ascontiguousarray(image.values[window]), LOG_SQRT_2PI + self._bounds.inlier
         fill(values, image.channels, self._noise.deviation(values), constant, *corner(window), self._texels)
         self._image = self._synthesizer.image(self.sensor, self._texels)
@@ -126,8 +126,10 @@ class ChannelTerm:
         places, projection = project_with_jacobian(self._view.camera, vertices)
         rows = np.einsum("mi,mij->mj", gradients[use] * inverse[use, None], projection[use])
         # Noise has gradients as a print has, and the more of it there is, the better it would seem to hold a surface.
-        # Its deviation is that at all samples: where the value agrees, there is less of it by chance.
-        deviation = noise_deviation(self._image[..., VALUE, None], places, self._period)[0] * inverse[use]
+        # Its deviation is that at all samples: where the value agrees, there is less of it by chance. A fine print
+        # looks like noise, but it is no residual where it agrees.
+        deviation = self._noise_deviation(places) * inverse[use]
+        deviation = np.minimum(deviation, np.median(np.abs(residual)) / NORMAL_MEDIAN)
         noise = deviation**2 @ np.einsum("mi,mij->m", gains[use], projection[use] ** 2)
         rows = shortened(rows, float(noise))
         samples = self._view.follow(surface, sparse_jacobian)
@@ -153,6 +155,13 @@ class ChannelTerm:
         values = np.full(seen.attributes[0].T.shape, np.nan)
         values[np.arange(len(texels)), texels[:, CHANNEL].astype(int)] = texels[:, VALUE]
         return values
+
+    def _noise_deviation(self, places: NDArray[np.float64]) -> float:
+        """Standard deviation of the image's noise around places (n, 2).
+
+        Taken for zero in a mosaic: pixels of a channel are too far apart to tell a fine print from noise.
+        """
+        return 0.0 if self._is_mosaic else float(noise_deviation(self._image[..., VALUE, None], places)[0])
 
     def _gradients(self, seen: Synthesis, surface: Surface) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Image gradient of each sample in its pixel's channel, to the right and down (m, 2) [1/px].

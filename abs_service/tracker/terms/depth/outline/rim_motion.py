@@ -11,6 +11,9 @@ LEAST_OF_A_SIDE = 8
 #: Share of the squared distances from the outline that a motion of the mesh explains at least, if it has moved.
 LEAST_EXPLAINED = 0.7
 
+#: It is longer than so many pixels: mixed pixels along an outline let all edges of a side err alike.
+LEAST_PX = 2.0
+
 
 def displacement(away: NDArray[np.float64], directions: NDArray[np.float64]) -> float:
     """Distance of edges from the outline: the mean of all, or what shows that the mesh has slid if that is larger.
@@ -49,8 +52,9 @@ def motion(away: NDArray[np.float64], directions: NDArray[np.float64], places: N
     rows = np.stack([right, down, down * x - right * y], axis=1)
     (along, across, turn), *_ = np.linalg.lstsq(rows, away)
     left = away - rows @ (along, across, turn)
+    length = float(np.median(np.hypot(along - turn * y, across + turn * x)))
     explained = left @ left < (1 - LEAST_EXPLAINED) * (away @ away)
-    return float(np.median(np.hypot(along - turn * y, across + turn * x))) if explained else 0.0
+    return length if explained and length > LEAST_PX else 0.0
 
 
 def _typical(away: NDArray[np.float64]) -> float:

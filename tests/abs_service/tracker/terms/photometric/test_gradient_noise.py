@@ -12,7 +12,6 @@ from abs_service.tracker.terms.photometric.channel import ChannelTerm
 from abs_service.tracker.terms.photometric.illumination import Passive
 from abs_service.tracker.terms.photometric.vertex_values import at_vertices
 from calib.camera import Camera
-from calib.noise.images.bayer import GaussianBayer
 from calib.noise.images.grey import GaussianGrey
 from calib.rig import Rig, Sensor
 from tests.abs_service.tracker.scenes import flat, sheet
@@ -65,15 +64,12 @@ def test_a_print_keeps_what_it_has_without_noise():
     assert length(picture(40, 10)) == pytest.approx(clean, rel=0.05)
 
 
-NOISES = {"grey": (GaussianGrey(5.0), ONE_CHANNEL), "rggb": (GaussianBayer(5.0), BAYER_ORDERS["rggb"])}
-
-
-def held(name: str, print_levels: float, noise: float) -> float:
+def held(print_levels: float, noise: float) -> float:
     """Root mean square of the rows of a term of one channel, for the image after the one that the mesh was made of."""
-    model, (sensor, pattern) = Rigid(sheet(17, 23, flat, (0.8, 0.6))), NOISES[name]
+    name, sensor, model = "grey", GaussianGrey(5.0), Rigid(sheet(17, 23, flat, (0.8, 0.6)))
     rig = Rig("r", {name: Sensor(name, CAMERA, sensor)})
     synthesizer = Sparse(rig, model.mesh)
-    first, now = (ChannelImage(picture(print_levels, noise, seed)[..., 0], pattern) for seed in (3, 4))
+    first, now = (ChannelImage(picture(print_levels, noise, seed)[..., 0], ONE_CHANNEL) for seed in (3, 4))
     looks = at_vertices(first, CAMERA, synthesizer.canvas).astype(np.float32)
     bounds = likelihood.Settings().bounds(rig.sensors[name])
     term, surface = ChannelTerm(name, synthesizer, looks, sensor, Passive(), bounds), model.deform(model.rest[None])
@@ -83,13 +79,12 @@ def held(name: str, print_levels: float, noise: float) -> float:
     return float(np.sqrt(np.mean(linear.rows**2)))
 
 
-@pytest.mark.parametrize("name", NOISES)
-def test_noise_in_one_channel_holds_nothing_on_a_blank_ground_and_a_print_keeps_what_it_has(name):
+def test_noise_in_one_channel_holds_nothing_on_a_blank_ground_and_a_print_keeps_what_it_has():
     """Regression: a wall without print was said to be tracked while the mesh was 14 to 130 mm off."""
-    clean = held(name, 40, 0)
-    assert held(name, 40, 3) == pytest.approx(clean, rel=0.08)
+    clean = held(40, 0)
+    assert held(40, 3) == pytest.approx(clean, rel=0.08)
     for noise in (1.0, 3.0, 5.0):
-        assert held(name, 0, noise) < 0.02 * clean
+        assert held(0, noise) < 0.02 * clean
 
 
 def test_the_gain_of_noise_in_gradients_of_a_mosaic_is_their_variance():
