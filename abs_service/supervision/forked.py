@@ -26,8 +26,9 @@ from abs_service.supervision import parent_watchdog
 #: Makes processes that the fork server forks.
 CONTEXT = multiprocessing.get_context("forkserver")
 
-#: Longest temporary folder in which the path of the fork server's socket is not too long for the kernel [bytes].
-LONGEST_PARENT = 70
+#: Longest temporary folder in which the path of the fork server's socket, 39 bytes longer, has the 107 that unix(7)
+#: permits [bytes].
+LONGEST_PARENT = 64
 
 _PR_SET_CHILD_SUBREAPER = 36
 #: Environment variable with the folder of the fork server's socket.

@@ -2,8 +2,10 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import threading
 import time
+from pathlib import Path
 
 import pytest
 
@@ -190,15 +192,22 @@ time.sleep(60)
 """
 
 
-def test_a_killed_supervisor_leaves_nothing_in_the_temporary_folder(tmp_path):
-    environment = os.environ | {"PYTHONPATH": PATH, "TMPDIR": str(tmp_path)}
+@pytest.fixture
+def short_folder():
+    """A temporary folder whose name is short enough for a socket in it, as those of tests are not always."""
+    with tempfile.TemporaryDirectory() as name:
+        yield Path(name)
+
+
+def test_a_killed_supervisor_leaves_nothing_in_the_temporary_folder(short_folder):
+    environment = os.environ | {"PYTHONPATH": PATH, "TMPDIR": str(short_folder)}
     command = [sys.executable, "-c", PRELOADING]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as supervisor:
         assert supervisor.stdout is not None
         assert supervisor.stdout.readline() == "works\n"
-        assert list(tmp_path.iterdir())
+        assert list(short_folder.iterdir())
         supervisor.kill()
-    assert eventually(lambda: not list(tmp_path.iterdir()))
+    assert eventually(lambda: not list(short_folder.iterdir()))
 
 
 def test_a_child_is_known_by_its_command_line(child):

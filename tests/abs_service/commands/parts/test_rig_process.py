@@ -18,7 +18,7 @@ from tests.conftest import encrypted
 
 @pytest.fixture
 def handlers():
-    before = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGINT)}
+    before = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)}
     yield
     for number, handler in before.items():
         signal.signal(number, handler)
@@ -42,6 +42,7 @@ def test_many_hangups_without_a_terminal_are_one_wish(handlers, monkeypatch):
         raise OSError(errno.ENXIO, path)
 
     monkeypatch.setattr(os, "open", no_terminal)
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)  # the tests themselves may run with nohup
     called, go_on = SimpleQueue(), SimpleQueue()
     monkeypatch.setattr(rig_process.time, "sleep", lambda seconds: go_on.get(timeout=1.0))
     rig_process.on_hangup(lambda: called.put("reload"))
