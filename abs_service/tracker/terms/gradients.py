@@ -116,12 +116,14 @@ def noise_deviation(image: NDArray[np.float32] | NDArray[np.uint8], places: NDAr
     The difference of two Laplacians leaves noise, and little of a picture (J. Immerkær: Fast noise variance estimation.
     Computer Vision and Image Understanding 64, 1996); here its median, which edges hardly change.
     """
-    corner = np.floor(places + 0.5).astype(np.intp)[:, None] + np.arange(-1, 2)[:, None]
+    known = places[np.isfinite(places).all(axis=1)]  # a candidate may lie behind the camera, or far beside the image
+    middle = np.clip(np.floor(known + 0.5), 0, np.array(image.shape[1::-1]) - 1).astype(np.intp)
+    corner = middle[:, None] + np.arange(-1, 2)[:, None]
     column, row = (np.clip(corner[..., axis], 0, image.shape[1 - axis] - 1) for axis in (0, 1))
     patches = image[row[:, :, None], column[:, None]].astype(np.float64)
     left = np.abs(np.einsum("i,j,nijc->nc", _SECOND, _SECOND, patches))
-    known = left[np.isfinite(left).all(axis=1)]
-    return np.median(known, axis=0) / _MEDIAN_LEFT if len(known) else np.zeros(image.shape[2])
+    left = left[np.isfinite(left).all(axis=1)]
+    return np.median(left, axis=0) / _MEDIAN_LEFT if len(left) else np.zeros(image.shape[2])
 
 
 def channel_gradients(

@@ -49,6 +49,14 @@ def test_an_image_of_which_nothing_is_known_has_no_noise():
     np.testing.assert_array_equal(noise_deviation(image, PLACES), 0)
 
 
+def test_a_candidate_behind_the_camera_or_far_beside_the_image_has_no_place_to_look_at():
+    image = picture(0, 3)
+    for places in (np.full((5, 2), np.nan), np.full((5, 2), 1e30)):
+        assert np.isfinite(noise_deviation(image, places)).all()
+    some = np.concatenate([PLACES, np.full((5, 2), np.nan)])
+    np.testing.assert_array_equal(noise_deviation(image, some), noise_deviation(image, PLACES))
+
+
 @pytest.mark.parametrize("noise", [1.0, 3.0, 10.0])
 def test_noise_on_a_blank_ground_holds_nothing(noise):
     """Regression: the more noise, the surer a wall without print was said to be tracked."""
