@@ -21,7 +21,7 @@ from typing import Any
 
 from setproctitle import setproctitle
 
-from abs_service.supervision import parent_watchdog
+from abs_service.supervision import parent_watchdog, standard_files
 
 #: Makes processes that the fork server forks.
 CONTEXT = multiprocessing.get_context("forkserver")
@@ -54,21 +54,14 @@ def ensure_running() -> None:
     """Starts the fork server anew if it has died, or its folder was deleted, if that can be; its children live on."""
     server: Any = forkserver._forkserver  # pyright: ignore # noqa: SLF001 - nothing public tells its address
     with suppress(OSError):  # else the next start of a process says why
-        _leave_deleted_folder()
+        if standard_files.is_folder_deleted():
+            os.chdir("/")  # processes can neither be started nor work in one that was
         os.makedirs(util.get_temp_dir(), 0o700, exist_ok=True)
         if server._forkserver_pid and not os.path.exists(server._forkserver_address):  # noqa: SLF001
             os.kill(server._forkserver_pid, signal.SIGKILL)  # noqa: SLF001
         forkserver.ensure_running()
         # Whoever starts a process waits for it, without an end if somebody has stopped it.
         os.kill(server._forkserver_pid, signal.SIGCONT)  # noqa: SLF001
-
-
-def _leave_deleted_folder() -> None:
-    """Changes to another working directory if it was deleted: processes can neither be started nor work in it."""
-    try:
-        os.getcwd()
-    except FileNotFoundError:
-        os.chdir("/")
 
 
 def detach() -> None:

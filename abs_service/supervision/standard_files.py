@@ -22,12 +22,19 @@ class StartError(Exception):
     """A process cannot work as it was started: with too few open files, or in a folder that was deleted."""
 
 
-def check_folder() -> None:
-    """Raises StartError if the working directory was deleted."""
+def is_folder_deleted() -> bool:
+    """True if the working directory was deleted."""
     try:
         os.getcwd()
     except FileNotFoundError:
-        raise StartError("the working directory was deleted; change to another one") from None
+        return True
+    return False
+
+
+def check_folder() -> None:
+    """Raises StartError if the working directory was deleted."""
+    if is_folder_deleted():
+        raise StartError("the working directory was deleted; change to another one")
 
 
 def allow_files() -> None:

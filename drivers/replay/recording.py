@@ -31,6 +31,7 @@ class Recording:
 
     Attributes:
         path: of the file.
+        contents: its index.
         truncated: True if the file was not finished.
         damaged_chunks: number of corrupt chunks skipped in an unfinished file; in a finished file, reading a corrupt
             chunk raises.
@@ -52,7 +53,7 @@ class Recording:
         self.truncated = contents.truncated
         self.damaged_chunks = contents.damaged
         self.duration_s = (contents.end_ns - contents.start_ns) * 1e-9
-        self._contents = contents
+        self.contents = contents
         self.wall_offset_ns = self._wall_offset()
         self.config = contents.attachments.get("rig.toml", b"").decode("utf-8", "replace")
         self.unpaired = 0
@@ -71,7 +72,7 @@ class Recording:
         """
         waiting: dict[tuple[str, int, int], tuple[str, bytes]] = {}
         wanted = {*encoded_image.SCHEMAS, codec.INFO_SCHEMA, codec.TRUTH_SCHEMA}
-        for topic, message in messages(self.path, self._contents, wanted):
+        for topic, message in messages(self.path, self.contents, wanted):
             try:
                 if topic.schema == codec.TRUTH_SCHEMA:
                     yield codec.decode_truth(message.data)
@@ -92,7 +93,7 @@ class Recording:
         self.unpaired = len(waiting)
 
     def _wall_offset(self) -> int:
-        for _, message in messages(self.path, self._contents, {codec.INFO_SCHEMA}):
+        for _, message in messages(self.path, self.contents, {codec.INFO_SCHEMA}):
             try:
                 return message.log_time - FrameInfo.FromString(message.data).header.t_host_ns
             except DecodeError as error:
@@ -102,10 +103,10 @@ class Recording:
     def _read_models(self) -> dict[str, SensorModel]:
         """First sensor model of every sensor."""
         missing = {
-            topic.name for topic in self._contents.topics.values() if topic.schema == MODEL_SCHEMA and topic.count
+            topic.name for topic in self.contents.topics.values() if topic.schema == MODEL_SCHEMA and topic.count
         }
         models: dict[str, SensorModel] = {}
-        for topic, message in messages(self.path, self._contents, {MODEL_SCHEMA}) if missing else ():
+        for topic, message in messages(self.path, self.contents, {MODEL_SCHEMA}) if missing else ():
             if topic.name in missing:
                 missing.discard(topic.name)
                 try:

@@ -8,7 +8,6 @@ from calib.camera import Camera
 from drivers.encoding import codec, encoded_image
 from drivers.encoding.mcap_file import McapFile
 from drivers.replay import Recording
-from drivers.replay.contents import scan
 from drivers.replay.messages import messages
 
 
@@ -27,7 +26,7 @@ def image_copies(
         RecordingError: a corrupt chunk.
         McapFileError, OSError: as `McapFile.write`.
     """
-    contents = scan(recording.path)
+    contents = recording.contents
     sensor_metadata.write_cameras(file, headers.at(0, 0), cameras, contents.start_ns)
     for topic, message in messages(recording.path, contents, {*encoded_image.SCHEMAS, codec.INFO_SCHEMA}):
         file.write(topic.name, topic.schema, message.data, message.log_time, message.sequence)

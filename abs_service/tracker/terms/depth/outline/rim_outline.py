@@ -130,7 +130,8 @@ class RimOutline:
         self._projection = Projection(camera)
         self._rim_cost = rim_cost(camera.lens)
         self._rim = rim
-        self._deviation = deviation
+        self._deviation, self._bound = deviation, FARTHEST * deviation
+        self._far = max(OFF_PX, self._bound)
         self._inwards = np.zeros((0, 0), np.float32)
         self._corner = np.zeros(2, np.float32)
         self._beyond = np.zeros(len(rim.outer), np.float32)
@@ -146,7 +147,7 @@ class RimOutline:
         window: Window = WHOLE,
     ) -> NDArray[np.bool_]:
         """Sets the outline from a window of a depth image; the mask of pixels that serve for the outline only."""
-        part, self._inwards = inwards(distance, seen, int(np.ceil(FARTHEST * self._deviation)) + 1)
+        part, self._inwards = inwards(distance, seen, int(np.ceil(self._bound)) + 1)
         self._corner = np.add(corner(window), corner(part))[::-1].astype(np.float32)
         if not self._begun:
             points, values, gradients = self._locate(predicted)
@@ -185,7 +186,7 @@ class RimOutline:
 
     def fit(self, surface: Surface) -> RimFit:
         """Agreement of the edges of a population of one with the outline."""
-        far, points = max(OFF_PX, FARTHEST * self._deviation), self._locate(surface)[0].astype(np.float64)
+        points = self._locate(surface)[0].astype(np.float64)
         away = self._inside_at(points)
         known = ~np.isnan(away)
         pixel_m = np.linalg.norm(points - self._camera.center, axis=1) / self._camera.fx
@@ -193,8 +194,8 @@ class RimOutline:
         beyond = self._beyond_by(surface, covered, (LARGEST_GAP_STEPS,))
         return RimFit(
             visible=int(np.count_nonzero(known)),
-            outside=int(np.count_nonzero(away < -far)),
-            inside=int(np.count_nonzero(away > far)),
+            outside=int(np.count_nonzero(away < -self._far)),
+            inside=int(np.count_nonzero(away > self._far)),
             off_m=self._displacement(surface, points, away, pixel_m) if known.any() else 0.0,
             occluded=self._hidden + int(np.count_nonzero(~known)),
             covered=len(covered),
@@ -205,13 +206,12 @@ class RimOutline:
         self, surface: Surface, points: NDArray[np.float64], away: NDArray[np.float64], pixel_m: NDArray[np.float64]
     ) -> float:
         """The larger of `displacement` and `motion` [m], of free edges (k, 3) at known distances (k,) [px]."""
-        far, bound = max(OFF_PX, FARTHEST * self._deviation), FARTHEST * self._deviation
         inner = surface.vertices[0].T[self._ends[1]].astype(np.float64)
         places, known = self._camera.project(points), ~np.isnan(away)
         directions = (places - self._camera.project(inner))[known]
-        # Outside, distances are known up to `far`; how much farther, nothing tells.
-        off_m = np.where(np.abs(away) > far, np.maximum(away, -far), 0.0) * pixel_m
-        moved = motion(np.clip(away[known], -bound, bound), directions, places[known])
+        # Outside, distances are known up to there; how much farther, nothing tells.
+        off_m = np.where(np.abs(away) > self._far, np.maximum(away, -self._far), 0.0) * pixel_m
+        moved = motion(np.clip(away[known], -self._bound, self._bound), directions, places[known])
         return max(displacement(off_m[known], directions), moved * float(np.mean(pixel_m)))
 
     def _beyond_by(self, surface: Surface, which: NDArray[np.intp], steps: Sequence[float]) -> NDArray[np.float64]:
