@@ -64,7 +64,7 @@ class Settings:
     sample_s: float = 1.0
 
 
-QUICK = Settings(starts=0, cold_starts=0, help_runs=2, settle_s=2.0, duration_s=20.0, warm_up_s=5.0, sample_s=0.25)
+QUICK = Settings(starts=0, cold_starts=0, help_runs=2, settle_s=2.0, duration_s=12.0, warm_up_s=4.0, sample_s=0.25)
 
 
 def run(settings: Settings, context: Context) -> Findings:

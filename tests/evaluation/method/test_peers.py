@@ -1,11 +1,10 @@
-"""The comparison with peers: scene, baseline, and our trackers on a short sequence."""
+"""The comparison with peers: scene, baseline, and our tracker on a short sequence."""
 
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
-from evaluation.experiment import Context
 from evaluation.method import peers
 from evaluation.method.peers.competitors import KNOWN, NoTracking, installed
 from evaluation.method.peers.gauss_newton import GaussNewton
@@ -88,10 +87,3 @@ def test_rivals_that_are_not_installed_are_left_out():
     names = tuple(KNOWN)
     assert set(installed(names)) <= set(names)
     assert not installed(())
-
-
-@pytest.mark.slow
-def test_quick_peers():
-    findings = peers.run(peers.QUICK, Context(1))
-    assert all(goal.value < 3.5 for goal in findings.goals if "error" in goal.name)  # six frames instead of forty
-    assert {"5 mm", "15 mm", "hole", "turn", "spin"} == set(findings.values["scenes"])
