@@ -95,7 +95,7 @@ class Camera:
         """
         return lookup.build((self.width, self.height), (self.fx, self.fy, self.cx, self.cy), self.lens)
 
-    @property
+    @functools.cached_property
     def field_radius(self) -> float:
         """Largest radius of (x/z, y/z) in the field of view, with a margin of one pixel.
 

@@ -27,7 +27,7 @@ class Lookup:
     @property
     def ray_length(self) -> NDArray[np.float64]:
         """Ratio of radial distance to z of every pixel (height, width)."""
-        return np.sqrt(1 + np.sum(self.ideal**2, axis=-1))
+        return np.sqrt(1 + _squared_length(self.ideal))
 
     @property
     def rays(self) -> NDArray[np.float64]:
@@ -38,7 +38,7 @@ class Lookup:
     @property
     def radius(self) -> float:
         """Largest distance of a pixel from the optical axis, in normalised coordinates."""
-        return float(np.linalg.norm(self.ideal, axis=-1).max())
+        return float(np.sqrt(_squared_length(self.ideal).max()))
 
 
 def build(size: tuple[int, int], matrix: tuple[float, float, float, float], lens: LensModel) -> Lookup:
@@ -50,15 +50,20 @@ def build(size: tuple[int, int], matrix: tuple[float, float, float, float], lens
     """
     focal, center = np.array(matrix[:2]), np.array(matrix[2:])
     pixels = np.stack(np.meshgrid(*(np.arange(length, dtype=float) for length in size)), axis=-1)
-    ideal, error = np.empty_like(pixels), np.empty(pixels.shape[:2])
+    ideal, error = np.empty_like(pixels), np.empty(pixels.shape[:2])  # squared, [px²]
     for rows in np.array_split(np.arange(size[1]), -(-size[1] // _ROWS)):  # blocks that fit into the cache
         ideal[rows] = lens.inverse((pixels[rows] - center) / focal)
-        error[rows] = np.linalg.norm(lens.distort(ideal[rows]) * focal + center - pixels[rows], axis=-1)
-    wrong = ~(error <= ACCURACY_PX)
+        error[rows] = _squared_length(lens.distort(ideal[rows]) * focal + center - pixels[rows])
+    wrong = ~(error <= ACCURACY_PX**2)
     if wrong.any():
         raise LensError(_complaint(lens, wrong, np.linalg.norm(pixels - center, axis=-1)))
     ideal.setflags(write=False)
     return Lookup(ideal)
+
+
+def _squared_length(places: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Of places (…, 2); five times faster than a norm along so short an axis."""
+    return places[..., 0] ** 2 + places[..., 1] ** 2
 
 
 def _complaint(lens: LensModel, wrong: NDArray[np.bool_], radius: NDArray[np.float64]) -> str:
