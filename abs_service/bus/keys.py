@@ -90,6 +90,11 @@ def reinitialize(tracker: str) -> str:
     return f"{tracker}/reinitialize"
 
 
+def controls(device: str) -> str:
+    """Topic of commands to set a device's controls: queries with an absmsg.v1.SetControls."""
+    return f"{device}/controls"
+
+
 def health(component: str) -> str:
     """Topic of a component's health: capture, record, run, track/<tracker>."""
     return f"health/{component}"

@@ -7,12 +7,14 @@ import logging
 import threading
 from collections import Counter
 from collections.abc import Callable, Mapping
+from typing import TypeVar
 
 from abs_service.bus.health import Health, Level
 from abs_service.capture.image_check import RepeatedImages
 from abs_service.capture.stall_detector import StallDetector
 from drivers.contract.device import Device, DeviceError, DeviceState, FinalError, Sink
 
+_T = TypeVar("_T")
 _log = logging.getLogger(__name__)
 
 #: Backoff before a failed device is reopened: doubles with each consecutive failure, up to the longest [s].
@@ -67,6 +69,8 @@ class DeviceSupervisor:
         self._heads = heads
         self._health = health
         self._clock = clock
+        self._device: Device | None = None  # while it streams
+        self._lock = threading.Lock()
         self._stop = threading.Event()
         self._abandoned = False
         self._thread = threading.Thread(target=self._run, name=f"device {name}", daemon=True)
@@ -84,6 +88,17 @@ class DeviceSupervisor:
         self._stop.set()
         self._thread.join(timeout_s)
         self._abandoned = self._thread.is_alive()
+
+    def use(self, act: Callable[[Device], _T]) -> _T:
+        """Calls `act` with the device, which is not closed meanwhile, and returns its result.
+
+        Raises:
+            DeviceError: the device is not open, or whatever `act` raises.
+        """
+        with self._lock:
+            if self._device is None:
+                raise DeviceError(f"{self._name} is not open at present")
+            return act(self._device)
 
     def _run(self) -> None:
         backoff_s = FIRST_BACKOFF_S
@@ -130,8 +145,11 @@ class DeviceSupervisor:
                     self.fatal_error = error
                 return False, str(error)
             device.start(stall_detector)
+            self._device = device
             reason = self._watch(device, stall_detector)
         finally:
+            with self._lock:
+                self._device = None
             device.close()
             self._previous.update(device.counters)
             self._previous.update(stall_detector.counters)

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from absmsg.v1.command_pb2 import CommandAnswer, Record, Reinitialize, Reload
+from absmsg.v1.command_pb2 import CommandAnswer, Record, Reinitialize, Reload, SetControls
 
 from abs_service.bus import keys
 from abs_service.bus.contract import Bus, Sample, Subscription
@@ -20,11 +20,13 @@ _log = logging.getLogger(__name__)
 REINITIALIZE = Reinitialize.DESCRIPTOR.full_name
 RECORD = Record.DESCRIPTOR.full_name
 RELOAD = Reload.DESCRIPTOR.full_name
-Command = Reinitialize | Record | Reload
+SET_CONTROLS = SetControls.DESCRIPTOR.full_name
+Command = Reinitialize | Record | Reload | SetControls
 _SCHEMAS: Mapping[str, type[Command]] = {
     REINITIALIZE: Reinitialize,
     RECORD: Record,
     RELOAD: Reload,
+    SET_CONTROLS: SetControls,
 }
 ANSWER = CommandAnswer.DESCRIPTOR.full_name
 
@@ -86,7 +88,7 @@ def answer_reinitialize(
     def where(payload: bytes) -> str:
         return str(_choice(payload))
 
-    return _answer(bus, keys.reinitialize(tracker), REINITIALIZE, headers, health, on_command, where)
+    return answer_valid(bus, keys.reinitialize(tracker), REINITIALIZE, headers, health, on_command, where)
 
 
 def answer_record(bus: Bus, headers: HeaderFactory, health: Health, act: Callable[[bool], str]) -> Subscription:
@@ -107,7 +109,7 @@ def answer_record(bus: Bus, headers: HeaderFactory, health: Health, act: Callabl
     def which(payload: bytes) -> str:
         return " on" if Record.FromString(payload).recording else " off"
 
-    return _answer(bus, keys.RECORD, RECORD, headers, health, on_command, which)
+    return answer_valid(bus, keys.RECORD, RECORD, headers, health, on_command, which)
 
 
 def answer_reload(bus: Bus, headers: HeaderFactory, health: Health, act: Callable[[], Sequence[str]]) -> Subscription:
@@ -120,7 +122,7 @@ def answer_reload(bus: Bus, headers: HeaderFactory, health: Health, act: Callabl
         act: reads it and returns the components that start again, or raises RefusedError. Called from a thread of the
             transport.
     """
-    reply = partial(_answer, bus, keys.RELOAD, RELOAD, headers, health)
+    reply = partial(answer_valid, bus, keys.RELOAD, RELOAD, headers, health)
     return reply(lambda payload: CommandAnswer(restarts=act()), lambda payload: "")
 
 
@@ -142,25 +144,26 @@ def reinitialize(
         command.seed.SetInParent()  # a pixel (0, 0) is one, too
     for column, row in choice.polygon:
         command.polygon.add(column=column, row=row)
-    return _ask(bus, keys.reinitialize(tracker), command, timeout_s)
+    return ask(bus, keys.reinitialize(tracker), command, timeout_s)
 
 
 def record(bus: Bus, headers: HeaderFactory, recording: bool, timeout_s: float) -> CommandAnswer | None:
     """Asks the recorder to record, or to wait; returns its answer, None if there is none."""
-    return _ask(bus, keys.RECORD, Record(header=headers.now(0), recording=recording), timeout_s)
+    return ask(bus, keys.RECORD, Record(header=headers.now(0), recording=recording), timeout_s)
 
 
 def reload(bus: Bus, headers: HeaderFactory, timeout_s: float) -> CommandAnswer | None:
     """Asks a rig to read its file again; returns its answer, None if there is none."""
-    return _ask(bus, keys.RELOAD, Reload(header=headers.now(0)), timeout_s)
+    return ask(bus, keys.RELOAD, Reload(header=headers.now(0)), timeout_s)
 
 
-def _ask(bus: Bus, topic: str, command: Command, timeout_s: float) -> CommandAnswer | None:
+def ask(bus: Bus, topic: str, command: Command, timeout_s: float) -> CommandAnswer | None:
+    """Sends a command on its topic; returns its answer, None if there is none."""
     answers = bus.command(topic, command.DESCRIPTOR.full_name, command.SerializeToString(), timeout_s)
     return CommandAnswer.FromString(answers[0].payload) if answers else None
 
 
-def _answer(
+def answer_valid(
     bus: Bus,
     topic: str,
     message: str,
@@ -169,7 +172,7 @@ def _answer(
     act: Callable[[bytes], CommandAnswer],
     details: Callable[[bytes], str],
 ) -> Subscription:
-    """Answers commands on a topic.
+    """Answers commands on a topic; counts and tells them as `answer_reinitialize`.
 
     `act` gets the payload of those that are valid and returns what is particular of their answer, or raises
     RefusedError, or any other error, which is logged; `details` makes what the log says of them.

@@ -154,6 +154,7 @@ SCHEMAS: Mapping[str, type[Message]] = {
         command_pb2.Reinitialize,
         command_pb2.Record,
         command_pb2.Reload,
+        command_pb2.SetControls,
         command_pb2.CommandAnswer,
         FileDescriptorSet,
     )
@@ -173,5 +174,6 @@ _TOPICS: Mapping[type[Message], Callable[[Any], str]] = {
     command_pb2.Reinitialize: lambda message: keys.reinitialize(message.tracker),
     command_pb2.Record: lambda message: keys.RECORD,
     command_pb2.Reload: lambda message: keys.RELOAD,
+    command_pb2.SetControls: lambda message: keys.controls(message.device),
     FileDescriptorSet: lambda message: keys.SCHEMA,
 }

@@ -14,7 +14,7 @@ RIG = "rig"
 PUBLISHES: Mapping[str, tuple[str, ...]] = {
     "capture": (
         *(keys.image("*", "*"), keys.points(keys.image("*", "*"))),
-        *(topic("*") for topic in (keys.calibration, keys.model, keys.truth, keys.clock)),
+        *(topic("*") for topic in (keys.calibration, keys.model, keys.truth, keys.clock, keys.controls)),
         *(keys.TRANSFORMS, keys.CONFIG, keys.SCHEMA),
         *(keys.health("capture"), keys.live("capture")),
     ),
@@ -35,6 +35,9 @@ COMMANDERS = ("operator",)
 #: Every name that a certificate may have.
 NAMES = (RIG, *PUBLISHES)
 
+#: Topics of commands.
+_COMMANDS = (keys.reinitialize("*"), keys.controls("*"), keys.RECORD, keys.RELOAD)
+
 _READ = ("declare_subscriber", "query", "declare_liveliness_subscriber", "liveliness_query")
 _PUBLISH = ("put", "declare_queryable", "reply", "liveliness_token")
 #: `**` does not match what begins with @.
@@ -48,7 +51,7 @@ def access_control() -> dict[str, object]:
         _rule("everything", "ingress", (*_READ, *_PUBLISH), _EVERYTHING),
         _rule("read", "ingress", _READ, _EVERYTHING),
         # A denial goes before what allows the same. Queries with wildcards are no commands, see `answer_commands`.
-        _rule("no commands", "ingress", ("query",), (keys.reinitialize("*"), keys.RECORD, keys.RELOAD), "deny"),
+        _rule("no commands", "ingress", ("query",), _COMMANDS, "deny"),
         *(_rule(f"publish {name}", "ingress", _PUBLISH, topics) for name, topics in PUBLISHES.items() if topics),
     ]
     return {

@@ -14,16 +14,19 @@ from functools import partial
 
 from abs_service import config
 from abs_service.bus import clock_offsets, keys
+from abs_service.bus.contract import Subscription
 from abs_service.bus.frames import FramePublisher
 from abs_service.bus.health import Health, Level
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.capture import sensor_metadata
+from abs_service.capture.asked_controls import AskedControls
 from abs_service.capture.device_supervisor import DeviceSupervisor
 from abs_service.capture.metadata_publisher import MetadataPublisher
 from abs_service.capture.point_clouds import PointCloudPublisher
 from abs_service.commands.parts import rig_devices, rig_process
 from abs_service.supervision import gc_tuning
 from abs_service.supervision.exit_codes import Exit
+from abs_service.wire import control_commands
 from drivers.contract.device import AddressError, Device, Sink
 from drivers.opening import open_device
 
@@ -56,7 +59,8 @@ def run(arguments: argparse.Namespace) -> int:
             for name, publisher in publishers.items()
         }
         source = str(arguments.config or "demo.toml")
-        supervisors = [_supervisor(name, rig, source, metadata, points[name], health) for name in rig.devices]
+        answer = partial(control_commands.answer_controls, bus, headers=headers, health=health)
+        supervisors = [_supervisor(name, rig, source, metadata, points[name], health, answer) for name in rig.devices]
         for supervisor in supervisors:
             supervisor.start()
         configure = partial(follow, arguments.reconfigured, partial(_configure, metadata, arguments))
@@ -82,13 +86,17 @@ def _supervisor(
     metadata: MetadataPublisher,
     sink: Sink,
     health: Health,
+    answer: Callable[..., Subscription],
 ) -> DeviceSupervisor:
+    asked = AskedControls()
+
     def on_open(device: Device) -> None:
         rig_devices.set_controls(device, rig.devices[name].controls, f"{source}: devices.{name}.controls")
+        asked.renew(device)
         metadata.add(rig_devices.cameras(rig, name, device))
         gc_tuning.freeze_loaded_objects()
 
-    return DeviceSupervisor(
+    supervisor = DeviceSupervisor(
         name,
         rig.devices[name].uri,
         lambda uri: open_device(uri, time.monotonic_ns),
@@ -98,6 +106,8 @@ def _supervisor(
         health,
         time.monotonic_ns,
     )
+    answer(name, act=lambda values: supervisor.use(partial(asked.set, values)))
+    return supervisor
 
 
 def follow(reconfigured: threading.Event, configure: Callable[[], None]) -> None:

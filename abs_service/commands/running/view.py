@@ -10,6 +10,7 @@
 
 import argparse
 import time
+from collections.abc import Mapping
 from importlib.util import find_spec
 
 from absmsg.v1.command_pb2 import CommandAnswer
@@ -18,7 +19,8 @@ from abs_service.bus.health import Health
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.commands.parts import rig_process
 from abs_service.supervision.exit_codes import Exit
-from abs_service.wire import commands
+from abs_service.wire import commands, control_commands
+from drivers.contract.controls import Value
 
 PORT = 8080
 
@@ -71,10 +73,14 @@ def run(arguments: argparse.Namespace) -> int:
         def record(recording: bool) -> CommandAnswer | None:
             return commands.record(bus, headers, recording, ANSWER_S)
 
+        def control(device: str, values: Mapping[str, Value]) -> CommandAnswer | None:
+            return control_commands.set_controls(bus, device, headers, ANSWER_S, values)
+
         feed = Feed(bus, time.monotonic_ns)
         endpoint = arguments.connect or rig.bus.endpoint
         silence = f"Is abs-service running at {endpoint}? This page connects again by itself; what it shows is old."
-        to_rig = Commands(reinitialize, record, {name: rig.reference(name)[0] for name in rig.trackers})
+        references = {name: rig.reference(name)[0] for name in rig.trackers}
+        to_rig = Commands(reinitialize, record, control, references, tuple(rig.devices))
         page = Page(feed, silence, arguments.port, arguments.view_only, to_rig, time.monotonic_ns)
         print(f"live page: {page.url}", flush=True)
         try:

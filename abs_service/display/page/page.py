@@ -14,6 +14,7 @@ from abs_service.bus import keys
 from abs_service.display.page import pictures, status, table, words
 from abs_service.display.page.choosing import Choosing, Measured
 from abs_service.display.page.commands import Commands
+from abs_service.display.page.controls import DeviceControls
 from abs_service.display.page.feed import Feed
 from abs_service.display.page.fields import FIELDS, ColorScale, Drawn, MeshView, joined, residual
 from abs_service.display.page.gestures import Gestures, Ray
@@ -61,6 +62,9 @@ class Page:
         self._reinitialization = Reinitialization(feed, commands.reinitialize, self._panel.answer)
         self._choosing = Choosing(self._gestures, self._look, self._panel.answer, self._reinitialization.ask)
         self._record = commands.record
+        if not view_only:
+            tab = self._panel.add_tab("Devices")
+            self._controls = DeviceControls(self._server.gui, tab, commands.devices, commands.control)
         self._scales = {name: ColorScale(field) for name, field in FIELDS.items()}
         self._drawn: dict[str, Drawn] = {}  # by tracker
         self._measured: dict[str, Measured] = {}  # by sensor

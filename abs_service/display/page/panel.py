@@ -51,7 +51,7 @@ class Panel:
         gui.configure_theme(control_width="large", dark_mode=True, show_logo=False, show_share_button=False)
         self._status, self._renewed = gui.add_html("", order=0.0), 0
         self._tracker = gui.add_dropdown("Tracker", list[str](["–"]), visible=False)
-        tabs = gui.add_tab_group()
+        self._tabs = tabs = gui.add_tab_group()
         with tabs.add_tab("View"):
             self._field = gui.add_dropdown("Colour of the mesh", tuple(FIELDS))
             self._legend = gui.add_image(np.zeros((16, 512, 3), np.uint8))
@@ -68,6 +68,10 @@ class Panel:
         self._images: dict[str, viser.GuiImageHandle] = {}
         self._plot_tab = tabs.add_tab("Plots")
         self._plots: dict[str, viser.GuiUplotHandle] = {}
+
+    def add_tab(self, label: str) -> viser.GuiTabHandle:
+        """Adds a tab after the others, for further controls."""
+        return self._tabs.add_tab(label)
 
     @property
     def tracker(self) -> str:

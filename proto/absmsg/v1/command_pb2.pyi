@@ -40,16 +40,50 @@ class Reload(_message.Message):
     header: _common_pb2.Header
     def __init__(self, header: _Optional[_Union[_common_pb2.Header, _Mapping]] = ...) -> None: ...
 
+class Control(_message.Message):
+    __slots__ = ("name", "on", "whole", "number", "choice", "unit", "minimum", "maximum", "choices")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    ON_FIELD_NUMBER: _ClassVar[int]
+    WHOLE_FIELD_NUMBER: _ClassVar[int]
+    NUMBER_FIELD_NUMBER: _ClassVar[int]
+    CHOICE_FIELD_NUMBER: _ClassVar[int]
+    UNIT_FIELD_NUMBER: _ClassVar[int]
+    MINIMUM_FIELD_NUMBER: _ClassVar[int]
+    MAXIMUM_FIELD_NUMBER: _ClassVar[int]
+    CHOICES_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    on: bool
+    whole: int
+    number: float
+    choice: str
+    unit: str
+    minimum: float
+    maximum: float
+    choices: _containers.RepeatedScalarFieldContainer[str]
+    def __init__(self, name: _Optional[str] = ..., on: _Optional[bool] = ..., whole: _Optional[int] = ..., number: _Optional[float] = ..., choice: _Optional[str] = ..., unit: _Optional[str] = ..., minimum: _Optional[float] = ..., maximum: _Optional[float] = ..., choices: _Optional[_Iterable[str]] = ...) -> None: ...
+
+class SetControls(_message.Message):
+    __slots__ = ("header", "device", "controls")
+    HEADER_FIELD_NUMBER: _ClassVar[int]
+    DEVICE_FIELD_NUMBER: _ClassVar[int]
+    CONTROLS_FIELD_NUMBER: _ClassVar[int]
+    header: _common_pb2.Header
+    device: str
+    controls: _containers.RepeatedCompositeFieldContainer[Control]
+    def __init__(self, header: _Optional[_Union[_common_pb2.Header, _Mapping]] = ..., device: _Optional[str] = ..., controls: _Optional[_Iterable[_Union[Control, _Mapping]]] = ...) -> None: ...
+
 class CommandAnswer(_message.Message):
-    __slots__ = ("header", "accepted", "reason", "region", "restarts")
+    __slots__ = ("header", "accepted", "reason", "region", "restarts", "controls")
     HEADER_FIELD_NUMBER: _ClassVar[int]
     ACCEPTED_FIELD_NUMBER: _ClassVar[int]
     REASON_FIELD_NUMBER: _ClassVar[int]
     REGION_FIELD_NUMBER: _ClassVar[int]
     RESTARTS_FIELD_NUMBER: _ClassVar[int]
+    CONTROLS_FIELD_NUMBER: _ClassVar[int]
     header: _common_pb2.Header
     accepted: bool
     reason: str
     region: str
     restarts: _containers.RepeatedScalarFieldContainer[str]
-    def __init__(self, header: _Optional[_Union[_common_pb2.Header, _Mapping]] = ..., accepted: _Optional[bool] = ..., reason: _Optional[str] = ..., region: _Optional[str] = ..., restarts: _Optional[_Iterable[str]] = ...) -> None: ...
+    controls: _containers.RepeatedCompositeFieldContainer[Control]
+    def __init__(self, header: _Optional[_Union[_common_pb2.Header, _Mapping]] = ..., accepted: _Optional[bool] = ..., reason: _Optional[str] = ..., region: _Optional[str] = ..., restarts: _Optional[_Iterable[str]] = ..., controls: _Optional[_Iterable[_Union[Control, _Mapping]]] = ...) -> None: ...

@@ -7,11 +7,14 @@ import numpy as np
 from calib import pose
 from calib.camera import Camera
 from drivers.contract.capabilities import Capabilities, StreamInfo
-from drivers.contract.controls import Controls
+from drivers.contract.controls import Control, ControlInfo, ControlKind, Controls
 from drivers.contract.device import DeviceInfo, DeviceState
 from drivers.contract.frame import Frame, Kind
 
 CAMERA = Camera(4, 3, 5.0, 5.0, 1.5, 1.0, T_rs=pose.from_rotation_vector([0.1, 0.2, 0.3], [0.05, 0, 0.01]))
+
+#: Limits of the exposure time of a device that can be adjusted.
+EXPOSURE = ControlInfo("exposure_s", ControlKind.NUMBER, "s", 0.001, 0.033)
 
 
 class FakeDevice:
@@ -55,3 +58,28 @@ def failing(reason):
 def working():
     """A device with one frame."""
     return FakeDevice(start=lambda sink: (sink.on_state(DeviceState.STREAMING, ""), sink.on_frame(frame())))
+
+
+def adjustable():
+    """A device with a frame, and with a control of every kind: an exposure time ends the automatic one."""
+    values = {"auto_exposure": True, "exposure_s": 0.01, "infrared_gain": 12, "sync_role": "free"}
+
+    def control(info):
+        def write(value):
+            values[info.name] = value
+            if info is EXPOSURE:
+                values["auto_exposure"] = False
+
+        return Control(info, lambda: values[info.name], write)
+
+    device = working()
+    device.controls = Controls(
+        control(info)
+        for info in (
+            ControlInfo("auto_exposure", ControlKind.SWITCH),
+            EXPOSURE,
+            ControlInfo("infrared_gain", ControlKind.WHOLE, minimum=1, maximum=50),
+            ControlInfo("sync_role", ControlKind.CHOICE, choices=("free", "master")),
+        )
+    )
+    return device

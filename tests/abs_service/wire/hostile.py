@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from absmsg.v1.command_pb2 import Record, Reinitialize, Reload
+from absmsg.v1.command_pb2 import Control, Record, Reinitialize, Reload, SetControls
 from absmsg.v1.common_pb2 import Header
 from absmsg.v1.deformation_state_pb2 import DeformationState
 from absmsg.v1.deformed_mesh_pb2 import DeformedMesh, MeshTopology
@@ -68,6 +68,7 @@ VALID: Mapping[str, Message] = {
     "sheet/reinitialize": Reinitialize(tracker="sheet", seed=Reinitialize.Pixel(column=111, row=133)),
     "record": Record(recording=True),
     "reload": Reload(),
+    "sim/controls": SetControls(device="sim", controls=[Control(name="exposure_s", number=0.01)]),
     **{f"health/{name}": Health(component=name) for name in ("capture", "record", "run", "track/sheet")},
     "clock/there": Header(host_clock="there", t_host_ns=1),
 }

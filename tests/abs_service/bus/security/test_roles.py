@@ -14,7 +14,7 @@ from abs_service.bus.health import Health
 from abs_service.bus.security import roles
 from abs_service.bus.session import Role, open_session
 from abs_service.bus.stamps import HeaderFactory, WallClock
-from abs_service.wire import commands
+from abs_service.wire import commands, control_commands
 from tests.abs_service.bus.loopback import LoopbackBus
 from tests.conftest import encrypted, mutual_tls
 from tests.waiting import eventually
@@ -31,6 +31,7 @@ PUBLISHERS = {
     "schema": "capture",
     "clock/0b6c": "capture",
     "sim/truth": "capture",
+    "sim/controls": "capture",
     "health/capture": "capture",
     "sheet/state": "tracker",
     "sheet/mesh": "tracker",
@@ -179,6 +180,17 @@ def test_only_operators_tell_the_recorder(name, rig, secured):
     answer = commands.record(secured(name), headers, True, 1.0)
     allowed = name in ("operator", "rig")
     assert (answer is not None and answer.accepted, True in acted) == (allowed, allowed)
+
+
+@pytest.mark.parametrize(("name", "allowed"), [("operator", True), ("viewer", False), ("tracker", False)])
+def test_only_operators_set_controls(name, allowed, rig, secured):
+    acted = []
+    headers, capture = HeaderFactory("demo", WallClock()), secured("capture")
+    health = Health(LoopbackBus(), "capture", headers)
+    control_commands.answer_controls(capture, "sim", headers, health, lambda values: acted.append(values) or {})
+    assert eventually(lambda: control_commands.set_controls(rig, "sim", headers, 1.0, {}) is not None)
+    answer = control_commands.set_controls(secured(name), "sim", headers, 1.0, {"gain": 2.0})
+    assert (answer is not None, {"gain": 2.0} in acted) == (allowed, allowed)
 
 
 def test_who_connects_is_in_the_log_of_the_router(rig, secured, caplog):

@@ -1,14 +1,20 @@
 """`abs-service capture` in this process, with devices that do what a test says."""
 
 import threading
+from functools import partial
 
 import pytest
 
 from abs_service import cli
+from abs_service.bus.session import Role
+from abs_service.bus.stamps import HeaderFactory, WallClock
+from abs_service.bus.zenoh_bus import ZenohBus
 from abs_service.commands.processes import capture
 from abs_service.supervision.exit_codes import Exit
+from abs_service.wire.control_commands import set_controls
 from drivers.contract.device import DeviceState
-from tests.abs_service.capture.fake_device import FakeDevice, frame
+from tests.abs_service.capture.fake_device import FakeDevice, adjustable, frame
+from tests.waiting import eventually
 
 RIG = """
 version = 1
@@ -20,12 +26,12 @@ sensors.head.device = "cam"
 
 @pytest.fixture
 def captured(tmp_path, endpoint, monkeypatch):
-    """Runs it with a device that does `start`, until `stop` or its end; returns the exit code."""
+    """Runs it with a device, until `stop` or its end; returns the exit code."""
     (tmp_path / "rig.toml").write_text(RIG)
 
-    def captured(start, stop):
+    def captured(device, stop):
         monkeypatch.setattr(capture.rig_process, "stop_on_signals", lambda: stop)
-        monkeypatch.setattr(capture, "open_device", lambda *_: FakeDevice(start=start))
+        monkeypatch.setattr(capture, "open_device", lambda *_: device)
         monkeypatch.setattr(capture.gc_tuning, "freeze_loaded_objects", lambda: None)
         return cli.main(["capture", str(tmp_path / "rig.toml"), "--listen", endpoint])
 
@@ -38,7 +44,7 @@ def test_the_exit_code_says_that_the_devices_have_ended(captured):
         sink.on_frame(frame())
         sink.on_state(DeviceState.CLOSED, "the recording has ended")
 
-    assert captured(ends, threading.Event()) == Exit.ENDED
+    assert captured(FakeDevice(start=ends), threading.Event()) == Exit.ENDED
 
 
 def test_the_exit_code_says_that_it_was_told_to_end(captured):
@@ -49,7 +55,28 @@ def test_the_exit_code_says_that_it_was_told_to_end(captured):
         sink.on_frame(frame())
         stop.set()
 
-    assert captured(works, stop) == Exit.OK
+    assert captured(FakeDevice(start=works), stop) == Exit.OK
+
+
+def test_controls_of_a_device_are_set_while_it_is_captured(captured, endpoint):
+    stop, device, answers = threading.Event(), adjustable(), []
+
+    def ask():
+        try:
+            with ZenohBus.open("demo", endpoint, Role.CLIENT) as bus:
+                send = partial(set_controls, bus, "cam", HeaderFactory("demo", WallClock()), 1.0)
+                eventually(lambda: (answer := send({})) is not None and answer.accepted)
+                answers.append(send({"exposure_s": 0.02}))
+        finally:
+            stop.set()
+
+    asking = threading.Thread(target=ask)
+    begin = device.start
+    device.start = lambda sink: (begin(sink), asking.start())
+    assert captured(device, stop) == Exit.OK
+    asking.join()
+    assert answers[0].accepted
+    assert device.controls.get("exposure_s") == 0.02
 
 
 class SetAfterTheFirstLook(threading.Event):
