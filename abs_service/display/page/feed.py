@@ -12,7 +12,7 @@ from absmsg.v1.deformation_state_pb2 import DeformationState
 from absmsg.v1.deformed_mesh_pb2 import DeformedMesh, MeshTopology
 from absmsg.v1.frame_info_pb2 import FrameInfo
 from absmsg.v1.health_pb2 import Health
-from absmsg.v1.sensor_model_pb2 import SensorModel
+from absmsg.v1.sensor_model_pb2 import Config, SensorModel
 from google.protobuf.message import DecodeError, Message
 from numpy.typing import NDArray
 
@@ -28,8 +28,8 @@ M = TypeVar("M", bound=Message)
 #: Time that numbers are kept [s], images that are kept of a stream, and the timeout of a query [s].
 MINUTE_S, IMAGES, QUERY_S = 60.0, 6, 0.2
 
-_PATTERNS = ("health/**", keys.state("*"), keys.mesh("*"), keys.topology("*"), keys.model("*"))
-_MESSAGES: tuple[type[Message], ...] = (Health, DeformationState, DeformedMesh, MeshTopology, SensorModel)
+_PATTERNS = ("health/**", keys.state("*"), keys.mesh("*"), keys.topology("*"), keys.model("*"), keys.CONFIG)
+_MESSAGES: tuple[type[Message], ...] = (Health, DeformationState, DeformedMesh, MeshTopology, SensorModel, Config)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -11,7 +11,7 @@ import viser
 from absmsg.v1.deformed_mesh_pb2 import DeformedMesh
 
 from abs_service.bus import keys
-from abs_service.display.page import pictures, status, table, words
+from abs_service.display.page import gravity, pictures, status, table, words
 from abs_service.display.page.choosing import Choosing, Measured
 from abs_service.display.page.commands import Commands
 from abs_service.display.page.controls import DeviceControls
@@ -115,6 +115,7 @@ class Page:
         colors = self._scales[name].colors(FIELDS[name].values(view))
         self._scene.show_mesh(tracker, view, colors, stale)
         self._scene.show_first(tracker, view, self._panel.shows[0])
+        self._scene.show_gravity(tracker, view, gravity.down(self._feed, tracker))
         self._trails.extend(tracker, (mesh.header.boot_id, mesh.mesh_version), view.vertices, mesh.header.t_host_ns)
         self._scene.show_trails(tracker, self._trails.lines(tracker))
 

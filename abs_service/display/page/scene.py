@@ -1,4 +1,4 @@
-"""The 3-D part of the page: mesh, its first pose, trails, points of the depth sensors, cameras."""
+"""The 3-D part of the page: mesh, its first pose, trails, gravity, points of the depth sensors, cameras."""
 
 import numpy as np
 import viser
@@ -7,6 +7,7 @@ from viser import transforms
 
 from abs_service.display.page.fields import MeshView
 from abs_service.display.page.gltf import glb
+from abs_service.display.page.gravity import Direction
 from calib.camera import Camera
 
 #: Colour of first pose, cameras and points, and size of a camera [m].
@@ -14,6 +15,9 @@ GHOST, CAMERA, POINT, CAMERA_M = (150, 160, 175), (80, 160, 220), (150, 175, 205
 
 #: Colour of trails, which no palette has, and the width of their lines [px].
 TRAIL, TRAIL_PX = (255, 80, 190), 3.0
+
+#: Colour of the arrow of gravity; its length and its shaft's radius, as shares of the mesh's extent.
+GRAVITY, GRAVITY_LENGTH, GRAVITY_RADIUS = (240, 200, 80), 0.4, 0.008
 
 #: Colour of everything that is stale.
 STALE = (70, 70, 70)
@@ -39,6 +43,7 @@ class Scene:
         self._clouds: dict[str, viser.PointCloudHandle] = {}
         self._cameras: dict[str, str] = {}
         self._trails: dict[str, viser.LineSegmentsHandle] = {}
+        self._gravity: dict[str, tuple[float, ...]] = {}  # direction and start of each arrow
         server.on_client_connect(self._aim)
         server.scene.set_up_direction("-y")
         server.scene.configure_default_lights(enabled=True, cast_shadow=False)
@@ -82,6 +87,18 @@ class Scene:
             self._trails[tracker] = add(f"/trails/{tracker}", lines, TRAIL, **width)
         elif (shown := self._trails.pop(tracker, None)) is not None:
             shown.remove()
+
+    def show_gravity(self, tracker: str, view: MeshView, down: Direction | None) -> None:
+        """Shows gravity as an arrow from the middle of the first pose of a tracker's mesh, if it is known."""
+        middle = view.first.mean(axis=0)
+        if down is None or self._gravity.get(tracker) == (*down, *middle):
+            return
+        self._gravity[tracker] = *down, *middle
+        extent_m = float(np.linalg.norm(np.ptp(view.first, axis=0)))
+        end, radius = middle + GRAVITY_LENGTH * extent_m * np.array(down), GRAVITY_RADIUS * extent_m
+        name, ends, add = f"/gravity/{tracker}", np.array([[middle, end]]), self._server.scene.add_arrows
+        add(name, ends, GRAVITY, shaft_radius=radius, head_radius=3 * radius, head_length=8 * radius)
+        self._server.scene.add_label(f"{name}/name", "gravity", position=tuple(end))
 
     def show_points(
         self, sensor: str, points: NDArray[np.float32], spacing_m: float, stale: bool, visible: bool
