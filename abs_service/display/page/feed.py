@@ -72,7 +72,8 @@ class Source(Protocol):
 class Feed:
     """Collects the messages of a rig. Its methods may be called from one thread; messages arrive in another.
 
-    Where the clock goes back, as in a recording, all that was collected is forgotten.
+    Those that `status` needs may be called from any thread. Where the clock goes back, as in a recording, all that was
+    collected is forgotten.
 
     Args:
         source: of the messages.

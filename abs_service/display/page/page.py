@@ -1,7 +1,7 @@
 """The page: reads the feed and updates scene and panel, a few times a second each, while a browser is connected."""
 
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, redirect_stdout
 from dataclasses import replace
 from os import devnull
@@ -18,6 +18,7 @@ from abs_service.display.page.controls import DeviceControls
 from abs_service.display.page.feed import Feed
 from abs_service.display.page.fields import FIELDS, ColorScale, Drawn, MeshView, joined, residual
 from abs_service.display.page.gestures import Gestures, Ray
+from abs_service.display.page.neighbours import Neighbour, links
 from abs_service.display.page.panel import Button, Panel
 from abs_service.display.page.plots import plots
 from abs_service.display.page.recording import ask
@@ -48,6 +49,9 @@ class Page:
         view_only: True leaves out everything that acts on the rig.
         commands: to the rig.
         clock: monotonic time [ns].
+
+    Attributes:
+        neighbours: other rigs, to which there are links.
     """
 
     def __init__(
@@ -56,6 +60,7 @@ class Page:
         self._feed, self._silence, self._references, self._clock = feed, silence, commands.references, clock
         with _quiet():
             self._server = viser.ViserServer(HOST, port, label="abs-service", verbose=False)
+        self.neighbours: Sequence[Neighbour] = ()
         self._scene = Scene(self._server)
         self._gestures, self._trails = Gestures(self._server.scene), Trails()
         self._panel = Panel(self._server, self._trail_buttons() | ({} if view_only else self._buttons()))
@@ -184,6 +189,7 @@ class Page:
         tracker = self._panel.tracker
         numbers = self._feed.numbers(tracker)
         self._panel.show_status(status.lines(self._feed, tracker, self._silence))
+        self._panel.show_neighbours(links(self.neighbours))
         self._panel.show_legend(self._scales[self._panel.field].end)
         self._panel.show_table(table.rows(self._feed, tracker))
         self._panel.show_plots(plots(numbers, self._feed.now_s))

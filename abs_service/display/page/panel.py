@@ -50,6 +50,7 @@ class Panel:
         gui.main_panel.dock_right()
         gui.configure_theme(control_width="large", dark_mode=True, show_logo=False, show_share_button=False)
         self._status, self._renewed = gui.add_html("", order=0.0), 0
+        self._neighbours = gui.add_html("", order=0.1, visible=False)
         self._tracker = gui.add_dropdown("Tracker", list[str](["–"]), visible=False)
         self._tabs = tabs = gui.add_tab_group()
         with tabs.add_tab("View"):
@@ -108,6 +109,11 @@ class Panel:
             style = f"background:{one.color};color:white;padding:8px 12px;border-radius:6px;margin:6px 8px"
             lines.append(f"<div class='abs-status' style='{style}'>{title}{text}</div>")
         self._status.content = "".join(lines)
+
+    def show_neighbours(self, links: str) -> None:
+        """Shows HTML with links to other rigs."""
+        if self._neighbours.content != links:
+            self._neighbours.content, self._neighbours.visible = links, bool(links)
 
     def show_legend(self, end: float) -> None:
         """Shows the colours of the mesh; `end` has the last one."""

@@ -1,5 +1,7 @@
 """`abs-service view`, and `run --view`, without a browser."""
 
+import threading
+from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
@@ -8,6 +10,7 @@ from abs_service import config
 from abs_service.cli import command_parser, main
 from abs_service.commands import run
 from abs_service.commands.running import view
+from tests.abs_service.bus.loopback import LoopbackBus
 
 
 @pytest.mark.parametrize(
@@ -34,10 +37,12 @@ def test_run_serves_a_page_only_if_asked_with_the_options_of_view(options, given
     [
         (["x.mcap", "--connect", "tcp/127.0.0.1:1"], "a recording is read from its file"),
         (["x.mcap"], "x.mcap: No such file"),
+        (["rig.toml", "x.mcap"], "x.mcap: a recording is shown alone"),
+        (["a.toml", "b.toml", "--connect", "tcp/127.0.0.1:1"], "each of several rigs has the endpoint of its file"),
         (["x.mcap.active"], "x.mcap.active: No such file"),
     ],
 )
-def test_a_recording_that_cannot_be_shown_is_a_mistake_of_the_user(capsys, arguments, reason):
+def test_what_cannot_be_shown_is_a_mistake_of_the_user(capsys, arguments, reason):
     pytest.importorskip("viser")
     assert main(["view", *arguments]) == 2
     assert reason in capsys.readouterr().err
@@ -48,3 +53,49 @@ def test_without_viser_the_extra_is_named(monkeypatch, capsys, command):
     monkeypatch.setattr(view, "find_spec", lambda _: None)
     assert main([command, *(["--view"] if command == "run" else [])]) == 2
     assert ".venv/bin/pip install -e '.[view]'" in capsys.readouterr().err
+
+
+@pytest.fixture
+def served(monkeypatch, tmp_path):
+    """Serves pages of rigs with these names until `stop`, which is set; returns the pages."""
+    pages, made = pytest.importorskip("abs_service.commands.running.pages"), []
+    stop = threading.Event()
+    stop.set()
+    monkeypatch.setattr(pages.rig_process, "stop_on_signals", lambda: stop)
+    monkeypatch.setattr(pages.rig_process, "open_bus", lambda *_: nullcontext(LoopbackBus()))
+
+    class Kept(pages.Page):
+        def __init__(self, *arguments):
+            super().__init__(*arguments)
+            made.append(self)
+
+    monkeypatch.setattr(pages, "Page", Kept)
+
+    def served(*names):
+        for name in names:
+            rig = config.load_default().model_copy(update={"name": name})
+            (tmp_path / f"{name}.toml").write_text(config.to_toml(rig), "utf-8")
+        assert main(["view", *(str(tmp_path / f"{name}.toml") for name in names), "--port", "0"]) == 0
+        return made
+
+    return served
+
+
+def test_each_of_several_rigs_has_a_page_with_links_to_the_others(served, capsys):
+    left, right, third = served("left", "right", "third")
+    assert [one.name for one in right.neighbours] == ["left", "third"]
+    assert [one.url for one in right.neighbours] == [left.url, third.url]
+    assert f"live page of right: {right.url}\n" in capsys.readouterr().out
+
+
+def test_one_rig_has_no_links(served, capsys):
+    (page,) = served("left")
+    assert page.neighbours == []
+    assert f"live page: {page.url}\n" in capsys.readouterr().out
+
+
+def test_a_page_that_fails_ends_all_of_them(served, monkeypatch):
+    pages = pytest.importorskip("abs_service.commands.running.pages")
+    monkeypatch.setattr(pages.Page, "run", lambda *_: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        served("left", "right")

@@ -97,3 +97,16 @@ def test_the_legend_has_the_colours_and_the_end_of_the_chosen_quantity(server, a
     (legend,) = added[:1]
     assert legend.label == "0 … 5 mm"
     assert (legend.image[0, ::2] == PALETTES[False]).all()
+
+
+def test_links_to_other_rigs_are_shown_if_there_are_some(server, monkeypatch):
+    added, add = [], server.gui.add_html
+    monkeypatch.setattr(
+        server.gui, "add_html", lambda *given, **options: added.append(add(*given, **options)) or added[-1]
+    )
+    panel = Panel(server, {})
+    panel.show_neighbours("")
+    assert not added[1].visible
+    panel.show_neighbours("<a>right</a>")
+    assert added[1].visible
+    assert added[1].content == "<a>right</a>"
