@@ -1,4 +1,4 @@
-"""The picture of the README: what the simulated cameras see, and the mesh that the tracker found there.
+"""Images of the simulated sheet as cameras of today make them, and the mesh that the tracker found there.
 
 python -m evaluation.pictures.overview docs/images/overview.png
 """
@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, SubFigure
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from mpl_toolkits.mplot3d.axes3d import Axes3D
 from numpy.typing import NDArray
@@ -22,6 +22,9 @@ from calib.rig import Rig
 from drivers.simulated import address
 from drivers.simulated.simulation import Simulation
 
+#: The demo rig's world, as a depth and a colour camera of today see it.
+URI = "simulated://sheet?seed=1&tof=640x480&color=640x480"
+
 #: Exposure that is shown: the sheet is bent most in the first ten seconds.
 SHOWN = 121
 
@@ -32,7 +35,7 @@ def main() -> None:
     parser.add_argument("picture", type=Path)
     path = parser.parse_args().picture
     settings = config.load_default()
-    simulation = address.parse(settings.devices["sim"].uri).build()
+    simulation = address.parse(URI).build()
     rig = wiring.rig(settings, "sheet", {name: head.camera for name, head in simulation.heads.items()})
     tracking = TrackingSession(rig, wiring.plan(settings, "sheet"))
     synchroniser = Synchroniser(settings.reference("sheet"), streams(rig.sensors.values()), 1)
@@ -44,27 +47,27 @@ def main() -> None:
     ]
     if tracking.mesh is None:
         raise RuntimeError("the demo rig sees no object")
-    figure = Figure(figsize=(14, 4.4), layout="constrained")
-    _draw_images(figure, simulation, rig, estimates[-1], tracking.mesh.faces)
-    _draw_mesh(figure, simulation, estimates[-1].vertices.astype(float), tracking.mesh.faces)
+    figure = Figure(figsize=(14, 3.6), layout="constrained")
+    near, seen, mesh = (figure.add_subfigure(place) for place in figure.add_gridspec(1, 3))  # whose titles are in line
+    _draw_images((near, seen), simulation, rig, estimates[-1], tracking.mesh.faces)
+    _draw_mesh(mesh, simulation, estimates[-1].vertices.astype(float), tracking.mesh.faces)
     figure.savefig(path, dpi=90)
 
 
 def _draw_images(
-    figure: Figure, simulation: Simulation, rig: Rig, estimate: Estimate, faces: NDArray[np.int32]
+    figures: tuple[SubFigure, SubFigure], simulation: Simulation, rig: Rig, estimate: Estimate, faces: NDArray[np.int32]
 ) -> None:
     images = {frame.key: frame for frame in simulation.expose(SHOWN)[0]}
-    near = figure.add_subplot(131)
+    near, seen = (figure.add_subplot() for figure in figures)
     distance = images["tof", "depth"].si()
     middle = float(np.median(np.linalg.norm(estimate.vertices, axis=1)))
     near.imshow(distance, cmap="viridis", vmin=middle - 0.06, vmax=middle + 0.06, interpolation="nearest")
-    near.set_title("time of flight: distance", fontsize=11)
+    figures[0].suptitle("time of flight: distance", fontsize=11)
     _crop(near, rig, "tof", estimate)
-    seen = figure.add_subplot(132)
     seen.imshow(images["color", "color"].data, interpolation="nearest")
     u, v = rig.sensors["color"].camera.project(estimate.vertices).T
     seen.triplot(u, v, faces, color="white", linewidth=0.6)
-    seen.set_title("colour, with the tracked mesh", fontsize=11)
+    figures[1].suptitle("colour, with the tracked mesh", fontsize=11)
     _crop(seen, rig, "color", estimate)
 
 
@@ -76,11 +79,13 @@ def _crop(axes: Axes, rig: Rig, sensor: str, estimate: Estimate) -> None:
     axes.set_axis_off()
 
 
-def _draw_mesh(figure: Figure, simulation: Simulation, vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> None:
+def _draw_mesh(
+    figure: SubFigure, simulation: Simulation, vertices: NDArray[np.float64], faces: NDArray[np.int32]
+) -> None:
     truth = simulation.expose(SHOWN)[1].points_r.astype(float)
     error_mm = np.linalg.norm(vertices - closest_points(vertices, truth), axis=1) * 1e3
     points = vertices[:, [0, 2, 1]] * (1, 1, -1)
-    axes = figure.add_subplot(133, projection="3d")
+    axes = figure.add_subplot(projection="3d")
     surface = Poly3DCollection(points[faces], cmap="magma_r", edgecolor="0.3", linewidth=0.2)
     surface.set_array(error_mm[faces].mean(axis=1))
     surface.set_clim(0, 4)
@@ -91,7 +96,7 @@ def _draw_mesh(figure: Figure, simulation: Simulation, vertices: NDArray[np.floa
         axes.set_box_aspect(high - low, zoom=1)
         axes.view_init(elev=35, azim=-50)
     axes.set_axis_off()
-    axes.set_title(f"the mesh in space: {error_mm.mean():.1f} mm from the true surface", fontsize=11)
+    figure.suptitle(f"the mesh in space: {error_mm.mean():.1f} mm from the true surface", fontsize=11)
     figure.colorbar(surface, ax=axes, label="distance from the truth [mm]", shrink=0.7)
 
 
