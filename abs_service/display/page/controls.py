@@ -62,6 +62,8 @@ class DeviceControls:
             except ValueError as error:
                 self._answer.content = f"{error}."
                 return
+            # Switches first: some cameras take an exposure time only when the automatic one is off.
+            changed = dict(sorted(changed.items(), key=lambda one: not isinstance(one[1], bool)))
             answer = self._send(device, changed)
             if answer is not None and answer.accepted:
                 self._show(device, answer.controls)

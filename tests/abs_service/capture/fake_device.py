@@ -76,8 +76,8 @@ def adjustable():
     device.controls = Controls(
         control(info)
         for info in (
-            ControlInfo("auto_exposure", ControlKind.SWITCH),
             EXPOSURE,
+            ControlInfo("auto_exposure", ControlKind.SWITCH),
             ControlInfo("infrared_gain", ControlKind.WHOLE, minimum=1, maximum=50),
             ControlInfo("sync_role", ControlKind.CHOICE, choices=("free", "master")),
         )

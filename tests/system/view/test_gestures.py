@@ -43,8 +43,9 @@ def test_a_page_that_only_shows_has_no_buttons_that_act_and_follows_vertices(run
     launch("view", rig_file, "--port", port, "--view-only")
     page, _ = opened(browser, port)
     says(page, "Tracking")
-    for name in ("Reinitialise", "Choose the object", "Start recording", "Stop recording"):
+    for name in ("Reinitialise", "Choose the object", "Start recording", "Stop recording", "Read the controls"):
         assert page.get_by_role("button", name=name).count() == 0
+    assert page.get_by_role("tab", name="Devices").count() == 0
     page.get_by_role("button", name="Follow a vertex").click()
     says(page, "Click a vertex")
     assert trail_pixels(page) == 0

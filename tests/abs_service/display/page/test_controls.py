@@ -77,6 +77,15 @@ def test_only_what_was_changed_is_set_and_all_is_shown_as_it_is_then(bench):
     assert bench.said == "Nothing was changed."
 
 
+def test_switches_are_set_first_since_they_may_allow_the_rest(bench):
+    controls, page = bench.capture("cam", adjustable()), bench.page("cam")
+    page.read()
+    bench.added["exposure_s"].value, bench.added["auto_exposure"].value = "0.02", False
+    page.set("cam")
+    assert "auto_exposure = false\nexposure_s = 0.02\n" in bench.said
+    assert controls.get("exposure_s") == 0.02
+
+
 @pytest.mark.parametrize(
     ("name", "given", "words"),
     [
