@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.api.estimate import Estimate
-from abs_service.display.page.gltf import INDICES, VERTICES, Buffer
+from abs_service.display.page.scene.gltf import INDICES, VERTICES, Buffer
 from abs_service.export.arrays import mesh_numbers
 from abs_service.export.errors import ExportError
 

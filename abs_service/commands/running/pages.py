@@ -12,12 +12,12 @@ from absmsg.v1.command_pb2 import CommandAnswer
 from abs_service.bus.health import Health
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.commands.parts import rig_process
-from abs_service.display.page.commands import NONE, Commands
+from abs_service.display.page.acting.commands import NONE, Commands
 from abs_service.display.page.feed import Feed
-from abs_service.display.page.neighbours import Neighbour
 from abs_service.display.page.page import Page
 from abs_service.display.page.playback import Playback
 from abs_service.display.page.player import Player
+from abs_service.display.page.readouts.neighbours import Neighbour
 from abs_service.wire import commands, control_commands
 from drivers.contract.controls import Value
 

@@ -1,1 +1,1 @@
-"""The live page of a rig in a browser. `page.py`, `scene.py` and `panel.py` know viser."""
+"""The live page of a rig in a browser. `page`, `panel`, `scene`, `player` and `acting` know viser."""

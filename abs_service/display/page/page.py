@@ -11,20 +11,22 @@ import viser
 from absmsg.v1.deformed_mesh_pb2 import DeformedMesh
 
 from abs_service.bus import keys
-from abs_service.display.page import gravity, pictures, status, table, words
-from abs_service.display.page.choosing import Choosing, Measured
-from abs_service.display.page.commands import Commands
-from abs_service.display.page.controls import DeviceControls
+from abs_service.display.page import pictures
+from abs_service.display.page.acting.choosing import Choosing, Measured
+from abs_service.display.page.acting.commands import Commands
+from abs_service.display.page.acting.controls import DeviceControls
+from abs_service.display.page.acting.gestures import Gestures, Ray
+from abs_service.display.page.acting.recording import ask
+from abs_service.display.page.acting.reinitialization import Reinitialization
 from abs_service.display.page.feed import Feed
-from abs_service.display.page.fields import FIELDS, ColorScale, Drawn, MeshView, joined, residual
-from abs_service.display.page.gestures import Gestures, Ray
-from abs_service.display.page.neighbours import Neighbour, links
 from abs_service.display.page.panel import Button, Panel
-from abs_service.display.page.plots import plots
-from abs_service.display.page.recording import ask
-from abs_service.display.page.reinitialization import Reinitialization
-from abs_service.display.page.scene import Scene
-from abs_service.display.page.trails import Trails
+from abs_service.display.page.readouts import status, table, words
+from abs_service.display.page.readouts.neighbours import Neighbour, links
+from abs_service.display.page.readouts.plots import plots
+from abs_service.display.page.scene import gravity
+from abs_service.display.page.scene.fields import FIELDS, ColorScale, Drawn, MeshView, joined, residual
+from abs_service.display.page.scene.scene import Scene
+from abs_service.display.page.scene.trails import Trails
 from abs_service.tracking.log.tracker_log import points
 from calib.camera import Camera
 from drivers.contract.frame import Frame, Kind

@@ -9,10 +9,10 @@ import numpy as np
 import viser
 from viser import uplot
 
-from abs_service.display.page.fields import FIELDS, PALETTES
 from abs_service.display.page.pictures import Picture
-from abs_service.display.page.plots import Curves, complete
-from abs_service.display.page.words import STALE_COLOR, Words
+from abs_service.display.page.readouts.plots import Curves, complete
+from abs_service.display.page.readouts.words import STALE_COLOR, Words
+from abs_service.display.page.scene.fields import FIELDS, PALETTES
 
 _LINES = ("#3b82f6", "#f59e0b", "#10b981", "#ef4444", "#a78bfa")
 

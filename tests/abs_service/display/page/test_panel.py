@@ -9,9 +9,9 @@ import pytest
 
 viser = pytest.importorskip("viser")
 
-from abs_service.display.page.fields import PALETTES  # noqa: E402 - needs viser
 from abs_service.display.page.panel import Button, Panel  # noqa: E402 - needs viser
-from abs_service.display.page.plots import STEPS  # noqa: E402 - needs viser
+from abs_service.display.page.readouts.plots import STEPS  # noqa: E402 - needs viser
+from abs_service.display.page.scene.fields import PALETTES  # noqa: E402 - needs viser
 
 
 @pytest.fixture

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from abs_service.display.page import pictures
-from abs_service.display.page.gltf import glb
+from abs_service.display.page.scene.gltf import glb
 from calib.camera import Camera
 from drivers.contract.frame import Frame, Geometry, Kind
 

@@ -11,7 +11,7 @@ viser = pytest.importorskip("viser")
 from abs_service.bus.health import Health  # noqa: E402 - needs viser
 from abs_service.bus.stamps import HeaderFactory, WallClock  # noqa: E402 - needs viser
 from abs_service.capture.asked_controls import AskedControls  # noqa: E402 - needs viser
-from abs_service.display.page.controls import DeviceControls  # noqa: E402 - needs viser
+from abs_service.display.page.acting.controls import DeviceControls  # noqa: E402 - needs viser
 from abs_service.wire import control_commands  # noqa: E402 - needs viser
 from tests.abs_service.bus.loopback import LoopbackBus  # noqa: E402 - needs viser
 from tests.abs_service.capture.fake_device import adjustable, working  # noqa: E402 - needs viser

@@ -7,9 +7,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.display.page.fields import MeshView, joined
-from abs_service.display.page.gestures import Ray
+from abs_service.display.page.acting.gestures import Ray
 from abs_service.display.page.pictures import under_ray
+from abs_service.display.page.scene.fields import MeshView, joined
 
 #: Length of a trail [ns].
 TRAIL_NS = 10_000_000_000

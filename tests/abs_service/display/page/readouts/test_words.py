@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from abs_service.display.page import words
+from abs_service.display.page.readouts import words
 
 
 @pytest.mark.parametrize(

@@ -7,9 +7,9 @@ from absmsg.v1.deformation_state_pb2 import DeformationState
 from absmsg.v1.health_pb2 import Health
 
 from abs_service.bus import keys
-from abs_service.display.page import words
 from abs_service.display.page.feed import Feed, rate_hz
-from abs_service.display.page.words import STALE_S, STATUS, Words
+from abs_service.display.page.readouts import words
+from abs_service.display.page.readouts.words import STALE_S, STATUS, Words
 
 
 def lines(feed: Feed, tracker: str, silence: str) -> list[Words]:

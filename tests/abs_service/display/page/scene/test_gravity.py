@@ -11,12 +11,12 @@ from absmsg.v1.sensor_model_pb2 import Config
 from abs_service import config
 from abs_service.bus import keys
 from abs_service.bus.contract import EVENTS
-from abs_service.display.page import gravity
 from abs_service.display.page.feed import Feed
-from abs_service.display.page.fields import MeshView
+from abs_service.display.page.scene import gravity
+from abs_service.display.page.scene.fields import MeshView
 from tests.abs_service.bus.loopback import LoopbackBus
 
-STRIP = Path(__file__).parents[4] / "examples" / "rigs" / "gravity.toml"
+STRIP = Path(__file__).parents[5] / "examples" / "rigs" / "gravity.toml"
 
 
 def down(toml, tracker="strip"):
@@ -55,7 +55,7 @@ def test_a_configuration_that_is_none_has_no_gravity(toml):
 
 
 def test_the_arrow_begins_in_the_mesh_and_is_drawn_once():
-    viser, scene = pytest.importorskip("viser"), pytest.importorskip("abs_service.display.page.scene")
+    viser, scene = pytest.importorskip("viser"), pytest.importorskip("abs_service.display.page.scene.scene")
     first, empty = np.array([[0.0, 0, 1], [0.2, 0, 1], [0, 0.4, 1]]), np.empty((0, 6))
     view = MeshView(first, first, np.array([[0, 1, 2]], np.int32), empty, np.empty((0, 0)), None)
     with redirect_stdout(StringIO()):

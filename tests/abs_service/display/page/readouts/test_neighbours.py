@@ -5,9 +5,9 @@ from absmsg.v1.deformation_state_pb2 import DeformationState
 
 from abs_service.bus import keys
 from abs_service.bus.contract import STATE
-from abs_service.display.page import words
 from abs_service.display.page.feed import Feed
-from abs_service.display.page.neighbours import Neighbour, links
+from abs_service.display.page.readouts import words
+from abs_service.display.page.readouts.neighbours import Neighbour, links
 from tests.abs_service.bus.loopback import LoopbackBus
 
 

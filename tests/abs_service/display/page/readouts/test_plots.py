@@ -3,7 +3,7 @@
 import numpy as np
 
 from abs_service.display.page.feed import Numbers
-from abs_service.display.page.plots import COMPONENTS, STEPS, binned, complete, moving, plots
+from abs_service.display.page.readouts.plots import COMPONENTS, STEPS, binned, complete, moving, plots
 
 
 def numbers(t_s, theta, model_id="a", deviation_mm=0.5) -> Numbers:

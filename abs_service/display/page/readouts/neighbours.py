@@ -4,8 +4,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from html import escape
 
-from abs_service.display.page import status, words
 from abs_service.display.page.feed import Feed
+from abs_service.display.page.readouts import status, words
 
 #: Colours of a state, the worst first.
 _WORST = (*(words.STATUS[name][1] for name in ("LOST", "DEGRADED")), words.STALE_COLOR, words.STATUS["INITIALIZING"][1])

@@ -4,7 +4,7 @@ import pytest
 
 from abs_service.bus.health import Health
 from abs_service.bus.stamps import HeaderFactory, WallClock
-from abs_service.display.page import recording
+from abs_service.display.page.acting import recording
 from abs_service.recording.triggers.trigger import ALWAYS, Asked
 from abs_service.wire import commands
 from tests.abs_service.bus.loopback import LoopbackBus

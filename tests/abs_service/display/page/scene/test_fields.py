@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from abs_service.display.page import fields
-from abs_service.display.page.fields import FIELDS, GREY, ColorScale, MeshView
+from abs_service.display.page.scene import fields
+from abs_service.display.page.scene.fields import FIELDS, GREY, ColorScale, MeshView
 from calib.camera import Camera
 
 CAMERA = Camera(40, 30, 40.0, 40.0, 19.5, 14.5)

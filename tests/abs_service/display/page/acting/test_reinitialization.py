@@ -6,8 +6,8 @@ from absmsg.v1.deformation_state_pb2 import DeformationState
 
 from abs_service.bus import keys
 from abs_service.bus.contract import STATE
+from abs_service.display.page.acting.reinitialization import ANSWER_S, Reinitialization
 from abs_service.display.page.feed import Feed
-from abs_service.display.page.reinitialization import ANSWER_S, Reinitialization
 from abs_service.wire.commands import Choice
 from tests.abs_service.bus.loopback import LoopbackBus
 

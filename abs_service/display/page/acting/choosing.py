@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.display.page import pictures
-from abs_service.display.page.gestures import Eye, Gestures, Ray
+from abs_service.display.page.acting.gestures import Eye, Gestures, Ray
 from abs_service.wire import commands
 from abs_service.wire.commands import Choice, Pixel
 from calib.camera import Camera

@@ -7,8 +7,8 @@ from absmsg.v1.deformation_state_pb2 import DeformationState
 from absmsg.v1.health_pb2 import Health
 
 from abs_service.bus.contract import EVENTS
-from abs_service.display.page import status
 from abs_service.display.page.feed import Feed
+from abs_service.display.page.readouts import status
 from tests.abs_service.bus.loopback import LoopbackBus
 
 

@@ -3,9 +3,9 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from abs_service.display.page import controls
-from abs_service.display.page.recording import Record
-from abs_service.display.page.reinitialization import Send
+from abs_service.display.page.acting import controls
+from abs_service.display.page.acting.recording import Record
+from abs_service.display.page.acting.reinitialization import Send
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from abs_service.display.page import choosing
-from abs_service.display.page.choosing import Choosing, Measured
-from abs_service.display.page.gestures import Eye
+from abs_service.display.page.acting import choosing
+from abs_service.display.page.acting.choosing import Choosing, Measured
+from abs_service.display.page.acting.gestures import Eye
 from abs_service.tracker.detection.segments.within import filled
 from abs_service.wire.commands import Choice
 from calib.camera import Camera

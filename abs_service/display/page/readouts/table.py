@@ -8,8 +8,8 @@ from absmsg.v1.deformation_state_pb2 import DeformationState
 from absmsg.v1.health_pb2 import Health
 
 from abs_service.bus import keys
-from abs_service.display.page import words
 from abs_service.display.page.feed import Feed, rate_hz
+from abs_service.display.page.readouts import words
 
 #: First parts of the counters that count losses.
 LOSSES = frozenset({"dropped", "lost", "malformed", "unused", "skipped"})

@@ -5,9 +5,9 @@ import viser
 from numpy.typing import NDArray
 from viser import transforms
 
-from abs_service.display.page.fields import MeshView
-from abs_service.display.page.gltf import glb
-from abs_service.display.page.gravity import Direction
+from abs_service.display.page.scene.fields import MeshView
+from abs_service.display.page.scene.gltf import glb
+from abs_service.display.page.scene.gravity import Direction
 from calib.camera import Camera
 
 #: Colour of first pose, cameras and points, and size of a camera [m].

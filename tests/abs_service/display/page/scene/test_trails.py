@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from abs_service.display.page.fields import MeshView
-from abs_service.display.page.trails import GAP_NS, TRAIL_NS, Trails
+from abs_service.display.page.scene.fields import MeshView
+from abs_service.display.page.scene.trails import GAP_NS, TRAIL_NS, Trails
 
 FRAME_NS = 33_000_000
 SQUARE = np.array([[0.0, 0, 1], [0.1, 0, 1], [0, 0.1, 1], [0.1, 0.1, 1]])

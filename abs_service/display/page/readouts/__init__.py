@@ -1,0 +1,1 @@
+"""State of a rig in words, numbers and curves."""
