@@ -1,5 +1,17 @@
-"""`python -m abs_service` is `abs-service`."""
+"""`abs-service`, and `python -m abs_service`: the command line, where Ctrl-C while it is imported is no traceback."""
 
-from abs_service.cli import program
+import sys
 
-program()
+
+def start() -> None:
+    """Runs the command line as a process."""
+    try:
+        from abs_service.cli import program  # noqa: PLC0415 - here, where Ctrl-C is caught
+
+        program()
+    except KeyboardInterrupt:
+        sys.exit(130)  # `Exit.INTERRUPTED`, which may not be imported yet
+
+
+if __name__ == "__main__":
+    start()

@@ -7,10 +7,12 @@ Such a module has a docstring (its help; examples after the first paragraph), `a
 
 import argparse
 import os
+import signal
 import sys
 import threading
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import partial
 from importlib import import_module
 from types import ModuleType
@@ -119,7 +121,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             return Exit.USER
         chosen = parser.parse_args(given[:1]).command
         name, given = f"{name} {chosen}".strip(), given[1:]
-        module = import_module(f"{module.__name__}.{MODULES.get(name, chosen)}")
+        with _ended_by_interrupt():
+            module = import_module(f"{module.__name__}.{MODULES.get(name, chosen)}")
         commands = getattr(module, "COMMANDS", {})
     from abs_service.commands.parts import logs  # noqa: PLC0415 - `logging` takes a third of the time of --help
 
@@ -139,6 +142,18 @@ def main(argv: Sequence[str] | None = None) -> int:
         return Exit.PIPE_CLOSED
     except Exception as error:
         return logs.end_with(standard_files.blamed(error), arguments)
+
+
+@contextmanager
+def _ended_by_interrupt() -> Iterator[None]:
+    """Within it, Ctrl-C is no exception: native libraries take one for a failure of their imports, or swallow it."""
+    before = signal.getsignal(signal.SIGINT)
+    if before is signal.default_int_handler:
+        signal.signal(signal.SIGINT, lambda *_: os._exit(Exit.INTERRUPTED))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def _compute_with_one_thread() -> None:

@@ -15,7 +15,7 @@ import tempfile
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from importlib import import_module
-from multiprocessing import current_process, forkserver, util
+from multiprocessing import current_process, forkserver, resource_tracker, util
 from multiprocessing.connection import Connection
 from typing import Any
 
@@ -47,7 +47,12 @@ def preload(module: str) -> None:
     current_process()._config["tempdir"] = folder  # pyright: ignore # noqa: SLF001
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     CONTEXT.set_forkserver_preload([module])
-    forkserver.ensure_running()
+    resource_tracker.ensure_running()  # first, since it unblocks the signal
+    signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT,))  # by Ctrl-C, the server would end with a traceback
+    try:
+        forkserver.ensure_running()
+    finally:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, (signal.SIGINT,))
 
 
 def ensure_running() -> None:
@@ -87,6 +92,7 @@ def begin(
         program: runs the arguments.
         arguments: its command line.
     """
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, (signal.SIGINT,))  # which the first fork server has inherited
     os.setpgid(0, 0)  # Ctrl-C in the terminal reaches only the supervisor, which stops the children in order
     with stdin, output:
         for descriptor, end in ((0, stdin), (1, output), (2, output)):

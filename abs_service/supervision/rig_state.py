@@ -1,5 +1,6 @@
 """Current state of a running rig, collected from its messages."""
 
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 
@@ -50,6 +51,7 @@ class RigState:
         self.trackers = {name: TrackerLog() for name in trackers}
         self.received: dict[str, Received] = {}
         self.malformed = 0
+        self._ended: defaultdict[str, Counter[str]] = defaultdict(Counter)  # counters of processes that have ended
         self._clock = clock
 
     def take(self, sample: Sample) -> list[EstimateReport]:
@@ -63,6 +65,9 @@ class RigState:
     def _take(self, sample: Sample) -> list[EstimateReport]:
         if sample.message == Health.DESCRIPTOR.full_name:
             health = Health.FromString(sample.payload)
+            before = self.health(health.component)
+            if before.header.boot_id != health.header.boot_id:
+                self._ended[health.component].update(before.counters)
             previous = replace(self.received.get(health.component, Received()), previous=None)
             self.received[health.component] = Received(health, self._clock(), previous if previous.t_ns else None)
         elif sample.message == SurfaceTruth.DESCRIPTOR.full_name:
@@ -74,6 +79,12 @@ class RigState:
     def health(self, component: str) -> Health:
         """Last health of a component; empty if there is none yet."""
         return self.received.get(component, Received()).health
+
+    def counters(self, component: str) -> Counter[str]:
+        """Counters of a component, of all its processes together: each one that is started again counts from zero."""
+        total = Counter(self._ended[component])
+        total.update(self.health(component).counters)
+        return total
 
     def preparing(self) -> bool:
         """True if a tracker is compiling its kernels, or loading them from the cache."""

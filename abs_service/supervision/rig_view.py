@@ -26,7 +26,7 @@ class Stream:
 
 @dataclass(frozen=True)
 class Recording:
-    """The recorder: file being written, its size, bytes written per second, recorded and dropped messages.
+    """The recorder: file being written, its size, bytes written per second; files, recorded and dropped messages.
 
     `forecast` says how long the disk lasts; "" in the first seconds.
     """
@@ -34,6 +34,7 @@ class Recording:
     file: Path
     size: int
     rate: float
+    files: int
     recorded: int
     dropped: int
     forecast: str
@@ -70,15 +71,16 @@ class RigView:
     @property
     def streams(self) -> list[Stream]:
         """All streams of images, by name."""
-        health, ages = self.live.health("capture"), self._ages_ms()
-        topics = [key.removeprefix("published.") for key in health.counters if key.startswith("published.")]
+        counters, ages = self.live.counters("capture"), self._ages_ms()
+        gauges = self.live.health("capture").gauges
+        topics = [key.removeprefix("published.") for key in counters if key.startswith("published.")]
         return [
             Stream(
                 name=topic.removesuffix("/image"),
-                rate_hz=health.gauges.get(f"rate_hz.{topic}", 0.0),
+                rate_hz=gauges.get(f"rate_hz.{topic}", 0.0),
                 age_ms=ages.get(topic.partition("/")[0]),
-                published=health.counters[f"published.{topic}"],
-                dropped=health.counters.get(f"dropped.{topic}", 0),
+                published=counters[f"published.{topic}"],
+                dropped=counters[f"dropped.{topic}"],
             )
             for topic in sorted(topics)
             if keys.is_image(topic)
@@ -87,15 +89,16 @@ class RigView:
     @property
     def recording(self) -> Recording | None:
         """The recorder; None if it did not begin a file."""
-        health = self.live.health("record")
+        health, counters = self.live.health("record"), self.live.counters("record")
         if not health.labels.get("file"):
             return None
         return Recording(
             file=self.directory / Path(health.labels["file"]).name.removesuffix(".active"),
             size=int(health.gauges.get("file_bytes", 0)),
             rate=self.live.received["record"].rate("file_bytes"),
-            recorded=health.counters.get("recorded", 0),
-            dropped=_sum(health, "dropped."),
+            files=counters["files"],
+            recorded=counters["recorded"],
+            dropped=sum(number for name, number in counters.items() if name.startswith("dropped.")),
             forecast=health.labels.get("forecast", ""),
         )
 
@@ -139,10 +142,12 @@ class RigView:
         for name, tracker in self.live.trackers.items():
             lines += [f"{name}: {line}" for line in tracker.summary()]
         if recording:
-            numbers = f"{size(recording.size)}, {recording.recorded} messages, {recording.dropped} dropped"
-            lines.append(f"{_on_disk(recording.file)}: {numbers}")
-        if failures := self.live.health("record").counters.get("failures", 0):
-            lines.append(f"recording failed {failures}×, last: {self.live.health('record').labels['last_failure']}")
+            files = f"; {recording.files} files" if recording.files > 1 else ""
+            numbers = f"{files}, {recording.recorded} messages, {recording.dropped} dropped"
+            lines.append(f"{_on_disk(recording.file)}: {size(recording.size)}{numbers}")
+        if failures := self.live.counters("record")["failures"]:
+            reason = self.live.health("record").labels.get("last_failure", "")
+            lines.append(f"recording failed {failures}×" + (f", last: {reason}" if reason else ""))
         restarts = {child.component: child.restarts for child in self.children if child.restarts}
         if restarts:
             lines.append("restarts: " + ", ".join(f"{name} {number}" for name, number in restarts.items()))
@@ -197,7 +202,3 @@ def _on_disk(path: Path) -> str:
     if active.exists():
         return f"{active} (unfinished: `abs-service recover` completes it)"
     return str(path) if path.exists() else f"{path} (is gone)"
-
-
-def _sum(health: Health, prefix: str) -> int:
-    return sum(number for name, number in health.counters.items() if name.startswith(prefix))

@@ -5,12 +5,14 @@ import re
 import signal
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 from unittest.mock import Mock
 
 import pytest
 
 from abs_service import cli
+from abs_service.__main__ import start
 from abs_service.commands import check
 from abs_service.commands.running import reinitialize
 from abs_service.supervision.exit_codes import Exit
@@ -55,6 +57,26 @@ def test_130_for_ctrl_c_while_a_command_is_imported(monkeypatch, capsys):
     with pytest.raises(SystemExit) as ended:
         cli.program()
     assert (ended.value.code, capsys.readouterr().err) == (Exit.INTERRUPTED, "")
+
+
+def test_130_for_ctrl_c_while_the_command_line_is_imported(monkeypatch):
+    importer = Mock(find_spec=Mock(side_effect=KeyboardInterrupt))
+    monkeypatch.setattr(sys, "meta_path", [importer])
+    monkeypatch.delitem(sys.modules, "abs_service.cli")
+    with pytest.raises(SystemExit) as ended:
+        start()
+    assert ended.value.code == Exit.INTERRUPTED
+
+
+def test_130_for_ctrl_c_in_a_native_import_which_would_make_a_failure_of_its_own_of_an_exception(monkeypatch):
+    ends = Mock(side_effect=SystemExit)
+    monkeypatch.setattr(os, "_exit", ends)
+    interrupted = {"abs_service.commands.check": lambda name: signal.raise_signal(signal.SIGINT)}
+    monkeypatch.setattr(cli, "import_module", lambda name: interrupted.get(name, import_module)(name))
+    with pytest.raises(SystemExit):
+        cli.main(["check"])
+    ends.assert_called_once_with(Exit.INTERRUPTED)
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
 def test_130_for_ctrl_c(monkeypatch):

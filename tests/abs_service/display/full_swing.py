@@ -64,7 +64,7 @@ def recorder(file_bytes):
         level=Health.LEVEL_OK,
         labels={"file": "demo_2026.mcap.active"},
         gauges={"file_bytes": file_bytes},
-        counters={"recorded": 500, "dropped.tof/depth/image": 2, "dropped.color/color/image": 1},
+        counters={"files": 1, "recorded": 500, "dropped.tof/depth/image": 2, "dropped.color/color/image": 1},
     )
 
 

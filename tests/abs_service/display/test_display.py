@@ -39,6 +39,14 @@ def test_the_summary_says_what_there_is_of_a_recording_that_failed(live, tmp_pat
     assert "recording failed 2×, last: No space left on device" in summary
 
 
+def test_the_summary_counts_all_processes_of_a_component_that_was_started_again(live, tmp_path):
+    again = recorder(1_000_000)
+    again.header.boot_id = "another process"
+    take_health(live, again)
+    take_health(live, again)  # once a second
+    assert view(live, directory=tmp_path).summary()[3].endswith("1.0 MB; 2 files, 1000 messages, 6 dropped")
+
+
 def test_plain_output_is_one_line_a_second(live):
     out = io.StringIO()
     with Output(out.write) as file, PlainDisplay(file, Output(io.StringIO().write)) as display:
