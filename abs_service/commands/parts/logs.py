@@ -3,10 +3,13 @@
 import argparse
 import logging
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
+from typing import IO, cast
 
 import abs_service
+from abs_service.display.terminal import output
 from abs_service.supervision.exit_codes import Exit, is_for_user
 from abs_service.supervision.log_lines import ERROR, JsonFormatter
 from drivers.contract.text import printable
@@ -65,6 +68,20 @@ def set_up(arguments: argparse.Namespace, command: str, given: Sequence[str]) ->
     logging.basicConfig(level=arguments.log_level.upper(), handlers=[handler])
     fields = {"version": abs_service.__version__, "arguments": list(given)}
     _log.info("abs-service %s %s", command, abs_service.__version__, extra={"fields": fields})
+
+
+@contextmanager
+def in_background() -> Iterator[None]:
+    """Within it, nothing waits for a reader of standard error who stands still, as a halted terminal (Ctrl-S)."""
+    handlers = [one for one in logging.getLogger().handlers if getattr(one, "stream", None) is sys.stderr]
+    with output.of(sys.stderr) as background:
+        for handler in handlers:
+            cast(logging.StreamHandler[IO[str]], handler).setStream(background.file)
+        try:
+            yield
+        finally:
+            for handler in handlers:
+                cast(logging.StreamHandler[IO[str]], handler).setStream(sys.stderr)
 
 
 def end_with(error: Exception, arguments: argparse.Namespace) -> int:

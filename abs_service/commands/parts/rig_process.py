@@ -6,7 +6,7 @@ import signal
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
 from queue import SimpleQueue
 from types import FrameType
@@ -16,7 +16,7 @@ from abs_service.bus.security import roles
 from abs_service.bus.security.mutual_tls import TlsError
 from abs_service.bus.session import Role
 from abs_service.bus.zenoh_bus import ZenohBus
-from abs_service.commands.parts import library_output
+from abs_service.commands.parts import library_output, logs
 from abs_service.supervision import gc_tuning
 from abs_service.wire.checked_bus import CheckedBus
 
@@ -69,10 +69,9 @@ def load_config(arguments: argparse.Namespace) -> config.ServiceConfig:
     return config.load(arguments.config) if arguments.config else config.load_default()
 
 
-def open_bus(
-    rig: config.ServiceConfig, arguments: argparse.Namespace, *names: str
-) -> AbstractContextManager[CheckedBus]:
-    """The bus that the configuration and the arguments describe.
+@contextmanager
+def open_bus(rig: config.ServiceConfig, arguments: argparse.Namespace, *names: str) -> Iterator[CheckedBus]:
+    """The bus that the configuration and the arguments describe; within it, the log is written in the background.
 
     Args:
         rig: the configuration.
@@ -84,7 +83,9 @@ def open_bus(
         SecurityError: a file of `[bus.tls]` cannot be used.
     """
     role = Role.ROUTER if arguments.listen else Role.CLIENT
-    return open_bus_at(arguments.listen or arguments.connect or rig.bus.endpoint, role, rig, arguments, *names)
+    endpoint = arguments.listen or arguments.connect or rig.bus.endpoint
+    with logs.in_background(), open_bus_at(endpoint, role, rig, arguments, *names) as bus:
+        yield bus
 
 
 @contextmanager

@@ -9,7 +9,9 @@ from pathlib import Path
 
 import pytest
 
+from abs_service.commands.parts import logs
 from abs_service.commands.parts.log_file import LogFile
+from abs_service.display.terminal import output
 from abs_service.supervision.exit_codes import Exit
 
 #: A command that logs, and then does what its argument says.
@@ -127,3 +129,18 @@ def test_a_full_disk_does_no_more_than_that(capsys):
     assert capsys.readouterr().err == "abs-service: --log-file /dev/full cannot be written: No space left on device\n"
     with pytest.raises(OSError, match="No space"):
         handler.close()
+
+
+def test_a_live_process_waits_for_no_reader_of_its_log(monkeypatch):
+    reader, writer = os.pipe()
+    monkeypatch.setattr(output, "END_S", 0.05)
+    with os.fdopen(writer, "w") as stderr:
+        monkeypatch.setattr(sys, "stderr", stderr)
+        handler = logging.StreamHandler(stderr)
+        monkeypatch.setattr(logging.getLogger(), "handlers", [handler])
+        with logs.in_background():
+            for _ in range(3):
+                logging.warning("x" * 40_000)  # a pipe holds 64 KiB
+            assert os.read(reader, 10) == b"x" * 10
+        assert handler.stream is stderr
+        os.close(reader)
