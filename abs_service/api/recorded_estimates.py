@@ -7,11 +7,12 @@ from pathlib import Path
 import numpy as np
 from absmsg.v1.deformation_state_pb2 import DeformationState
 from absmsg.v1.deformed_mesh_pb2 import DeformedMesh, MeshTopology
+from google.protobuf.message import DecodeError
 from numpy.typing import NDArray
 
 from abs_service.api.estimate import Estimate
 from abs_service.tracker.estimate import Status
-from drivers.replay.contents import Contents
+from drivers.replay.contents import Contents, RecordingError
 from drivers.replay.messages import messages
 
 _STATE, _MESH, _TOPOLOGY = (one.DESCRIPTOR.full_name for one in (DeformationState, DeformedMesh, MeshTopology))
@@ -27,8 +28,15 @@ def estimates(path: Path, contents: Contents, tracker: str) -> Iterator[Estimate
     """Estimates of one tracker in the order of their times.
 
     Raises:
-        RecordingError: a damaged part.
+        RecordingError: a damaged part, or what is no estimate.
     """
+    try:
+        yield from _estimates(path, contents, tracker)
+    except (DecodeError, ValueError) as error:
+        raise RecordingError(f"{path}: an estimate of {tracker} is malformed: {error}") from error
+
+
+def _estimates(path: Path, contents: Contents, tracker: str) -> Iterator[Estimate]:
     topologies: dict[tuple[str, int], MeshTopology] = {}
     own = (
         (topic.schema, message)

@@ -10,7 +10,7 @@ from typing import BinaryIO
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.reader import SeekingReader
-from mcap.records import Attachment, Channel, Chunk, ChunkIndex, McapRecord, Message, Schema
+from mcap.records import Attachment, Channel, Chunk, ChunkIndex, Footer, McapRecord, Message, Schema
 from mcap.stream_reader import StreamReader
 from mcap.summary import Summary
 from zstandard import ZstdError
@@ -72,7 +72,7 @@ class Contents:
         attachments: content by name.
         start_ns, end_ns: first and last log time [ns]; 0 for a file without messages.
         truncated: True if the file was not finished: its writer was killed, or is still writing.
-        damaged: number of corrupt chunks that were skipped; in a finished file they are only detected when read.
+        damaged: number of corrupt chunks that were skipped; in a file with an index they are only detected when read.
     """
 
     chunks: tuple[ChunkLocation, ...]
@@ -93,7 +93,7 @@ def scan(path: Path) -> Contents:
     try:
         with limited.opened(path) as stream:
             summary = _summary(path, stream)
-            return _scan_records(stream) if summary is None else _from_index(summary, stream)
+            return _scan_records(path, stream) if summary is None else _from_index(summary, stream)
     except OSError as error:
         raise RecordingError(f"{path}: {error.strerror}") from error
     except DAMAGE as error:
@@ -115,9 +115,20 @@ def _summary(path: Path, stream: BinaryIO) -> Summary | None:
         what = f"{path}: this is no MCAP file ({stream.seek(0, 2)} bytes)"
         raise RecordingError(f"{what}; `abs-service import` reads recordings of other tools") from error
     try:
-        return reader.get_summary()
+        summary = reader.get_summary()
     except (*DAMAGE, OSError):  # the latter if the file is shorter than the end of a finished one
         return None
+    return summary if summary is not None and _is_whole(summary) else None
+
+
+def _is_whole(summary: Summary) -> bool:
+    """False if it lacks a part that is used here; a writer may leave out any."""
+    statistics = summary.statistics
+    return (
+        statistics is not None
+        and 0 < statistics.chunk_count == len(summary.chunk_indexes)
+        and statistics.attachment_count == len(summary.attachment_indexes)
+    )
 
 
 def _from_index(summary: Summary, stream: BinaryIO) -> Contents:
@@ -142,9 +153,9 @@ def _channels(index: ChunkIndex) -> frozenset[int] | None:
     return frozenset(index.message_index_offsets) or None
 
 
-def _scan_records(stream: BinaryIO) -> Contents:
+def _scan_records(path: Path, stream: BinaryIO) -> Contents:
     """Reads every record up to the first truncated one; corrupt chunks are skipped and counted."""
-    damaged = 0
+    damaged, finished = 0, False
     chunks: list[ChunkLocation] = []
     schemas: dict[int, Schema] = {}
     channels: dict[int, Channel] = {}
@@ -154,6 +165,11 @@ def _scan_records(stream: BinaryIO) -> Contents:
     for offset, record in _records(stream):
         if isinstance(record, Attachment):
             attachments[record.name] = record.data
+        if isinstance(record, Message):
+            raise RecordingError(
+                f"{path}: it has messages outside of chunks; `abs-service recover` writes a file without"
+            )
+        finished = isinstance(record, Footer)
         if not isinstance(record, Chunk):
             continue
         try:
@@ -173,7 +189,7 @@ def _scan_records(stream: BinaryIO) -> Contents:
         attachments,
         min(times, default=0),
         max(times, default=0),
-        truncated=True,
+        truncated=not finished,
         damaged=damaged,
     )
 

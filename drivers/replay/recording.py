@@ -33,13 +33,14 @@ class Recording:
         path: of the file.
         contents: its index.
         truncated: True if the file was not finished.
-        damaged_chunks: number of corrupt chunks skipped in an unfinished file; in a finished file, reading a corrupt
-            chunk raises.
+        damaged_chunks: number of corrupt chunks skipped in a file without index; with one, reading a corrupt chunk
+            raises.
         duration_s: from the first to the last message [s].
         wall_offset_ns: wall-clock time minus `t_host_ns` of the first frame [ns]; 0 if there is none.
         counts: number of images by (sensor, stream).
         models: recorded sensor models, by sensor name.
         cameras: camera models, by sensor name.
+        recalibrated: sensors of which another calibration follows within the file.
         config: the rig's configuration as TOML; "" if none was attached.
         unpaired: number of images and metadata messages without counterpart in the last pass of `frames`.
 
@@ -60,6 +61,7 @@ class Recording:
         self.counts = _image_counts(path, contents)
         self.models = self._read_models()
         self.cameras = {sensor: self._camera(model) for sensor, model in self.models.items()}
+        self.recalibrated = [sensor for sensor, model in self.models.items() if self._is_followed(model)]
 
     def frames(self, streams: Collection[tuple[str, str]] = ()) -> Iterator[Frame | Truth]:
         """Frames and truths in order of time; each is decoded when it is reached.
@@ -116,6 +118,11 @@ class Recording:
             if not missing:
                 break
         return models
+
+    def _is_followed(self, model: SensorModel) -> bool:
+        """True if the last calibration that the recorder attached is another one."""
+        last = self.contents.attachments.get(f"calibration/{model.sensor}.json", b"")
+        return b'"calib_id"' in last and f'"{model.calib_id}"'.encode() not in last
 
     def _camera(self, model: SensorModel) -> Camera:
         try:

@@ -28,7 +28,13 @@ def recorded_rig(settings: config.ServiceConfig, name: str, recording: Recording
             f'{recording.path}: tracker "{name}" needs sensor "{unknown[0]}", which is not there; '
             f"the recording has: {', '.join(there)}"
         )
-    rig = wiring.rig(settings, name, wiring.cameras(settings, recording.cameras))
+    cameras = wiring.cameras(settings, recording.cameras)
+    if lacking := [sensor for sensor in settings.trackers[name].sensors if sensor not in cameras]:
+        raise ReplayOptionError(
+            f'{recording.path}: no camera of sensor "{lacking[0]}" is in this recording; '
+            f"describe it in sensors.{lacking[0]}.camera of a rig file for --config"
+        )
+    rig = wiring.rig(settings, name, cameras)
     there = [f"{sensor}/{stream}" for sensor, stream in recording.counts]
     if missing := missing_streams(rig.sensors.values(), there):
         raise ReplayOptionError(f'{recording.path}: tracker "{name}" needs {", ".join(missing)}, which is not there')

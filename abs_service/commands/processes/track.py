@@ -32,6 +32,7 @@ from abs_service.supervision.exit_codes import Exit
 from abs_service.tracking.live.estimate_publisher import EstimatePublisher
 from abs_service.tracking.live.live_tracker import LiveTracker
 from abs_service.tracking.live.tracker_health import TrackerHealth
+from abs_service.tracking.monitors.calibration_monitor import CalibrationMonitor
 from abs_service.tracking.plan import Plan
 from abs_service.tracking.session import TrackingSession, streams
 from abs_service.tracking.warmup.board import is_undistorted, load_cached, warm_up
@@ -59,38 +60,53 @@ def run(arguments: argparse.Namespace) -> int:
     name = arguments.tracker or next(iter(settings.trackers), "")
     plan, noises = wiring.plan(settings, name), wiring.noises(settings, name)
     stop = rig_process.stop_on_signals()
-    clock = WallClock()
-    headers = HeaderFactory(settings.name, clock)
-    with rig_process.open_bus(settings, arguments, "tracker") as bus:
-        health = Health(bus, f"track/{name}", headers)
-        bus.declare_liveliness(f"track/{name}")
-        rigs: SimpleQueue[Rig] = SimpleQueue()
-        preparing = _begin(partial(_prepare, rigs, noises, plan, health))
-        cameras = await_cameras(bus, settings.trackers[name].sensors, health, stop)
-        if stop.is_set():
-            return Exit.OK
-        rigs.put(rig := wiring.rig(settings, name, cameras))
-        _await(preparing, health, stop)
-        if stop.is_set():
-            return Exit.OK
-        gc_tuning.freeze_loaded_objects()
-        tracking = TrackingSession(rig, plan)
-        act = partial(chosen_region.reinitialize, tracking, rig, plan, name)
-        commands.answer_reinitialize(bus, name, headers, health, act)
-        clocks, measuring = _clocks(bus, headers, stop)
-        sets = _frame_sets(bus, settings, name, rig, clocks)
-        tracker_health = TrackerHealth(health, sets, time.monotonic_ns)
-        publisher, budget_ms = _publisher(bus, settings, name, rig, headers), settings.trackers[name].budget_ms
-        live = LiveTracker(tracking, sets, publisher, tracker_health, time.monotonic_ns, clocks, budget_ms)
-        while not stop.is_set():
-            live.process_next()
-            if health.due():
-                clock.measure()
-                _report(tracker_health, bus, health)
-        tracker_health.report()
-        health.publish()
-        measuring.join()  # it uses the bus
+    while not stop.is_set():
+        with rig_process.open_bus(settings, arguments, "tracker") as bus:
+            _track(bus, settings, name, plan, noises, stop)
     return Exit.OK
+
+
+def _track(
+    bus: CheckedBus,
+    settings: config.ServiceConfig,
+    name: str,
+    plan: Plan,
+    noises: Mapping[str, Noise],
+    stop: threading.Event,
+) -> None:
+    """Tracks until stopped, or until a sensor has another calibration."""
+    headers = HeaderFactory(settings.name, WallClock())
+    health = Health(bus, f"track/{name}", headers)
+    bus.declare_liveliness(f"track/{name}")
+    rigs: SimpleQueue[Rig] = SimpleQueue()
+    preparing = _begin(partial(_prepare, rigs, noises, plan, health))
+    cameras = await_cameras(bus, settings.trackers[name].sensors, health, stop)
+    if stop.is_set():
+        return
+    monitor = CalibrationMonitor(cameras)
+    bus.subscribe(keys.model("*"), lambda sample: monitor.take(SensorModel.FromString(sample.payload)))
+    rigs.put(rig := wiring.rig(settings, name, cameras))
+    _await(preparing, health, stop)
+    if stop.is_set():
+        return
+    gc_tuning.freeze_loaded_objects()
+    tracking = TrackingSession(rig, plan)
+    act = partial(chosen_region.reinitialize, tracking, rig, plan, name)
+    commands.answer_reinitialize(bus, name, headers, health, act)
+    clocks, measuring = _clocks(bus, headers, monitor.changed)
+    sets = _frame_sets(bus, settings, name, rig, clocks)
+    tracker_health = TrackerHealth(health, sets, time.monotonic_ns)
+    publisher, budget_ms = _publisher(bus, settings, name, rig, headers), settings.trackers[name].budget_ms
+    live = LiveTracker(tracking, sets, publisher, tracker_health, time.monotonic_ns, clocks, budget_ms)
+    while not (stop.is_set() or monitor.changed.is_set()):
+        live.process_next()
+        if health.due():
+            headers.clock.measure()
+            _report(tracker_health, bus, health)
+    tracker_health.report()
+    health.publish()
+    monitor.changed.set()
+    measuring.join()  # it uses the bus
 
 
 def _begin(prepare: Callable[[], None]) -> Future[None]:

@@ -84,14 +84,15 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def notes(recording: Recording) -> list[str]:
-    """Notes on truncation and damage of a recording."""
-    if not recording.truncated:
-        return []
-    found = [f"{recording.path} was never finished; what follows is up to where it breaks off"]
+    """Notes on truncation and damage of a recording, and on cameras that do not stay the same."""
+    path, found = recording.path, list[str]()
+    if recording.truncated:
+        found.append(f"{path} was never finished; what follows is up to where it breaks off")
     if recording.damaged_chunks:
-        found.append(
-            f"{recording.path}: {recording.damaged_chunks} damaged chunks are left out; their images are missing"
-        )
+        found.append(f"{path}: {recording.damaged_chunks} damaged chunks are left out; their images are missing")
+    if recording.recalibrated:
+        sensors = ", ".join(recording.recalibrated)
+        found.append(f"{path}: another calibration of {sensors} follows within it; the first one is used throughout")
     return found
 
 

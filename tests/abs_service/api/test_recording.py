@@ -5,9 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from absmsg.v1.deformation_state_pb2 import DeformationState
 
 import abs_service as a
 from abs_service import cli
+from drivers.encoding.mcap_file import McapFile
 
 ROOT = Path(__file__).parents[3]
 SAMPLE = ROOT / "recordings" / "sample.mcap"
@@ -153,3 +155,15 @@ def test_a_rig_file_with_a_mistake_is_refused(tmp_path):
     (tmp_path / "rig.toml").write_text('version = 1\nname = "x"\nfoo = 1\n', encoding="utf-8")
     with pytest.raises(a.ConfigError, match=r"rig\.toml: \d(.|\n)*foo: unknown key"):
         a.load_rig(tmp_path / "rig.toml")
+
+
+@pytest.mark.parametrize("changes", [{"payload": b"\xff"}, {"status": 99}, {"covariance_valid": True, "theta": [1.0]}])
+def test_what_is_no_estimate_is_named(changes, tmp_path):
+    state = DeformationState(**changes) if "payload" not in changes else None
+    payload = state.SerializeToString() if state else changes["payload"]
+    with (tmp_path / "x.mcap").open("wb") as stream:
+        file = McapFile(stream)
+        file.write("/sheet/state", DeformationState.DESCRIPTOR.full_name, payload, 0, 0)
+        file.finish()
+    with pytest.raises(a.RecordingError, match=r"x\.mcap: an estimate of sheet is malformed"):
+        list(a.open_recording(tmp_path / "x.mcap").estimates())

@@ -1,19 +1,21 @@
 """Offline reading of recordings, in order, also from truncated and corrupt files."""
 
 import dataclasses
+import json
 import os
 from collections.abc import Iterable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 from absmsg.v1.common_pb2 import Header
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
-from mcap.writer import MCAP0_MAGIC
+from mcap.writer import MCAP0_MAGIC, IndexType, Writer
 
 from drivers.contract.device import Truth
 from drivers.contract.frame import Frame
-from drivers.encoding import codec
+from drivers.encoding import codec, mcap_file
 from drivers.encoding.mcap_file import McapFile
 from drivers.replay import Recording, RecordingError
 from drivers.replay.contents import scan
@@ -142,6 +144,39 @@ def test_frames_of_other_streams_are_not_decoded(tmp_path: Path) -> None:
         list(recording.frames())
     depths = [item for item in items if not isinstance(item, Frame) or item.key == ("tof", "depth")]
     assert_same(recording.frames([("tof", "depth")]), depths)
+
+
+@pytest.mark.parametrize(
+    "left_out",
+    [{"use_statistics": False}, {"index_types": IndexType.NONE}, {"use_statistics": False, "repeat_channels": False}],
+)
+def test_a_writer_may_leave_out_parts_of_the_index(tmp_path: Path, monkeypatch, left_out) -> None:
+    monkeypatch.setattr(mcap_file, "Writer", partial(Writer, **left_out))
+    items = recorded(3)
+    recording = Recording(write(tmp_path / "a.mcap", items))
+    assert_same(recording.frames(), items)
+    assert not recording.truncated
+    assert recording.cameras.keys() == {"tof", "color"}
+
+
+def test_messages_outside_of_chunks_are_for_recover(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setattr(mcap_file, "Writer", partial(Writer, use_chunking=False))
+    with pytest.raises(RecordingError, match=r"a\.mcap: it has messages outside of chunks; `abs-service recover`"):
+        Recording(write(tmp_path / "a.mcap", recorded(1)))
+
+
+@pytest.mark.parametrize(("last", "changed"), [("", []), ("another", ["tof"])])
+def test_a_sensor_of_which_another_calibration_follows_is_named(tmp_path: Path, last: str, changed: list[str]) -> None:
+    path = tmp_path / "a.mcap"
+    with path.open("wb") as stream:
+        file = McapFile(stream)
+        write_item(file, recorded(1)[1])
+        write_model(file, "tof", CAMERAS["tof"], calib_id="first")
+        for calib_id in ("first", last or "first"):
+            text = json.dumps({"sensor": "tof", "calib_id": calib_id}).encode()
+            file.attach("calibration/tof.json", "application/json", text, WALL_NS)
+        file.finish()
+    assert Recording(path).recalibrated == changed
 
 
 def foreign(path: Path) -> None:

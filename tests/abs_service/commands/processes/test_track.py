@@ -53,3 +53,16 @@ def test_a_warm_up_that_fails_ends_the_tracker_with_its_error(tracked, monkeypat
     monkeypatch.setattr(track, part, fails)
     with pytest.raises(RuntimeError, match="no space left for the cache"):
         tracked()
+
+
+def test_it_begins_anew_until_it_is_stopped(tracked, monkeypatch):
+    begun = []
+
+    def track_until_another_calibration(bus, *_):
+        begun.append(bus)
+        if len(begun) == 2:
+            track.rig_process.stop_on_signals().set()
+
+    monkeypatch.setattr(track, "_track", track_until_another_calibration)
+    tracked()
+    assert len(set(begun)) == 2
