@@ -113,7 +113,7 @@ def effective(rig: config.ServiceConfig, arguments: argparse.Namespace) -> confi
     """
     record = {"enabled": rig.record.enabled and not arguments.no_record}
     if arguments.out:
-        record["directory"] = arguments.out.resolve()
+        record["directory"] = arguments.out.absolute()
     devices = rig.devices
     if arguments.seed is not None:
         devices = {

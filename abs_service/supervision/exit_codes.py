@@ -36,7 +36,8 @@ def lack_of_host(error: Exception) -> str:
     """A lack of the host, such as of memory, descriptors or threads, in words; "" for an error of another kind."""
     if isinstance(error, MemoryError):
         return f"out of memory {error}".rstrip()
-    # The second is how Python says that there are too many threads.
-    if (isinstance(error, OSError) and error.errno in _HOST) or str(error) == "can't start new thread":
+    # How Python says that there are too many threads, and the loader that a library has no room.
+    words = str(error) == "can't start new thread" or "failed to map segment" in str(error)
+    if words or (isinstance(error, OSError) and error.errno in _HOST):
         return str(error)
     return ""

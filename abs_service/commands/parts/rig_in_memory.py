@@ -26,8 +26,17 @@ class RigInMemory:
         self.write(rig)
 
     def write(self, rig: config.ServiceConfig) -> None:
-        """Puts another configuration in place of this one."""
-        content = config.to_toml(rig).encode()
+        """Puts another configuration in place of this one.
+
+        Raises:
+            ConfigError: it has a file name that is not UTF-8.
+        """
+        text = config.to_toml(rig)
+        try:
+            content = text.encode()
+        except UnicodeEncodeError as error:
+            line = text.splitlines()[text.count("\n", 0, error.start)]
+            raise config.ConfigError(f"{line}: this name is not UTF-8; rename it, or set LANG=C.UTF-8") from None
         os.pwrite(self._stream.fileno(), content, 0)
         os.truncate(self._stream.fileno(), len(content))
         self.rig = rig

@@ -63,6 +63,7 @@ class TestWhatTheCommandLineChanges:
 
     def test_name_seed_folder_and_recording(self, rig_file, tmp_path, monkeypatch):
         monkeypatch.chdir(tmp_path)
+        (tmp_path / "here").symlink_to("here")  # a loop, which the check of the folder names
         rig = self.changed(rig_file, "--rig", "other", "--seed", "9", "--out", "here", "--no-record")
         assert (rig.name, rig.record.directory, rig.record.enabled) == ("other", tmp_path / "here", False)
         assert rig.devices["sim"].uri == "simulated://sheet?seed=9&tof=32x24&sensors=tof"

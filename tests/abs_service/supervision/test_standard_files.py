@@ -68,7 +68,12 @@ def test_a_low_limit_of_open_files_is_raised_if_it_can_be():
     assert (code, output) == (0, b"1024\n")
 
 
-@pytest.mark.parametrize("error", [MemoryError(), OSError(errno.EMFILE, "Too many open files"), thread_limit()])
+NO_ROOM = ImportError("libopenblas.so: failed to map segment from shared object")
+
+
+@pytest.mark.parametrize(
+    "error", [MemoryError(), OSError(errno.EMFILE, "Too many open files"), thread_limit(), NO_ROOM]
+)
 def test_what_a_host_lacks_is_no_mistake_of_ours(error):
     assert lack_of_host(error)
     assert not lack_of_host(KeyError("name"))

@@ -44,6 +44,12 @@ def test_another_configuration_takes_its_place_and_a_shorter_one_leaves_no_rest(
         assert file.exchange(lambda: rig, ALL) == (rig.record.directory, ())
 
 
+def test_a_file_name_that_is_not_utf_8_is_named(rig, tmp_path):
+    record = rig.record.model_copy(update={"directory": tmp_path / "o\udcff"})
+    with pytest.raises(config.ConfigError, match=r"directory = .*: this name is not UTF-8"), in_memory(rig) as file:
+        file.write(rig.model_copy(update={"record": record}))
+
+
 def test_what_cannot_be_used_is_refused_and_changes_nothing(rig):
 
     def wrong():
