@@ -4,61 +4,64 @@ import socket
 
 import pytest
 
-from tests.system.running import abs_service
+from abs_service.cli import main
+from abs_service.supervision.exit_codes import Exit
 
-pytestmark = pytest.mark.slow  # each test starts an interpreter
 
-
-def refused(*arguments):
+@pytest.fixture
+def refused(capfd):
     """The message of a command that is refused."""
-    done = abs_service(*arguments, timeout_s=60)
-    assert done.returncode == 2, done.stdout + done.stderr
-    assert "Traceback" not in done.stderr
-    assert done.stderr.count("error: ") == 1
-    return done.stderr.partition("error: ")[2]
+
+    def refused(*arguments):
+        assert main([str(one) for one in arguments]) == Exit.USER
+        error = capfd.readouterr().err
+        assert error.count("error: ") == 1
+        return error.partition("error: ")[2]
+
+    return refused
 
 
 @pytest.mark.parametrize("command", ["run", "check", "capture", "track", "record"])
-def test_a_file_that_is_not_there(command, tmp_path):
+def test_a_file_that_is_not_there(refused, command, tmp_path):
     assert refused(command, tmp_path / "no.toml") == f"{tmp_path}/no.toml: cannot be read: No such file or directory\n"
 
 
-def test_a_file_that_is_no_toml(rig_file):
+def test_a_file_that_is_no_toml(refused, rig_file):
     rig_file.write_text("version = \n")
     message = refused("run", rig_file)
     assert message.startswith(f"{rig_file}: not TOML: ")
     assert "line 1" in message
 
 
-def test_a_port_in_use(rig_file, endpoint):
+def test_a_port_in_use(refused, rig_file, endpoint):
     with socket.create_server(("127.0.0.1", int(endpoint.rpartition(":")[2]))):
         message = refused("run", rig_file)
     assert message.startswith(f'bus.endpoint = "{endpoint}": the address is in use')
 
 
-def test_a_folder_that_cannot_be_written(rig_file, tmp_path):
+def test_a_folder_that_cannot_be_written(refused, rig_file, tmp_path):
     (tmp_path / "taken").write_text("a file")
     message = refused("run", rig_file, "--out", tmp_path / "taken" / "below")
     assert f'"{tmp_path}/taken/below": cannot be made' in message
 
 
-def test_a_folder_that_takes_no_files(rig_file):
+def test_a_folder_that_takes_no_files(refused, rig_file):
     # Not even from root, for whom permissions are no obstacle.
     assert refused("run", rig_file, "--out", "/proc").startswith('record.directory = "/proc": cannot be written: ')
 
 
 @pytest.mark.parametrize("name", ["a/b", "", "*", "a b$"])
-def test_a_name_that_cannot_be_on_the_wire(name, rig_file):
+def test_a_name_that_cannot_be_on_the_wire(refused, name, rig_file):
     assert repr(name) in refused("run", rig_file, "--rig", name).replace('"', "'")
 
 
-def test_a_device_address_that_no_device_can_have(rig_file):
+def test_a_device_address_that_no_device_can_have(refused, rig_file):
     rig_file.write_text(rig_file.read_text().replace("simulated://sheet?seed=1", "simulated://sheet?sed=1"))
     message = refused("run", rig_file)
     assert message.startswith(f"{rig_file}: devices.sim.uri = \"simulated://sheet?sed=1\": unknown key 'sed'")
 
 
-def test_all_device_addresses_that_no_device_can_have(rig_file):
+def test_all_device_addresses_that_no_device_can_have(refused, rig_file):
     text = rig_file.read_text().replace("simulated://sheet?seed=1", "simulated://sheet?sed=1")
     rig_file.write_text(text + '[devices.second]\nuri = "kinect1://?stream=ir"\n')
     message = refused("run", rig_file)
@@ -68,8 +71,8 @@ def test_all_device_addresses_that_no_device_can_have(rig_file):
 
 
 class TestReplay:
-    def test_of_nothing(self, tmp_path):
+    def test_of_nothing(self, refused, tmp_path):
         assert refused("replay", tmp_path / "no.mcap") == f"{tmp_path}/no.mcap: No such file or directory\n"
 
-    def test_of_something_else(self, rig_file):
+    def test_of_something_else(self, refused, rig_file):
         assert refused("replay", rig_file).startswith(f"{rig_file}: this is no MCAP file")
