@@ -213,10 +213,10 @@ def test_a_group_is_all_of_its_experiments(experiment, tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_two_run_beside_each_other_and_find_what_they_find_alone(tmp_path: Path, capsys) -> None:
     chosen = ["--quick", "--seed", "3"]
-    assert __main__.main(["checkerboard", *chosen, "--jobs", "0"]) == Exit.USER
+    assert __main__.main(["noise_fits", *chosen, "--jobs", "0"]) == Exit.USER
     assert "--jobs 0: must be 1 or more" in capsys.readouterr().err
-    assert __main__.main(["checkerboard", "flexpad", *chosen, "--jobs", "2", "--out", str(tmp_path)]) == Exit.OK
-    assert (tmp_path / "flexpad/report.json").exists()
-    beside = json.loads((tmp_path / "checkerboard/report.json").read_text())
-    assert __main__.main(["checkerboard", *chosen, "--out", str(tmp_path / "alone")]) == Exit.OK
-    assert json.loads((tmp_path / "alone/checkerboard/report.json").read_text())["verdicts"] == beside["verdicts"]
+    assert __main__.main(["noise_fits", "noise_board", *chosen, "--jobs", "2", "--out", str(tmp_path)]) == Exit.OK
+    assert (tmp_path / "noise_board/report.json").exists()
+    beside = json.loads((tmp_path / "noise_fits/report.json").read_text())
+    assert __main__.main(["noise_fits", *chosen, "--out", str(tmp_path / "alone")]) == Exit.OK
+    assert json.loads((tmp_path / "alone/noise_fits/report.json").read_text())["verdicts"] == beside["verdicts"]

@@ -1,10 +1,8 @@
-"""Paired differences, and the experiment that compares the likelihood with squares."""
+"""Paired differences."""
 
 import numpy as np
 import pytest
 
-from evaluation.experiment import Context
-from evaluation.method import squares
 from evaluation.paired import upper_end
 
 
@@ -16,11 +14,3 @@ def test_the_upper_end_is_above_the_mean_by_the_half_width_of_student():
 
 def test_one_sequence_says_nothing():
     assert np.isnan(upper_end([1.0], [0.0]))
-
-
-@pytest.mark.slow
-def test_every_case_is_tracked():
-    findings = squares.run(squares.QUICK, Context(0))
-    errors = findings.values["vertex_mm"]
-    assert set(errors) >= {name for pair in squares.PAIRS for name in pair}
-    assert all(0 < error < 3 for one in errors.values() for error in one)

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from drivers.encoding.encoded_image import ImageCodec
-from evaluation.experiment import Context
 from evaluation.service import image_codecs
 from evaluation.service.image_codecs import candidates, images
 
@@ -27,10 +26,3 @@ def test_a_recording_without_loss_is_smaller_than_one_of_raw_images():
     lossless = image_codecs.record((color,), ImageCodec.LOSSLESS, ImageCodec.LOSSLESS)
     assert 0.42 * raw.size < lossless.size < 0.6 * raw.size  # the noise's entropy, and what a prediction adds
     assert len(lossless.set_s) == 1
-
-
-@pytest.mark.slow
-def test_the_experiment_has_a_goal_for_every_rig():
-    findings = image_codecs.run(image_codecs.Settings(2), Context(0))
-    assert len(findings.goals) == 6
-    assert {goal.bound for goal in findings.goals} == {0.4, 0.25}

@@ -100,9 +100,8 @@ def error_over_300_exposures(uri: str, **changes: object) -> float:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [1, 2, 3])
-def test_the_likelihood_is_within_2_mm_and_better_than_squares(seed):
-    uri = f"simulated://sheet?seed={seed}"
+def test_the_likelihood_is_within_2_mm_and_better_than_squares():
+    uri = "simulated://sheet?seed=1"
     likelihood = error_over_300_exposures(uri)
     assert likelihood <= 2
     assert likelihood < error_over_300_exposures(uri, objective=euclidean.Settings())
