@@ -9,7 +9,6 @@ from absmsg.v1 import common_pb2, sensor_model_pb2
 from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from google.protobuf.descriptor_pb2 import FileDescriptorSet
-from google.protobuf.message import Message
 
 import abs_service
 from abs_service.bus import keys
@@ -18,7 +17,7 @@ from calib import pose
 from calib.camera import Camera
 from calib.lenses.fisheye import KannalaBrandt
 from calib.lenses.lens import Lens
-from drivers.encoding.mcap_file import McapFile, file_descriptor_set
+from drivers.encoding.mcap_file import file_descriptor_set
 
 #: Names of the lens models in `foxglove.CameraCalibration`.
 _DISTORTION_MODELS = {Lens.name: "rational_polynomial", KannalaBrandt.name: "kannala_brandt"}
@@ -92,21 +91,6 @@ def _numbers(value: Any) -> list[float]:
     if isinstance(value, (list, tuple)):
         return [number for part in value for number in _numbers(part)]
     return [float(value)] if isinstance(value, (int, float)) else []
-
-
-def write_cameras(file: McapFile, header: common_pb2.Header, cameras: Mapping[str, Camera], wall_ns: int) -> None:
-    """Writes models without noise, calibrations and poses of the sensors' cameras to a recording.
-
-    Raises:
-        McapFileError, OSError: as `McapFile.write`.
-    """
-    content: dict[str, Message] = {}
-    for sensor, camera in cameras.items():
-        content[keys.model(sensor)] = sensor_model(header, sensor, camera, {})
-        content[keys.calibration(sensor)] = calibration(sensor, camera, wall_ns)
-    content[keys.TRANSFORMS] = transforms(cameras, wall_ns)
-    for topic, message in content.items():
-        file.write(f"/{topic}", message.DESCRIPTOR.full_name, message.SerializeToString(), wall_ns, 0)
 
 
 def config(header: common_pb2.Header, toml: str) -> sensor_model_pb2.Config:

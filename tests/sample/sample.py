@@ -15,9 +15,9 @@ from abs_service import config
 from abs_service.bus import keys
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.capture import sensor_metadata
+from abs_service.capture.mcap_writing import write_frame
 from abs_service.config import ServiceConfig, plugins
 from drivers.contract.device import Truth
-from drivers.contract.frame import Frame
 from drivers.encoding import codec
 from drivers.encoding.mcap_file import Compression, McapFile
 from drivers.simulated.address import parse
@@ -53,7 +53,8 @@ def write(path: Path, settings: ServiceConfig) -> None:
             frames, truth = simulation.expose(k)
             _write_truth(file, truth, headers)
             for frame in frames:
-                _write_frame(file, frame, headers)
+                header = headers.at(frame.t_host_ns, frame.seq, frame.sensor)
+                write_frame(file, frame, header, headers.clock.wall(frame.t_host_ns))
         file.finish()
 
 
@@ -80,13 +81,6 @@ def _write_announcements(
     for topic, message in messages.items():
         payload = message.SerializeToString(deterministic=True)
         file.write(f"/{topic}", message.DESCRIPTOR.full_name, payload, START_NS, 0)
-
-
-def _write_frame(file: McapFile, frame: Frame, headers: HeaderFactory) -> None:
-    topic, wall_ns = keys.image(frame.sensor, frame.stream), headers.clock.wall(frame.t_host_ns)
-    info = codec.encode_info(frame, headers.at(frame.t_host_ns, frame.seq, frame.sensor))
-    file.write(f"/{topic}", codec.IMAGE_SCHEMA, codec.encode_image(frame, wall_ns), wall_ns, frame.seq)
-    file.write(f"/{keys.info(topic)}", codec.INFO_SCHEMA, info, wall_ns, frame.seq)
 
 
 def _write_truth(file: McapFile, truth: Truth, headers: HeaderFactory) -> None:

@@ -3,13 +3,10 @@
 from collections.abc import Mapping
 from pathlib import Path
 
-from abs_service.bus import keys
 from abs_service.bus.stamps import HeaderFactory
 from abs_service.calibration.shots.shots import Shot
-from abs_service.capture import sensor_metadata
+from abs_service.capture.mcap_writing import write_cameras, write_frame
 from calib.camera import Camera
-from drivers.contract.frame import Frame
-from drivers.encoding import codec
 from drivers.encoding.mcap_file import McapFile
 
 
@@ -42,7 +39,7 @@ class ShotRecording:
         self._file = McapFile(self._stream)
         now_ns = headers.clock.wall(headers.clock.monotonic())
         self._file.attach("rig.toml", "text/toml", rig_toml.encode(), now_ns)
-        sensor_metadata.write_cameras(self._file, headers.now(0), cameras, now_ns)
+        write_cameras(self._file, headers.now(0), cameras, now_ns)
 
     def write(self, shot: Shot) -> None:
         """Appends a shot and flushes it to disk.
@@ -52,7 +49,8 @@ class ShotRecording:
         """
         try:
             for frame in sorted(shot.frames, key=lambda frame: frame.t_host_ns):
-                self._write_frame(frame)
+                wall_ns = self._headers.clock.wall(frame.t_host_ns)
+                write_frame(self._file, frame, self._headers.at(frame.t_host_ns, frame.seq), wall_ns)
             self._file.flush()
         except OSError as error:
             raise ShotFileError(f"{self._path}: cannot be written: {error.strerror}") from error
@@ -69,9 +67,3 @@ class ShotRecording:
             raise ShotFileError(f"{self._path}: cannot be written: {error.strerror}") from error
         finally:
             self._stream.close()
-
-    def _write_frame(self, frame: Frame) -> None:
-        topic, wall_ns = keys.image(frame.sensor, frame.stream), self._headers.clock.wall(frame.t_host_ns)
-        info = codec.encode_info(frame, self._headers.at(frame.t_host_ns, frame.seq))
-        self._file.write(f"/{topic}", codec.IMAGE_SCHEMA, codec.encode_image(frame, wall_ns), wall_ns, frame.seq)
-        self._file.write(f"/{keys.info(topic)}", codec.INFO_SCHEMA, info, wall_ns, frame.seq)

@@ -9,10 +9,7 @@ from absmsg.v1.common_pb2 import Header
 from rich.console import Console
 from rich.progress import track
 
-from abs_service.bus import keys
-from abs_service.capture import sensor_metadata
-from drivers.contract.frame import Frame
-from drivers.encoding import codec
+from abs_service.capture.mcap_writing import write_cameras, write_frame
 from drivers.encoding.foreign_recording import ForeignRecording, ForeignRecordingError
 from drivers.encoding.mcap_file import McapFile
 
@@ -43,20 +40,13 @@ def write(path: Path, rig: str, recording: ForeignRecording, rig_toml: bytes) ->
         if rig_toml:
             file.attach("rig.toml", "text/toml", rig_toml, first.t_host_ns)
         header = _header(rig, first.t_host_ns, 0)
-        sensor_metadata.write_cameras(file, header, recording.cameras, first.t_host_ns)
+        write_cameras(file, header, recording.cameras, first.t_host_ns)
         console = Console(stderr=True)
         for frame in track(chain([first], frames), "importing", recording.total, console=console, transient=True):
-            _write_frame(file, rig, frame)
+            write_frame(file, frame, _header(rig, frame.t_host_ns, frame.seq), frame.t_host_ns)
             counts[frame.key] += 1
         file.finish()
     return counts
-
-
-def _write_frame(file: McapFile, rig: str, frame: Frame) -> None:
-    topic, wall_ns = keys.image(frame.sensor, frame.stream), frame.t_host_ns
-    info = codec.encode_info(frame, _header(rig, wall_ns, frame.seq))
-    file.write(f"/{topic}", codec.IMAGE_SCHEMA, codec.encode_image(frame, wall_ns), wall_ns, frame.seq)
-    file.write(f"/{keys.info(topic)}", codec.INFO_SCHEMA, info, wall_ns, frame.seq)
 
 
 def _header(rig: str, wall_ns: int, seq: int) -> Header:

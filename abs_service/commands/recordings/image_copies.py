@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 
 from abs_service.bus.stamps import HeaderFactory
-from abs_service.capture import sensor_metadata
+from abs_service.capture.mcap_writing import write_cameras
 from calib.camera import Camera
 from drivers.encoding import codec, encoded_image
 from drivers.encoding.mcap_file import McapFile
@@ -27,7 +27,7 @@ def image_copies(
         McapFileError, OSError: as `McapFile.write`.
     """
     contents = recording.contents
-    sensor_metadata.write_cameras(file, headers.at(0, 0), cameras, contents.start_ns)
+    write_cameras(file, headers.at(0, 0), cameras, contents.start_ns)
     for topic, message in messages(recording.path, contents, {*encoded_image.SCHEMAS, codec.INFO_SCHEMA}):
         file.write(topic.name, topic.schema, message.data, message.log_time, message.sequence)
         if topic.schema == codec.INFO_SCHEMA:

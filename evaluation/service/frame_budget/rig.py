@@ -8,11 +8,7 @@ from urllib.parse import quote
 import tomli_w
 from absmsg.v1.common_pb2 import Header
 
-from abs_service.bus import keys
-from abs_service.capture import sensor_metadata
-from calib.camera import Camera
-from drivers.contract.frame import Frame
-from drivers.encoding import codec
+from abs_service.capture.mcap_writing import write_cameras, write_frame
 from drivers.encoding.mcap_file import Compression, McapFile
 from drivers.simulated.address import parse
 from evaluation.service.live.rig import demo_table
@@ -82,24 +78,12 @@ def write_take(path: Path, head: str, seed: int, exposures: int, progress: Calla
     with path.open("wb") as stream:
         file = McapFile(stream, Compression.LZ4)
         file.attach("rig.toml", "text/toml", configuration(head, [address(head, seed)]).encode(), _BEGIN_NS)
-        for name, one in simulation.heads.items():
-            _write_camera(file, name, one.camera)
+        cameras = {name: one.camera for name, one in simulation.heads.items()}
+        write_cameras(file, Header(rig=NAME), cameras, _BEGIN_NS)
         for k in range(exposures):
             if k % 30 == 0:
                 progress(f"exposure {k} of {exposures}")
             for frame in simulation.frames(k):
-                _write_frame(file, frame)
+                write_frame(file, frame, Header(rig=NAME, seq=frame.seq), _BEGIN_NS + frame.t_host_ns)
         file.finish()
     return path
-
-
-def _write_camera(file: McapFile, name: str, camera: Camera) -> None:
-    model = sensor_metadata.sensor_model(Header(rig=NAME), name, camera, {})
-    file.write(f"/{keys.model(name)}", model.DESCRIPTOR.full_name, model.SerializeToString(), _BEGIN_NS, 0)
-
-
-def _write_frame(file: McapFile, frame: Frame) -> None:
-    topic, wall_ns = keys.image(frame.sensor, frame.stream), _BEGIN_NS + frame.t_host_ns
-    info = codec.encode_info(frame, Header(rig=NAME, seq=frame.seq))
-    file.write(f"/{topic}", codec.IMAGE_SCHEMA, codec.encode_image(frame, wall_ns), wall_ns, frame.seq)
-    file.write(f"/{keys.info(topic)}", codec.INFO_SCHEMA, info, wall_ns, frame.seq)

@@ -15,10 +15,10 @@ from mcap.stream_reader import StreamReader
 from mcap_protobuf.decoder import DecoderFactory
 
 from abs_service.bus.stamps import HeaderFactory, WallClock
+from abs_service.capture.mcap_writing import write_frame
 from abs_service.commands.recordings import recover as command
 from abs_service.recording.recovery import RecoveryError, leftovers, recover, remove_interrupted
 from drivers.contract.frame import Frame, Geometry, Kind
-from drivers.encoding import codec
 from drivers.encoding.mcap_file import Compression, McapFile
 
 HEADER = HeaderFactory("demo", WallClock(), "boot").at(0, 0)
@@ -35,8 +35,7 @@ def write(path, finish=True, compression=Compression.LZ4):
         for seq in range(FRAMES):
             data = pixels.integers(0, 65535, (24, 32), np.uint16)
             item = Frame("tof", "depth", Kind.DEPTH, data, "16UC1", seq, seq, seq, geometry=Geometry.Z)
-            file.write("/tof/depth/image", codec.IMAGE_SCHEMA, codec.encode_image(item, seq + 1), seq + 1, seq)
-            file.write("/tof/depth/info", codec.INFO_SCHEMA, codec.encode_info(item, HEADER), seq + 1, seq)
+            write_frame(file, item, HEADER, seq + 1)
         file.flush()
         if finish:
             file.finish()

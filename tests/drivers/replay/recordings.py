@@ -5,19 +5,18 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from absmsg.v1.common_pb2 import Header
-from absmsg.v1.sensor_model_pb2 import SensorModel
 
+from abs_service.capture import sensor_metadata
 from calib.camera import Camera
 from drivers.contract.device import Truth
 from drivers.contract.frame import Frame
-from drivers.encoding import codec
 from drivers.encoding.mcap_file import Compression, McapFile
 from drivers.replay.contents import scan
 from drivers.simulated.address import parse
+from tests.abs_service.commands.recordings.simulated_recording import WALL_NS, write_frame, write_truth
 
 SIMULATION = parse("simulated://sheet?tof=32x24&color=32x24&sensors=tof,color").build()
 CAMERAS = {name: head.camera for name, head in SIMULATION.heads.items()}
-WALL_NS = 1_700_000_000_000_000_000
 BOOT_NS = 3_000_000_000
 
 
@@ -30,33 +29,14 @@ def recorded(count: int) -> list[Frame | Truth]:
 
 
 def write_item(file: McapFile, item: Frame | Truth) -> None:
-    wall_ns = item.t_host_ns + WALL_NS
-    header = Header(rig="demo", seq=item.seq)
-    if isinstance(item, Truth):
-        file.write("/sim/truth", codec.TRUTH_SCHEMA, codec.encode_truth(item, header), wall_ns, item.seq)
-        return
-    base = f"/{item.sensor}/{item.stream}"
-    file.write(f"{base}/image", codec.IMAGE_SCHEMA, codec.encode_image(item, wall_ns), wall_ns, item.seq)
-    file.write(f"{base}/info", codec.INFO_SCHEMA, codec.encode_info(item, header), wall_ns, item.seq)
+    write_truth(file, item) if isinstance(item, Truth) else write_frame(file, item)
 
 
 def write_model(file: McapFile, sensor: str, camera: Camera, **changes: object) -> None:
-    model = SensorModel(
-        sensor=sensor,
-        width=camera.width,
-        height=camera.height,
-        fx=camera.fx,
-        fy=camera.fy,
-        cx=camera.cx,
-        cy=camera.cy,
-        lens=camera.lens.coefficients.tolist(),
-        lens_model=camera.lens.name,
-        T_rs=camera.T_rs.ravel().tolist(),
-        noise="gaussian_polynomial",
-    )
+    model = sensor_metadata.sensor_model(Header(), sensor, camera, {"type": "gaussian_polynomial"})
     for name, value in changes.items():
         setattr(model, name, value)
-    file.write(f"/{sensor}/model", "absmsg.v1.SensorModel", model.SerializeToString(), WALL_NS, 0)
+    file.write(f"/{sensor}/model", model.DESCRIPTOR.full_name, model.SerializeToString(), WALL_NS, 0)
 
 
 def write(

@@ -6,9 +6,8 @@ from pathlib import Path
 from typing import Protocol
 
 from absmsg.v1.common_pb2 import Header
-from absmsg.v1.sensor_model_pb2 import SensorModel
 
-from calib.camera import Camera
+from abs_service.capture import mcap_writing
 from drivers.contract.device import Truth
 from drivers.contract.frame import Frame
 from drivers.encoding import codec
@@ -55,36 +54,27 @@ def write_take(
         file = McapFile(stream, chunk_size=400_000)
         if toml:
             file.attach("rig.toml", "text/toml", toml.encode(), WALL_NS)
-        for head, name in names.items():
-            _write_camera(file, name, simulation.heads[head].camera)
+        cameras = {name: simulation.heads[head].camera for head, name in names.items()}
+        mcap_writing.write_cameras(file, Header(rig="demo"), cameras, WALL_NS)
         for k in exposures:
             frames, truths = simulation.frames(k), simulation.truths(k)
             for truth in truths:
-                _write_truth(file, truth)
+                write_truth(file, truth)
             for frame in frames:
                 if frame.sensor in names:
-                    _write_frame(file, replace(frame, sensor=names[frame.sensor]), encode_image)
+                    write_frame(file, replace(frame, sensor=names[frame.sensor]), encode_image)
             add(file, k)
         file.finish() if finish else file.flush()
     return path
 
 
-def _write_camera(file: McapFile, name: str, camera: Camera) -> None:
-    model = SensorModel(sensor=name, width=camera.width, height=camera.height, fx=camera.fx, fy=camera.fy)
-    model.cx, model.cy = camera.cx, camera.cy
-    model.lens.extend(camera.lens.coefficients.tolist())
-    model.lens_model = camera.lens.name
-    model.T_rs.extend(camera.T_rs.ravel().tolist())
-    file.write(f"/{name}/model", "absmsg.v1.SensorModel", model.SerializeToString(), WALL_NS, 0)
-
-
-def _write_truth(file: McapFile, truth: Truth) -> None:
+def write_truth(file: McapFile, truth: Truth) -> None:
+    """Writes the truth of an exposure."""
     payload = codec.encode_truth(truth, Header(rig="demo", seq=truth.seq))
     file.write("/sim/truth", codec.TRUTH_SCHEMA, payload, WALL_NS + truth.t_host_ns, truth.seq)
 
 
-def _write_frame(file: McapFile, frame: Frame, encode_image: ImageEncoder) -> None:
-    wall_ns, base = WALL_NS + frame.t_host_ns, f"/{frame.sensor}/{frame.stream}"
+def write_frame(file: McapFile, frame: Frame, encode_image: ImageEncoder = unchanged) -> None:
+    """Writes an image and its metadata."""
     header = Header(rig="demo", seq=frame.seq)
-    file.write(f"{base}/image", *encode_image(codec.encode_image(frame, wall_ns)), wall_ns, frame.seq)
-    file.write(f"{base}/info", codec.INFO_SCHEMA, codec.encode_info(frame, header), wall_ns, frame.seq)
+    mcap_writing.write_frame(file, frame, header, WALL_NS + frame.t_host_ns, encode_image)
