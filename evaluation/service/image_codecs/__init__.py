@@ -1,4 +1,4 @@
-"""Bytes and times of lossless image codecs, and of a recorder that uses one.
+"""Bytes of recordings whose images are compressed, and processor time of a recorder that compresses them.
 
 The rig of today is a depth camera of 640 × 480 and a colour camera of 1280 × 720 at 30 Hz, simulated, moving.
 
@@ -26,8 +26,7 @@ from drivers.contract.frame import Frame
 from drivers.encoding import codec, encoded_image
 from drivers.encoding.encoded_image import ImageCodec
 from evaluation.experiment import Context, Findings, at_most
-from evaluation.service.image_codecs import candidates, images
-from evaluation.service.image_codecs.candidates import CHOSEN, CHOSEN_OF_MOSAICS, Candidate
+from evaluation.service.image_codecs import images
 
 TITLE = "Image codecs: bytes and processor time of recordings"
 
@@ -50,10 +49,6 @@ class Settings:
 QUICK = Settings(3)
 
 _COLUMNS = (
-    Column("images"), Column("codec"), Column("bytes left", "%", ".1f"), Column("encode, median", "ms", ".2f"),
-    Column("encode, 95 %", "ms", ".2f"), Column("decode, median", "ms", ".2f"), Column("decode, 95 %", "ms", ".2f"),
-)  # fmt: skip
-_RECORDER_COLUMNS = (
     Column("rig"), Column("codec"), Column("raw images", "MB/s", ".1f"), Column("recording", "MB/s", ".1f"),
     Column("of today's", "%", ".1f"), Column("processor, median", "cores", ".2f"),
     Column("processor, 95 %", "cores", ".2f"),
@@ -74,14 +69,9 @@ class Recorded:
 
 
 def run(settings: Settings, context: Context) -> Findings:
-    """Compresses images by every codec, then records the rig of today by some."""
+    """Records the rig of today, and one of real cameras, with and without compressed images."""
     simulated = images.streams(images.simulated(context.seed + 1, settings.frames))
     real = images.recorded(context.data, settings.frames)
-    known, missing = candidates.available()
-    rows: list[tuple[Cell, ...]] = []
-    for name, frames in (simulated | real).items():
-        context.progress(name)
-        rows += _compared(name, frames, known)
     recorders, shares, cores = _recorders(simulated, real, context)
     reason = (
         "Noise of 2.5 levels alone takes 42 % of the simulated colours' bytes, and predicting from noise adds to it."
@@ -90,42 +80,9 @@ def run(settings: Settings, context: Context) -> Findings:
         at_most(f"Recording, {name}", share, SHARE, reason=reason if name == _LOSSLESS else "")
         for name, share in shares.items()
     ) + tuple(at_most(f"Recorder's thread, {name}", value, CORES, "cores") for name, value in cores.items())
-    left_out = (f"Not installed, left out: {', '.join(missing)}.",) if missing else ()
-    sections = (
-        Section("Recordings", (Table("Encoded and written by one thread", _RECORDER_COLUMNS, recorders),)),
-        Section("Codecs", (Table("Single passes, one thread", _COLUMNS, tuple(rows)), *left_out)),
-    )
-    return Findings(goals, sections, {"codecs": rows, "recordings": recorders, "shares": shares, "cores": cores})
-
-
-def _compared(name: str, frames: Sequence[Frame], known: Mapping[str, Candidate]) -> list[tuple[Cell, ...]]:
-    """A row for every codec, on the same frames in turns."""
-    if frames[0].encoding.startswith("bayer"):
-        known = {**known, CHOSEN: CHOSEN_OF_MOSAICS}
-    of_codec: dict[str, list[tuple[float, float, float]]] = {}
-    for frame in frames:
-        pixels = np.ascontiguousarray(frame.data)
-        for codec_name, candidate in known.items():
-            if candidate.applies(pixels):
-                of_codec.setdefault(codec_name, []).append(round_trip(candidate, pixels))
-    rows: list[tuple[Cell, ...]] = []
-    for codec_name, passes in of_codec.items():
-        left, encode_s, decode_s = np.array(passes).T
-        times_ms = (1e3 * np.quantile(one, share) for one in (encode_s, decode_s) for share in (0.5, 0.95))
-        rows.append((name, codec_name, 100 * float(left.mean()), *map(float, times_ms)))
-    return rows
-
-
-def round_trip(candidate: Candidate, pixels: candidates.Pixels) -> tuple[float, float, float]:
-    """Share of the bytes that is left, and processor times to encode and to decode [s]."""
-    begin_s = time.thread_time()
-    encoded = candidate.encode(pixels)
-    encoded_s = time.thread_time()
-    decoded = candidate.decode(encoded, pixels)
-    decoded_s = time.thread_time()
-    if decoded.tobytes() != pixels.tobytes():
-        raise RuntimeError("a lossless codec lost something")
-    return candidates.size(encoded) / pixels.nbytes, encoded_s - begin_s, decoded_s - encoded_s
+    table = Table("Encoded and written by one thread", _COLUMNS, recorders)
+    values = {"recordings": recorders, "shares": shares, "cores": cores}
+    return Findings(goals, (Section("Recordings", (table,)),), values)
 
 
 _LOSSLESS = "depth and colour, lossless"

@@ -1,21 +1,18 @@
-"""Images to compress: of the simulated device, and of real cameras where there are recordings."""
+"""Images to record: of the simulated device, and of real cameras where there are recordings."""
 
-from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 
-import cv2
-
-from drivers.contract.frame import Frame, Geometry, Kind
+from drivers.contract.frame import Frame
 from drivers.encoding.foreign_recording import ForeignRecordingError
 from drivers.opening import open_recording
 from evaluation.scenes.exposure import LabeledExposure
 from evaluation.sequences import FIRST_MOVING, expose, simulate
 
 #: Address of the rig of today: one depth camera and one colour camera.
-RIG = "simulated://sheet?seed={seed}&sensors=tof,color,bayer,structured_light"
-SIZES = "&tof=640x480&structured_light=640x480&color=1280x720&bayer=1280x720"
+RIG = "simulated://sheet?seed={seed}&sensors=tof,color,bayer"
+SIZES = "&tof=640x480&color=1280x720&bayer=1280x720"
 
 
 def simulated(seed: int, frames: int) -> list[LabeledExposure]:
@@ -41,38 +38,15 @@ def recorded(data: Path | None, frames: int) -> dict[str, list[Frame]]:
     for name, program, path in (
         ("RealSense", "realsense", data / "realsense_bag/single_depth_color_640x480.bag"),
         ("Azure Kinect", "azure", data / "tof_azure_kinect_pyk4a/recording.mkv"),
-        ("ifm O3R", "o3r", data / "tof_ifm_o3r/O3RBuffer.data"),
     ):
         try:
             for frame in islice(open_recording(program, path).frames(), 2 * frames):
                 found.setdefault(f"{name} {frame.stream}", []).append(frame)
         except (ForeignRecordingError, FileNotFoundError):
             continue
-    for name, folder in (("PrimeSense", "sl_rgbd_deform_petit"), ("Kinect v1", "sl_kinect_paper")):
-        for stream, read in _FOLDERS.items():
-            made = list(islice(_images(data / folder, stream, read), frames))
-            # The depth images of the second are no sensor's: see the recordings' list of sources.
-            if made and (name, stream) != ("Kinect v1", "depth"):
-                found[f"{name} {stream}"] = made
     return found
-
-
-def _images(folder: Path, stream: str, read: int) -> Iterator[Frame]:
-    paths = sorted([*folder.glob(f"{stream}_*.png"), *folder.glob(f"{stream}_*.jpg")])
-    for seq, path in enumerate(paths):
-        pixels = cv2.imread(str(path), read)
-        if pixels is None:
-            continue
-        if stream == "depth":
-            yield Frame(*("x", stream, Kind.DEPTH, pixels, "16UC1", seq, seq, seq), geometry=Geometry.Z)
-        else:
-            yield Frame("x", stream, Kind.COLOR, pixels, "rgb8", seq, seq, seq)
 
 
 def as_stream(frame: Frame, sensor: str, seq: int) -> Frame:
     """The frame as that of a sensor and exposure."""
     return replace(frame, sensor=sensor, seq=seq, t_host_ns=seq * 33_333_333)
-
-
-#: How OpenCV reads the images of a stream.
-_FOLDERS: Mapping[str, int] = {"depth": cv2.IMREAD_UNCHANGED, "color": cv2.IMREAD_COLOR_RGB}
