@@ -15,24 +15,23 @@ if TYPE_CHECKING:
 #: Maximum number of arrows; more overlap.
 ARROWS = 1500
 
+#: Parts of an image, across and down, in which views are counted.
+_CELLS = 8, 6
+
 _NO_VALUE = "0.8"  # grey of what is not known
 
 
-def coverage_map(
-    views: Sequence[NDArray[np.floating]], width: int, height: int, cells: tuple[int, int] = (8, 6)
-) -> "Figure":
+def coverage_map(views: Sequence[NDArray[np.floating]], width: int, height: int) -> "Figure":
     """Detected corners in the image, and number of views with corners in each cell.
 
     Args:
         views: pixels (n, 2) of the corners of each view.
         width, height: size of the image [px].
-        cells: parts of the image across and down.
     """
-    edges = np.linspace(-0.5, width - 0.5, cells[0] + 1), np.linspace(-0.5, height - 0.5, cells[1] + 1)
-    counts = coverage_counts(views, width, height, cells)
+    counts = coverage_counts(views, width, height)
     figure = plots.figure(7.5, 6.1 * height / width + 0.6)
     axes = figure.add_subplot()
-    shown = axes.pcolormesh(*edges, np.where(counts > 0, counts, np.nan).T, cmap="YlGn", vmin=0)
+    shown = axes.pcolormesh(*_edges(width, height), np.where(counts > 0, counts, np.nan).T, cmap="YlGn", vmin=0)
     axes.set_facecolor(_NO_VALUE)
     for pixels in views:
         axes.plot(pixels[:, 0], pixels[:, 1], ".", markersize=2.5, color="tab:blue", alpha=0.7)
@@ -41,15 +40,16 @@ def coverage_map(
     return figure
 
 
-def coverage_counts(
-    views: Sequence[NDArray[np.floating]], width: int, height: int, cells: tuple[int, int] = (8, 6)
-) -> NDArray[np.int64]:
+def coverage_counts(views: Sequence[NDArray[np.floating]], width: int, height: int) -> NDArray[np.int64]:
     """Number of views with corners in each cell (across, down) of an image; arguments as of `coverage_map`."""
-    edges = np.linspace(-0.5, width - 0.5, cells[0] + 1), np.linspace(-0.5, height - 0.5, cells[1] + 1)
-    counts = np.zeros(cells, np.int64)
+    counts = np.zeros(_CELLS, np.int64)
     for pixels in views:
-        counts += np.histogram2d(pixels[:, 0], pixels[:, 1], bins=edges)[0] > 0
+        counts += np.histogram2d(pixels[:, 0], pixels[:, 1], bins=_edges(width, height))[0] > 0
     return counts
+
+
+def _edges(width: int, height: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    return np.linspace(-0.5, width - 0.5, _CELLS[0] + 1), np.linspace(-0.5, height - 0.5, _CELLS[1] + 1)
 
 
 def residual_field(pixels: NDArray[np.floating], residuals: NDArray[np.floating], width: int, height: int) -> "Figure":
@@ -87,20 +87,19 @@ def residual_field(pixels: NDArray[np.floating], residuals: NDArray[np.floating]
     return figure
 
 
-def image_map(values: NDArray[np.floating], label: str, limits: tuple[float, float] | None = None) -> "Figure":
+def image_map(values: NDArray[np.floating], label: str) -> "Figure":
     """A quantity per pixel with its colour bar.
 
     Args:
         values: (height, width); NaN is shown in grey.
-        label: quantity and unit, for the bar.
-        limits: values at the ends of the bar; None takes the 1st and 99th percentile, which is robust against outliers.
+        label: quantity and unit, for the bar, which ends at the 1st and 99th percentile.
     """
-    return _map(values, label, limits or _percentiles(values), "viridis")
+    return _map(values, label, _percentiles(values), "viridis")
 
 
-def difference_map(values: NDArray[np.floating], label: str, limit: float | None = None) -> "Figure":
-    """A signed quantity per pixel; zero is white. Arguments as of `image_map`; the bar ends at ± `limit`."""
-    reach = limit or max(map(abs, _percentiles(values)))
+def difference_map(values: NDArray[np.floating], label: str) -> "Figure":
+    """A signed quantity per pixel; zero is white. Arguments as of `image_map`."""
+    reach = max(map(abs, _percentiles(values)))
     return _map(values, label, (-reach, reach), "RdBu_r")
 
 

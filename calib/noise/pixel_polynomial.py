@@ -49,14 +49,7 @@ class PixelPolynomial:
 
     def save(self, file: Path) -> None:
         """Writes the .npz that `Settings` reads."""
-        np.savez_compressed(
-            file,
-            sigma=self.sigma,
-            mu=self.mu,
-            distances=self.distances,
-            amplitudes=self.amplitudes,
-            minimum_sigma=self.minimum_sigma,
-        )
+        np.savez_compressed(file, **vars(self))
 
     @property
     def _polynomials(self) -> Polynomials:

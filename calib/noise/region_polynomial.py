@@ -51,15 +51,7 @@ class RegionPolynomial:
 
     def save(self, file: Path) -> None:
         """Writes the .npz that `Settings` reads."""
-        np.savez_compressed(
-            file,
-            labels=self.labels,
-            sigma=self.sigma,
-            mu=self.mu,
-            distances=self.distances,
-            amplitudes=self.amplitudes,
-            minimum_sigma=self.minimum_sigma,
-        )
+        np.savez_compressed(file, **vars(self))
 
     @property
     def _polynomials(self) -> Polynomials:

@@ -93,11 +93,11 @@ class TimeOfFlight:
         return Measurement((steps * step).astype(np.float32), np.clip(np.rint(bright), 0, 65535).astype(np.float32))
 
 
-def frame_set(measured: Measurement, seq: int, t_ns: int, sensor: str = "tof") -> FrameSet:
+def frame_set(measured: Measurement, seq: int, t_ns: int) -> FrameSet:
     """A measurement as the frames `depth` (radial) and `amplitude` that a driver would deliver."""
     frames = [
         Frame(
-            sensor, kind.value, kind, np.nan_to_num(values).astype("<f4"), "32FC1", t_ns, t_ns, seq,
+            "tof", kind.value, kind, np.nan_to_num(values).astype("<f4"), "32FC1", t_ns, t_ns, seq,
             geometry=geometry, invalid=invalid,
         )
         for kind, values, geometry, invalid in (

@@ -42,23 +42,14 @@ def in_theta(problem: Problem, start: Array) -> tuple[Array, Array]:
 
 def after_newton(problem: Problem, start: Array) -> tuple[Array, Array]:
     """At the best of none, half and all of a Newton step, all parameters alike."""
-    return start + _shares(problem, start), SCALE_M * np.eye(len(start))
+    quadratic = problem.linearize(start).quadratic
+    shares = np.outer([0.0, 0.5, 1.0], newton_step(quadratic, search_metric(quadratic)))
+    return start + shares, SCALE_M * np.eye(len(start))
 
 
 def in_metric(problem: Problem, start: Array) -> tuple[Array, Array]:
     """At the start, in the metric of the curvature."""
     return start[None], search_metric(problem.linearize(start).quadratic)
-
-
-def in_metric_after_newton(problem: Problem, start: Array) -> tuple[Array, Array]:
-    """As the product's `cma`."""
-    return start + _shares(problem, start), search_metric(problem.linearize(start).quadratic)
-
-
-def _shares(problem: Problem, start: Array) -> Array:
-    """None, half and all of a Newton step (3, dim)."""
-    quadratic = problem.linearize(start).quadratic
-    return np.outer([0.0, 0.5, 1.0], newton_step(quadratic, search_metric(quadratic)))
 
 
 @dataclass(frozen=True)

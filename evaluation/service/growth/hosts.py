@@ -32,13 +32,13 @@ class Costs:
     record: float
     trackers: Law
 
-    def cores(self, trackers: int, rate_hz: float = RATE_HZ) -> float:
+    def cores(self, trackers: int) -> float:
         """Cores that a rig with so many trackers takes."""
-        return (self.capture + self.run + self.record + self.trackers.time(trackers)) * 1e-3 * rate_hz
+        return (self.capture + self.run + self.record + self.trackers.time(trackers)) * 1e-3 * RATE_HZ
 
-    def most_trackers(self, cores: float, rate_hz: float = RATE_HZ) -> float:
+    def most_trackers(self, cores: float) -> float:
         """Trackers of one rig that so many cores carry."""
-        return float(np.floor(self.trackers.wall(cores / rate_hz * 1e3 - self.capture - self.run - self.record)))
+        return float(np.floor(self.trackers.wall(cores / RATE_HZ * 1e3 - self.capture - self.run - self.record)))
 
 
 def table(costs: Costs) -> Table:

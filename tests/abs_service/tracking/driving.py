@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from abs_service import config, wiring
-from abs_service.tracker.estimate import Estimate
+from abs_service.tracker.estimate import Estimate, Status
 from abs_service.tracker.models.base import DeformationModel
+from abs_service.tracker.optimizers import cma_es
 from abs_service.tracker.posterior.posterior import Posterior
 from abs_service.tracking.log.truth import Errors
 from abs_service.tracking.observer import Observer
@@ -71,6 +72,23 @@ def mean_errors(steps: list[Step]) -> tuple[float, float]:
     """Mean vertex and surface error [mm] of the steps with a known error."""
     errors = [step.errors for step in steps if step.errors is not None]
     return float(np.mean([e.vertex_mm for e in errors])), float(np.mean([e.surface_mm for e in errors]))
+
+
+def tracked_error_mm(uri: str, exposures: Iterable[int], **changes: object) -> float:
+    """Mean vertex error [mm] of the paper's search in exposures of an address, all of which say TRACKING.
+
+    Args:
+        uri: of the simulated device.
+        exposures: their numbers.
+        changes: parts of the plan.
+    """
+    simulation = simulate(uri)
+    plan = default_plan(optimizer=cma_es.Settings(), **changes)
+    steps = list(drive(TrackingSession(rig_of(simulation), plan), simulation, exposures))
+    vertex_mm, surface_mm = mean_errors(steps)
+    print(f"{uri} {changes}: vertex {vertex_mm:.2f} mm, surface {surface_mm:.2f} mm")
+    assert {step.estimate.status for step in steps} == {Status.TRACKING}
+    return vertex_mm
 
 
 def posterior_of(model: DeformationModel, rig: Rig, frames: list[Frame]) -> Posterior:

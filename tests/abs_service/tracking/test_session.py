@@ -13,7 +13,15 @@ from abs_service.tracking.session import TrackingSession, streams
 from abs_service.tracking.warmup.board import warm_up
 from drivers.contract.frame import Frame, Kind
 from drivers.simulated.sensors.view import View
-from tests.abs_service.tracking.driving import CONFIG, Step, default_plan, drive, mean_errors, rig_of, simulate
+from tests.abs_service.tracking.driving import (
+    Step,
+    default_plan,
+    drive,
+    mean_errors,
+    rig_of,
+    simulate,
+    tracked_error_mm,
+)
 
 SHEET = simulate("simulated://sheet?seed=1")
 RIG = rig_of(SHEET)
@@ -181,17 +189,6 @@ def test_warming_up_leaves_nothing_to_compile_and_no_trace():
     assert step.estimate.status == Status.TRACKING
 
 
-def error_over_300_exposures(uri: str, **changes: object) -> float:
-    simulation = simulate(uri)
-    plan = default_plan(optimizer=cma_es.Settings(), **changes)
-    steps = list(drive(TrackingSession(rig_of(simulation), plan), simulation, range(300)))
-    vertex_mm, surface_mm = mean_errors(steps)
-    objective = type(changes.get("objective", CONFIG.trackers["sheet"].objective)).__module__.rpartition(".")[2]
-    print(f"{uri} {objective}: vertex {vertex_mm:.2f} mm, surface {surface_mm:.2f} mm")
-    assert all(step.estimate.status == Status.TRACKING for step in steps)
-    return vertex_mm
-
-
 def test_a_second_frame_set_without_any_image_that_counts_is_survived():
     """A distance without its amplitude does not count, and there is no colour."""
     alone = only(Kind.DEPTH)
@@ -208,8 +205,8 @@ def test_the_likelihood_is_within_2_mm_and_as_good_as_squares_of_the_same_size(s
 
     The experiment `squares` has the default weights, which are those of two to four times these deviations.
     """
-    uri = f"simulated://sheet?seed={seed}"
-    likelihood = error_over_300_exposures(uri)
+    sequence = f"simulated://sheet?seed={seed}", range(300)
+    likelihood = tracked_error_mm(*sequence)
     assert likelihood <= 2
     equal = euclidean.Settings(depth_weight=0.5 / 4.5e-3**2, color_weight=0.5 / 4.0**2)
-    assert likelihood < 1.05 * error_over_300_exposures(uri, objective=equal)
+    assert likelihood < 1.05 * tracked_error_mm(*sequence, objective=equal)

@@ -68,12 +68,16 @@ def test_an_azure_kinect_is_as_published_and_as_well_as_its_halves_agree(data_se
 @pytest.mark.slow
 @pytest.mark.timeout(600)
 def test_the_truth_lies_in_the_95_percent_regions_at_the_right_rate() -> None:
-    """Of 50 rigs 95 % are expected inside; 42 to 50 hold 99.5 % of that binomial distribution."""
+    """Of 50 rigs 95 % are expected inside; 42 to 50 hold 99.5 % of that binomial distribution.
+
+    Joint regions from a dozen poses need a floor, so that deviations are a fifth too large: the mean is below 0.5.
+    """
     low, high = stats.binom.interval(0.995, simulated_rig.SEEDS, 0.95)
     found = [simulated_rig.error_probabilities(seed) for seed in range(simulated_rig.SEEDS)]
     for what in found[0]:
         inside = sum(each[what] < 0.95 for each in found)
         assert low <= inside <= high, what
+        assert np.mean([each[what] for each in found]) > 0.35, what
 
 
 @pytest.mark.slow

@@ -43,18 +43,14 @@ def test_deviations_of_a_camera_whose_views_disagree_are_those_of_a_bootstrap(da
 
 @pytest.mark.slow
 @pytest.mark.timeout(900)
-@pytest.mark.parametrize("amplitude_px", [0.0, 0.5])
-def test_deviations_are_the_errors_of_simulated_rigs(amplitude_px: float) -> None:
-    """With independent corners, and with boards that are bent in every view: 30 rigs tell a deviation to 13 %.
-
-    Joint 95 % regions from a dozen poses need a floor, so that deviations of independent corners are a fifth too large.
-    """
+def test_deviations_are_the_errors_of_simulated_rigs_whose_boards_are_bent() -> None:
+    """30 rigs tell a deviation to 13 %. `test_cameras` has rigs with independent corners."""
     errors, stated = [], []
     for seed in range(30):
         generator = np.random.default_rng(seed)
         heads = {name: head for name, head in board_views.three_heads().items() if name != "light"}
         seen = board_views.look(heads, board_views.random_boards(12, generator), generator, points=40)
-        corners: list[CornerView] = [bent(view, amplitude_px, generator) for view in seen.corners]
+        corners: list[CornerView] = [bent(view, 0.5, generator) for view in seen.corners]
         sensors = {name: SensorTask(head.camera.width, head.camera.height) for name, head in heads.items()}
         solution = calibrate(Task(sensors, corners, seen.planes, "tof"))
         sigma = {each.name: each.sigma for each in solution.parameters}

@@ -9,7 +9,6 @@ import pytest
 from abs_service.tracker.estimate import Status
 from abs_service.tracker.models.flexpad import FlexPad, Settings
 from abs_service.tracker.objectives import euclidean
-from abs_service.tracker.optimizers import cma_es
 from abs_service.tracking.observer import Observer
 from abs_service.tracking.session import TrackingSession
 from drivers.simulated.shapes.rectangle import PlacedRectangle
@@ -23,6 +22,7 @@ from tests.abs_service.tracking.driving import (
     posterior_of,
     rig_of,
     simulate,
+    tracked_error_mm,
 )
 
 
@@ -89,19 +89,9 @@ def test_a_sheet_that_is_bent_at_first_is_waited_for():
     assert tracker.track(frame_set(simulation.expose(1)[0], 1), lambda: True).status == Status.TRACKING
 
 
-def error_over_300_exposures(uri: str, **changes: object) -> float:
-    simulation = simulate(uri)
-    steps = list(drive(tracking(simulation, optimizer=cma_es.Settings(), **changes), simulation, range(300)))
-    vertex_mm, surface_mm = mean_errors(steps)
-    objective = "euclidean" if changes else "likelihood"
-    print(f"{uri} flexpad {objective}: vertex {vertex_mm:.2f} mm, surface {surface_mm:.2f} mm")
-    assert all(step.estimate.status == Status.TRACKING for step in steps)
-    return vertex_mm
-
-
 @pytest.mark.slow
 def test_the_likelihood_is_within_2_mm_and_better_than_squares():
-    uri = "simulated://sheet?seed=1"
-    likelihood = error_over_300_exposures(uri)
+    sequence = "simulated://sheet?seed=1", range(300)
+    likelihood = tracked_error_mm(*sequence, model=Settings())
     assert likelihood <= 2
-    assert likelihood < error_over_300_exposures(uri, objective=euclidean.Settings())
+    assert likelihood < tracked_error_mm(*sequence, model=Settings(), objective=euclidean.Settings())

@@ -19,7 +19,6 @@ from abs_service.tracker.models.flexpad import FlexPad
 from abs_service.tracker.models.posed import GAUGE_M, Posed
 from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.objectives import euclidean
-from abs_service.tracker.optimizers import cma_es
 from abs_service.tracker.posterior.curvature import gauss_newton, search_metric
 from abs_service.tracker.posterior.priors.change_metric import ChangeMetric
 from abs_service.tracker.posterior.priors.motion_prior import MotionPrior
@@ -30,7 +29,7 @@ from abs_service.tracking.session import TrackingSession
 from calib import pose
 from drivers.simulated.shapes.rectangle import Rectangle
 from tests.abs_service.tracker.scenes import sheet
-from tests.abs_service.tracking.driving import default_plan, drive, mean_errors, rig_of, simulate
+from tests.abs_service.tracking.driving import default_plan, drive, rig_of, simulate, tracked_error_mm
 
 MESH = sheet()
 SHAPE = nurbs.Settings((4, 4), 2).of_mesh(MESH)
@@ -214,20 +213,9 @@ def test_mistakes_of_the_shape_are_told_with_their_full_key(model, mistake):
     assert mistake in str(caught.value)
 
 
-def error_over_150_exposures(uri: str, **changes: object) -> float:
-    simulation = simulate(uri)
-    plan = default_plan(model=posed.Settings(nurbs.Settings((4, 4), 2)), optimizer=cma_es.Settings(), **changes)
-    steps = list(drive(TrackingSession(rig_of(simulation), plan), simulation, range(20, 170)))
-    vertex_mm, surface_mm = mean_errors(steps)
-    objective = "euclidean" if changes else "likelihood"
-    print(f"{uri} posed nurbs {objective}: vertex {vertex_mm:.2f} mm, surface {surface_mm:.2f} mm")
-    assert all(step.estimate.status == Status.TRACKING for step in steps)
-    return vertex_mm
-
-
 @pytest.mark.slow
 def test_the_likelihood_is_within_2_mm_and_not_far_from_squares():
-    uri = "simulated://sheet?seed=1"
-    likelihood = error_over_150_exposures(uri)
+    sequence, model = ("simulated://sheet?seed=1", range(20, 170)), posed.Settings(nurbs.Settings((4, 4), 2))
+    likelihood = tracked_error_mm(*sequence, model=model)
     assert likelihood <= 2
-    assert likelihood < 1.15 * error_over_150_exposures(uri, objective=euclidean.Settings())
+    assert likelihood < 1.15 * tracked_error_mm(*sequence, model=model, objective=euclidean.Settings())
