@@ -117,33 +117,6 @@ def test_a_mosaic_is_compared_channel_by_channel(kind, order):
 
 
 @ALL
-@pytest.mark.parametrize("order", BAYER_ORDERS)
-def test_the_gradient_of_a_mosaic_is_that_of_the_cost(kind, order):
-    """For gradients of the surface, as in sparse synthesis, and for gradients measured in the image.
-
-    All channels have the same gradient, so the number of vertices per colour filter has no effect.
-    """
-    mesh = sheet(21, 31, flat, size=(0.2, 0.14))
-    synthesizer = built(kind, mesh)
-    shades = np.array([0.2, 0.0, 0.4], np.float32)
-    looks, wall = (
-        np.mean(gradient_colors(points)[..., :2], axis=-1, keepdims=True).astype(np.float32) - 100 * shades
-        for points in (synthesizer.canvas.vertices, COLOR.unproject(plane_distance(COLOR, WALL, 1.0)))
-    )
-    rows, columns = np.indices((COLOR.height, COLOR.width))
-    values = np.take_along_axis(wall, BAYER_ORDERS[order][rows % 2, columns % 2, None].astype(int), axis=2)[..., 0]
-    term = ChannelTerm("color", synthesizer, looks.astype(np.float32), GaussianBayer(LEVELS), Passive(), BOUNDS)
-    term.observe(
-        ChannelImage(values.astype(np.float32), BAYER_ORDERS[order]), as_surface((mesh.vertices, mesh.normals))
-    )
-    for parameter in (3, 4):
-        theta = 0.01 * np.eye(6)[parameter]
-        numerical, linear = slope(term, Rigid(mesh), theta, parameter, 0.01)
-        assert linear == pytest.approx(numerical, rel=0.1)
-        assert abs(linear) > 300
-
-
-@ALL
 def test_a_lamp_of_its_own_lights_the_samples(kind):
     """For a wall of uniform reflectivity, every sample has the brightness of the illumination model."""
     reflectivity = 3000.0

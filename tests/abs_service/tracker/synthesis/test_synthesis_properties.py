@@ -22,6 +22,7 @@ from calib.noise.images.color import GaussianColor
 from calib.noise.images.grey import GaussianGrey
 from calib.rig import Rig, Sensor
 from tests.abs_service.tracker.scenes import depth_image, flat, observation, plane_distance, sheet
+from tests.abs_service.tracker.synthesis.test_synthesis import slope
 
 KINDS = {
     "sparse": sparse.Settings(),
@@ -109,16 +110,6 @@ def test_a_plane_is_found_where_it_is(kind, turn, shift):
         assert np.abs(residuals(term, scene)).max() * LEVELS < 6
 
 
-def gradients(term: ChannelTerm, parameter: int) -> tuple[float, float]:
-    """Derivative of the cost with respect to a shift, 1 cm from the truth: by finite differences and linearisation."""
-    model, step = Rigid(MESH), 0.01
-    theta = 0.01 * np.eye(6)[parameter]
-    offset = step * np.eye(6)[parameter]
-    ahead, behind = term.cost(model.deform(np.stack([theta + offset, theta - offset])))
-    linear = term.linearize(model.deform(theta[None]), model.sparse_jacobian(theta))
-    return (ahead - behind) / (2 * step), float(linear.jacobian[:, parameter] @ linear.residual)
-
-
 @ALL
 @pytest.mark.parametrize("name", ["grey", *BAYER_ORDERS])
 def test_the_gradient_of_one_number_per_pixel_is_that_of_the_cost(kind, name):
@@ -127,7 +118,8 @@ def test_the_gradient_of_one_number_per_pixel_is_that_of_the_cost(kind, name):
     pattern = ONE_CHANNEL if grey else BAYER_ORDERS[name]
     term = scene.channel(GaussianGrey(LEVELS) if grey else GaussianBayer(LEVELS), pattern)
     for parameter in (3, 4):
-        numerical, linear = gradients(term, parameter)
+        theta = 0.01 * np.eye(6)[parameter]  # 1 cm from the truth
+        numerical, linear = slope(term, Rigid(MESH), theta, parameter, 0.01)
         assert linear == pytest.approx(numerical, rel=0.1)
         assert abs(linear) > 100
 
