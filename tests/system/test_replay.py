@@ -1,4 +1,4 @@
-"""A recording of `run`, tracked again: offline always the same, live at its own pace."""
+"""A recording of `run`, tracked again: offline frame by frame, live at its own pace."""
 
 import json
 import signal
@@ -33,33 +33,21 @@ def mean_error_mm(estimates):
     return float(np.mean([estimate["error_mm"] for estimate in estimates if estimate["error_mm"] is not None]))
 
 
-def payloads(path, topic):
-    """Messages of a topic in a file, without the computing times, which differ between runs."""
-    with path.open("rb") as stream:
-        return [(message.log_time, message.data) for _, _, message in make_reader(stream).iter_messages(topics=topic)]
-
-
 def count(path, topic):
-    return len(payloads(path, topic))
+    with path.open("rb") as stream:
+        return sum(1 for _ in make_reader(stream).iter_messages(topics=topic))
 
 
-def test_offline_twice_gives_the_same_bits_and_live_gives_the_pace_and_an_end(recording, tmp_path):
+def test_offline_every_frame_is_tracked_and_live_gives_the_pace_and_an_end(recording, endpoint, launch):
     path, live = recording
-    first, second = (
-        abs_service("replay", path, "--json", "--out", tmp_path / name) for name in ("first.mcap", "second.mcap")
-    )
-    assert (first.returncode, second.returncode) == (0, 0), first.stderr + second.stderr
-    offline = estimates_of(first.stdout)
+    done = abs_service("replay", path, "--json")
+    assert done.returncode == 0, done.stderr
+    offline = estimates_of(done.stdout)
     assert len(offline) == count(path, "/tof/depth/image"), "a frame set was dropped"
     assert {estimate["status"] for estimate in offline[1:]} == {"TRACKING"}  # a recording may begin amid an exposure
-    assert [one["theta"] for one in offline] == [other["theta"] for other in estimates_of(second.stdout)]
-    assert payloads(tmp_path / "first.mcap", "/sheet/mesh") == payloads(tmp_path / "second.mcap", "/sheet/mesh")
     print(f"error offline {mean_error_mm(offline):.2f} mm, live {mean_error_mm(live):.2f} mm")
     assert mean_error_mm(offline) < 1.5 * mean_error_mm(live)
 
-
-def test_at_speed_1_the_estimates_come_at_the_pace_of_the_recording_until_it_ends(recording, endpoint, launch):
-    path, live = recording
     process = launch("replay", path, "--speed", "1", "--json", stdout=-1)
     begin_s = time.monotonic()
     with RigListener(endpoint, "sheet/state") as listener:
