@@ -91,7 +91,7 @@ class Adjustment:
     def noise(self) -> NDArray[np.float64]:
         """Covariance of the sensors' parameters (k, k), if noise were the only error and no pose were repeated."""
         return uncertainty.noise_covariance(
-            self._pose_information, variance_components.covariance_inflation(self.equations, self.residuals)
+            self.pose_information, variance_components.covariance_inflation(self.equations, self.residuals)
         )
 
     @cached_property
@@ -99,12 +99,11 @@ class Adjustment:
         """Covariance of increments of the parameters (size, size), from how far the poses of the board disagree."""
         if self.layout.board_start == 0:
             return self.independent
-        return uncertainty.with_boards(
-            self.independent, uncertainty.pose_covariance(self._pose_information, self.noise)
-        )
+        return uncertainty.with_boards(self.independent, uncertainty.pose_covariance(self.pose_information, self.noise))
 
     @cached_property
-    def _pose_information(self) -> uncertainty.PoseInformation:
+    def pose_information(self) -> uncertainty.PoseInformation:
+        """Information and scores of the distinct poses."""
         return uncertainty.pose_information(self.equations, self.residuals)
 
 

@@ -8,9 +8,11 @@ import numpy as np
 from calib.solve.calibrate import calibrate
 from calib.solve.solution import Solution
 from calib.solve.validation import projection_uncertainty
+from calib.solve.validation.board_shape import shape_errors
 from calib.solve.validation.contradictions import Contradiction, Scatter, contradictions, scatter
 from calib.solve.validation.cross_validation import Agreement, TooFewToSplitError, cross_validate
 from calib.solve.validation.projection_uncertainty import UncertaintyMap
+from calib.solve.validation.steadiness import Change, changes_of_optics, changes_of_place, focal_scatter
 from calib.solve.validation.weak_directions import weak_directions
 
 #: Largest ratio of observed to predicted difference of the halves; exceeded by chance in about 1 % of the cases.
@@ -71,11 +73,9 @@ def assess(
         for target in solution.task.sensors
         if target != source
     }
-    contradicting = contradictions(solution)
-    scattered = _scattered(solution, contradicting)
-    if scattered:
-        contradicting = []  # without a rest, nothing contradicts it
-    reasons = [*scattered, *_contradicting(contradicting), *weak_directions(solution, distance)]
+    shape = shape_errors(solution, distance, needed_px)
+    reasons, contradicting = _unlike(solution, [str(one) for one in shape if one.stretch], needed_px)
+    reasons += weak_directions(solution, distance)
     reasons += _outliers(solution, {one.shot for one in contradicting})
     reasons += _uncertain({**images, **pairs}, needed_px)
     try:
@@ -84,8 +84,50 @@ def assess(
     except TooFewToSplitError as error:
         agreements = []
         reasons.append(f"two halves could not be compared: {error}")
+    reasons += [str(one) for one in shape if not one.stretch]  # why the halves may differ
     verdict = f"Do not trust it yet: {reasons[0]}" if reasons else _praise(agreements, {**images, **pairs}, distance)
     return Assessment(not reasons, verdict, reasons, contradicting, agreements, images, pairs, distance)
+
+
+def _unlike(solution: Solution, misprinted: Sequence[str], needed_px: float) -> tuple[list[str], list[Contradiction]]:
+    """Reasons to doubt that all shots show the described board and one rig, and shots that contradict the others."""
+    moved, refocused = changes_of_place(solution, needed_px), changes_of_optics(solution, needed_px)
+    contradicting = [] if moved else contradictions(solution)
+    scattered = [] if moved else _scattered(solution, contradicting)
+    if scattered:
+        contradicting = []  # without a rest, nothing contradicts it
+    # What happened to a sensor looks as if its image changed, and a wrong board as if every shot had another lens.
+    optics = [] if moved else [_of_optics(one, len(solution.task.sensors)) for one in refocused]
+    is_explained = moved or refocused or misprinted or scattered or contradicting
+    focus = {} if is_explained else focal_scatter(solution, needed_px)
+    reasons = [*map(_of_place, moved), *optics, *misprinted, *(_of_focus(*each) for each in focus.items())]
+    return [*reasons, *scattered, *_contradicting(contradicting)], contradicting
+
+
+def _of_place(one: Change) -> str:
+    turn, move = np.linalg.norm(one.values[:3]), np.linalg.norm(one.values[3:])
+    return (
+        f"{one.sensor}: stands elsewhere from about shot {one.shot} on, by about {move * 1e3:.2g} mm and "
+        f"{np.degrees(turn):.2g}°, which shifts its corners by {one.shift_px:.2g} px: it or the reference was moved; "
+        "fasten the sensors, and leave out the shots before or after with --skip"
+    )
+
+
+def _of_optics(one: Change, sensors: int) -> str:
+    focal, across, down = one.values.tolist()
+    cause = "it was refocused, zoomed or moved: fasten the sensors," if sensors > 1 else "it was refocused or zoomed:"
+    return (
+        f"{one.sensor}: projects otherwise from about shot {one.shot} on: focal length by {focal:+.1%}, principal "
+        f"point by ({across:+.1f}, {down:+.1f}) px, which shifts its corners by {one.shift_px:.2g} px: {cause} "
+        "switch autofocus, zoom and image stabilisation off, and leave out the shots before or after with --skip"
+    )
+
+
+def _of_focus(sensor: str, deviation: float) -> str:
+    return (
+        f"{sensor}: its focal length differs by ± {deviation:.1%} from shot to shot: switch autofocus, zoom and image "
+        "stabilisation off"
+    )
 
 
 def _praise(agreements: Sequence[Agreement], fields: dict[str, UncertaintyMap], distance: float) -> str:

@@ -1,0 +1,144 @@
+"""Shape of the printed board: errors that all views share, which small residuals and agreeing halves do not show.
+
+A print that is longer along one axis, or a bent board, is explained by wrong intrinsics instead. How large such an
+error is follows from one Gauss-Newton step with its column added to the equations, its deviation from the scatter of
+the distinct poses (a sandwich estimator, as in `calib.solve.bundle.uncertainty`).
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+
+from calib.solve.bundle import robust
+from calib.solve.bundle.adjustment import DAMPING
+from calib.solve.bundle.blocks import Corners
+from calib.solve.bundle.equations import Equations
+from calib.solve.bundle.uncertainty import MAX_SHARE, MIN_POSES
+from calib.solve.solution import Solution
+from calib.solve.validation import projection_uncertainty
+from calib.solve.validation.support import supported
+
+#: Errors are named from this many deviations on, …
+CERTAIN = 5.0
+
+#: … and if they change projections by this share of what is needed; a bend, which a lens that fits nearly imitates, by
+#: more.
+NOTICED, NOTICED_BEND = 0.15, 0.25
+
+#: Sizes of the errors that columns of the equations stand for: 1 %, 1 mm.
+_STRETCH, _BEND_M = 0.01, 1e-3
+
+
+@dataclass(frozen=True)
+class ShapeError:
+    """An error of the board's shape.
+
+    Attributes:
+        stretch: True for a length along x relative to y [%], False for a bend from the middle to the edge [mm].
+        size, sigma: its estimate and standard deviation.
+        effect_px: how much projections change if it is taken into account, root mean square [px].
+    """
+
+    stretch: bool
+    size: float
+    sigma: float
+    effect_px: float
+
+    def __str__(self) -> str:
+        """One clause for people."""
+        if self.stretch:
+            longer, other = ("rows", "columns") if self.size > 0 else ("columns", "rows")
+            return (
+                f"the board's {longer} are {abs(self.size):.2f} ± {self.sigma:.2f} % longer than described, compared "
+                f"with its {other}, which changes projections by {self.effect_px:.2g} px: measure both with a ruler, "
+                "and print without scaling"
+            )
+        return (
+            f"a board that is bent by {abs(self.size):.2g} ± {self.sigma:.1g} mm would explain what the corners miss "
+            f"by, and change projections by {self.effect_px:.2g} px: glue it onto a flat plate"
+        )
+
+
+def shape_errors(solution: Solution, distance: float, needed_px: float) -> list[ShapeError]:
+    """Errors of the board that are certain and matter: a stretch, the bend with the largest effect, or both.
+
+    Args:
+        solution: from all shots.
+        distance: of the scene [m].
+        needed_px: required accuracy of projections [px].
+    """
+    found = [
+        one
+        for one in _estimates(solution, distance)
+        if abs(one.size) > CERTAIN * one.sigma
+        and one.effect_px > (NOTICED if one.stretch else NOTICED_BEND) * needed_px
+    ]
+    bends = sorted((one for one in found if not one.stretch), key=lambda one: -one.effect_px)
+    return [*(one for one in found if one.stretch), *bends[:1]]
+
+
+def _estimates(solution: Solution, distance: float) -> Iterator[ShapeError]:
+    adjustment = solution.adjustment
+    equations = adjustment.equations
+    clusters = np.unique(equations.poses, return_inverse=True)[1][equations.shots_of_rows]
+    if len(set(clusters.tolist())) < MIN_POSES:
+        return
+    jacobian, columns = equations.jacobian(np.zeros(equations.layout.size)), _columns(equations)
+    curvature = (jacobian.T @ jacobian).toarray()
+    sizes = np.sqrt(np.diag(curvature))
+    curvature = curvature / np.outer(sizes, sizes) + DAMPING * np.eye(len(sizes))
+    taken = linalg.solve(curvature, jacobian.T @ columns / sizes[:, None], assume_a="pos") / sizes[:, None]
+    own = (columns - jacobian @ taken)[: len(clusters)]
+    pulls, efficiency = robust.influence(adjustment.residuals[: len(clusters)]), robust.efficiency(adjustment.residuals)
+    for number, (column, changes) in enumerate(zip(own.T, taken.T, strict=True)):
+        information = np.bincount(clusters, column**2)
+        total = max(float(information.sum()), 1e-12)
+        scores = np.bincount(clusters, column * pulls)
+        size = -float(scores.sum()) / (efficiency * total)
+        left = (scores + efficiency * size * information) / np.sqrt(1 - np.minimum(information / total, MAX_SHARE))
+        sigma = float(np.sqrt(np.sum(left**2))) / (efficiency * total)
+        yield ShapeError(number == 0, size, sigma, _effect(solution, -changes * size, distance))
+
+
+def _columns(equations: Equations) -> NDArray[np.float64]:
+    """Derivatives of the residuals with respect to a stretch, and three bends of the board (n, 4)."""
+    layout = equations.layout
+    jacobian = equations.jacobian(np.zeros(layout.size)).toarray()
+    columns = np.zeros((jacobian.shape[0], 4))
+    turns = np.stack([equations.base.boards[shot][:3, :3] for shot in layout.shots])
+    for group, rows in zip(equations.groups, equations.slices(), strict=True):
+        if not isinstance(group.measured, Corners) or group.shots.ndim > 1:
+            continue
+        shots = group.shots[group.views_of_rows]
+        own = jacobian[rows]
+        starts = layout.board_start + 6 * shots + 3
+        by_place = np.stack([own[np.arange(len(shots)), starts + axis] for axis in range(3)], axis=1)
+        displaced = np.repeat(_displacements(group.measured.points_b), 2, axis=0)
+        columns[rows] = np.einsum("ni,nij,nkj->nk", by_place, turns[shots], displaced)
+    return columns
+
+
+def _displacements(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Displacements of points of the board (n, 3) in its frame, for each error (n, 4, 3) [m]."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    x, y, _ = (points - (low + high) / 2).T
+    radius = max((high - low).max() / 2, 1e-12)
+    none = np.zeros_like(x)
+    bends = [_BEND_M * shape / radius**2 for shape in (x * x, y * y, x * y)]
+    stretch = np.stack([x, -y, none], axis=1) * _STRETCH / 2
+    return np.stack([stretch, *(np.stack([none, none, bend], axis=1) for bend in bends)], axis=1)
+
+
+def _effect(solution: Solution, changes: NDArray[np.float64], distance: float) -> float:
+    """Largest change of a sensor's projections [px], up to a motion of it."""
+    layout, found = solution.adjustment.layout, [0.0]
+    for name, free in layout.free_parameters.items():
+        if free.intrinsics:
+            jacobian = projection_uncertainty.implied_jacobian(solution, name, distance)
+            moved = np.linalg.norm(jacobian @ changes[layout.columns(name, free.intrinsics)], axis=1)
+            pixels = projection_uncertainty.grid(solution.cameras[name]).reshape(-1, 2)
+            found.append(projection_uncertainty.rms(moved[supported(solution, name, pixels)]))
+    return float(np.nanmax(found))

@@ -1,0 +1,212 @@
+"""Sensors that did not stay as they were: refocused, zoomed or moved between shots.
+
+Such shots are explained by something in between, with small residuals, and halves that take every other pose agree.
+Each distinct pose pulls the solution with its own score (see `calib.solve.bundle.uncertainty`). A change at one time is
+the split of the poses in their order that disagrees most, beyond any split of the same poses in random order: errors of
+lens and board, which also disagree, have no order. A focal length that is another one in each shot makes the poses
+disagree about it more than about everything else.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg, stats
+
+from calib import pose
+from calib.solve.bundle import robust
+from calib.solve.bundle.parameters.layout import POSE, turned
+from calib.solve.bundle.uncertainty import PoseInformation
+from calib.solve.solution import Solution
+
+#: Minimum number of distinct poses before and after a change.
+LEAST = 4
+
+#: Random orders of the poses, the share of them that may disagree as much, and the factor by which the change disagrees
+#: more than any order of the poses without it.
+ORDERS, RIVALS, MARGIN = 499, 0.01, 1.2
+
+#: One of the values that change does so by this many deviations.
+DEVIATIONS = 4.0
+
+#: Probability that noise alone makes one split disagree less.
+CERTAIN = 1 - 1e-5
+
+#: Changes below this share of the required accuracy of projections are harmless.
+HARMLESS = 0.5
+
+#: Ratio of the disagreement about the focal length to that about all parameters, from which on it is not steady.
+UNSTEADY = 2.5
+
+#: Share of the information, by which what some poses do not show at all is kept from dividing by zero.
+_UNSEEN = 1e-9
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Change:
+    """A sensor that is another one from a shot on.
+
+    Attributes:
+        sensor: its name.
+        shot: the first shot after the change.
+        values: change of the focal length [1] and of cx and cy [px], or increments of the pose (6,) [rad, m].
+        shift_px: root mean square displacement of the corners [px].
+    """
+
+    sensor: str
+    shot: int
+    values: Array
+    shift_px: float
+
+
+def changes_of_optics(solution: Solution, needed_px: float) -> list[Change]:
+    """Sensors whose focal length or principal point changed, by at least half of `needed_px` [px] in the image."""
+    found = []
+    for name, directions in _optics(solution):
+        if split := _split(solution, directions):
+            shot, values = split
+            shift = _rms(values[0] * _from_middle(solution, name) + values[1:])
+            found.append(Change(name, shot, values, shift))
+    return [one for one in found if one.shift_px > HARMLESS * needed_px]
+
+
+def changes_of_place(solution: Solution, needed_px: float) -> list[Change]:
+    """Sensors that moved relative to the reference, by at least half of `needed_px` [px] in the image."""
+    layout, found = solution.adjustment.layout, []
+    for name, free in layout.free_parameters.items():
+        if free.moves and not free.free_running:
+            directions = np.eye(layout.board_start)[:, layout.columns(name, POSE)]
+            if split := _split(solution, directions):
+                shot, values = split
+                found.append(Change(name, shot, values, _rms(_moved(solution, name, values))))
+    return [one for one in found if one.shift_px > HARMLESS * needed_px]
+
+
+def focal_scatter(solution: Solution, needed_px: float) -> dict[str, float]:
+    """Deviation of the focal length from shot to shot [1], of the sensors in which it is not steady."""
+    found = {}
+    for name, directions in _optics(solution):
+        information, scores = _once(solution.adjustment.pose_information)
+        if len(scores) < 2 * LEAST:
+            continue
+        taken = linalg.inv(information.sum(axis=0) + solution.adjustment.pose_information.prior)
+        own = information - information @ taken @ information
+        focal = directions[:, 0]
+        weights = np.maximum(focal @ own @ focal, 1e-12)
+        ratio = float(np.mean((scores @ focal) ** 2 / weights)) / _disagreement(own, scores)
+        estimates = scores @ focal / weights
+        middle = np.average(estimates, weights=weights)
+        excess = float(np.sum(weights * (estimates - middle) ** 2)) - (len(scores) - 1)
+        variance = excess / (weights.sum() - float(np.sum(weights**2)) / weights.sum())
+        deviation = float(np.sqrt(max(variance, 0.0)))
+        if ratio > UNSTEADY and deviation * _rms(_from_middle(solution, name)) > HARMLESS * needed_px:
+            found[name] = deviation
+    return found
+
+
+def _disagreement(information: Array, scores: Array) -> float:
+    """Mean squared score of the poses, in deviations that noise alone would have."""
+    found = []
+    for own, score in zip(information, scores, strict=True):
+        sizes, axes = np.linalg.eigh(own)
+        known = sizes > 1e-6 * sizes[-1]
+        found.append(np.mean((axes.T @ score)[known] ** 2 / sizes[known]))
+    return max(float(np.mean(found)), 1.0)
+
+
+def _optics(solution: Solution) -> Iterator[tuple[str, Array]]:
+    """Sensors with a free focal length, and directions (k, 1 to 3) of it (relative) and of cx and cy."""
+    layout = solution.adjustment.layout
+    for name, free in layout.free_parameters.items():
+        if {"fx", "cx", "cy"} <= {*free.intrinsics}:
+            directions = np.zeros((layout.board_start, 3))
+            for key, column in (("fx", 0), ("fy", 0), ("cx", 1), ("cy", 2)):
+                if key in free.intrinsics:
+                    size = getattr(solution.cameras[name], key) if column == 0 else 1.0
+                    directions[layout.columns(name, [key]), column] = size
+            yield name, directions
+
+
+def _once(poses: PoseInformation) -> tuple[Array, Array]:
+    """Information (poses, k, k) and scores (poses, k), as if every distinct pose had been seen once."""
+    return poses.information / poses.repeats[:, None, None], poses.scores / poses.repeats[:, None] / poses.efficiency
+
+
+def _split(solution: Solution, directions: Array) -> tuple[int, Array] | None:
+    """First shot after a change along directions (k, m), and its size (m,); None if there is none."""
+    adjustment = solution.adjustment
+    numbers, first = np.unique(adjustment.equations.poses, return_index=True)
+    if len(numbers) < 2 * LEAST:
+        return None
+    order = np.argsort(first)
+    information, scores = (part[order] for part in _once(adjustment.pose_information))
+    lower = linalg.cholesky(information.sum(axis=0) + adjustment.pose_information.prior, lower=True)
+    whole = linalg.solve_triangular(lower, np.eye(len(lower)), lower=True) @ information @ directions
+    own, pulls = directions.T @ information @ directions, scores @ directions
+    best = _best(own, whole, pulls)
+    noise = robust.covariance_inflation(adjustment.residuals)
+    is_certain = np.any(np.abs(best.size) > DEVIATIONS * np.sqrt(noise) * best.sigma)
+    if not is_certain or best.misfit < noise * stats.chi2.ppf(CERTAIN, directions.shape[1]):
+        return None
+    after = np.arange(len(own)) >= best.first
+    unchanged = pulls + after[:, None] * (own @ best.size) - whole.transpose(0, 2, 1) @ whole[after].sum(0) @ best.size
+    random, rivals = np.random.default_rng(0), 0
+    for _ in range(ORDERS):
+        shuffled = random.permutation(len(own))
+        parts = own[shuffled], whole[shuffled]
+        rivals += _best(*parts, pulls[shuffled]).misfit >= best.misfit
+        if rivals > RIVALS * ORDERS or MARGIN * _best(*parts, unchanged[shuffled]).misfit >= best.misfit:
+            return None
+    return int(adjustment.layout.shots[np.sort(first)[best.first]]), best.size
+
+
+@dataclass(frozen=True)
+class _Split:
+    """The split that disagrees most: squared distance of the parts in deviations, first pose after it, and the change.
+
+    Attributes:
+        size, sigma: of the change (m,).
+    """
+
+    misfit: float
+    first: int
+    size: Array
+    sigma: Array
+
+
+def _best(own: Array, whole: Array, pulls: Array) -> _Split:
+    """Of poses in their order: information (poses, m, m), its root from all (poses, k, m), and pulls (poses, m)."""
+    before, together, pull = (np.cumsum(part, axis=0)[LEAST - 1 : -LEAST] for part in (own, whole, pulls))
+    curvature = before - together.transpose(0, 2, 1) @ together
+    curvature += _UNSEEN * np.diag(own.sum(axis=0).diagonal() + _UNSEEN)
+    # Of all poses the pulls cancel, so that those after the split are the opposite of those before.
+    sizes = np.linalg.solve(curvature, pull[:, :, None])[:, :, 0]
+    squares = np.sum(sizes * pull, axis=1)
+    best = int(np.argmax(squares))
+    variances = np.linalg.inv(curvature[best]).diagonal()
+    return _Split(float(squares[best]), best + LEAST, sizes[best], np.sqrt(np.maximum(variances, 0)))
+
+
+def _from_middle(solution: Solution, name: str) -> Array:
+    """Places of all corners of a sensor relative to its principal point (n, 2) [px]."""
+    pixels = np.concatenate([view.pixels for view in solution.task.corners if view.sensor == name])
+    return pixels - (solution.cameras[name].cx, solution.cameras[name].cy)
+
+
+def _moved(solution: Solution, name: str, values: Array) -> Array:
+    """Displacements of a sensor's corners (n, 2) [px] by increments of its pose (6,)."""
+    camera = solution.cameras[name]
+    after = replace(camera, T_rs=turned(camera.T_rs, values))
+    views = [view for view in solution.task.corners if view.sensor == name and view.shot in solution.boards]
+    if not views:
+        return np.zeros((1, 2))
+    points = np.concatenate([pose.transform(solution.boards[view.shot], view.points_b) for view in views])
+    return after.project(points) - camera.project(points)
+
+
+def _rms(displacements: Array) -> float:
+    squares = np.sum(displacements**2, axis=1)
+    return float(np.sqrt(np.mean(squares[np.isfinite(squares)])))
