@@ -23,6 +23,7 @@ from calib.formats.plausibility import baselines
 from calib.solve.bundle.parameters.lens_parameters import KINDS, LensKind, kind_of
 from calib.solve.bundle.tasks import SensorTask, Task
 from calib.solve.calibrate import calibrate
+from calib.solve.start.start import left_out
 from calib.solve.validation.verdict import assess
 
 
@@ -135,6 +136,7 @@ def finish(title: str, task: Task, arguments: argparse.Namespace, found: Materia
     name = re.sub(r"[^A-Za-z0-9_-]+", "_", arguments.out.name.partition(".")[0]) or "rig"
     made = report.calibration(name, origin, solution, assessment.trusted, found.known)
     notes = [f"{sensor}, shot {shot}: {error}" for (shot, sensor), error in found.seen.rejected.items()]
+    notes += left_out(task, solution.task)
     result = report.report(title, origin, solution, assessment, notes)
     written = [*rig_file.write(made, arguments.out), *page.write(result, arguments.out)]
     if arguments.json:

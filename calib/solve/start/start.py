@@ -39,7 +39,7 @@ def start(task: Task, note: Callable[[str], None]) -> tuple[Task, State]:
             seen[name] = {shot: each for shot, each in found.items() if each}
     placed = _placed(task, cameras, seen)
     usable = _usable(task, seen)
-    for said in _left_out(task, usable):
+    for said in left_out(task, usable):
         note(said)
     return usable, placed
 
@@ -143,7 +143,7 @@ def _usable(task: Task, seen: extrinsics_graph.PoseCandidates) -> Task:
     )
 
 
-def _left_out(task: Task, usable: Task) -> list[str]:
+def left_out(task: Task, usable: Task) -> list[str]:
     """Sentences that count the views of each sensor that are not used, and say why."""
     found = []
     for views, kept, why in (
