@@ -192,15 +192,16 @@ class TrackingSession:
     def _recover(self, tracker: Tracker, observation: Observation) -> None:
         """Relocates the mesh of a lost object, or makes a new one if it was lost for too long."""
         if self._loss_monitor.keeps_mesh(observation.t_host_ns):
-            tracker.relocate(self._detection(observation, self._region).points)
+            points = self._detection(observation, self._region).points
+            self._loss_monitor.check_spread(points, tracker.model.mesh)
+            tracker.relocate(points)
             return
         self._renew(tracker.model.mesh, observation)
 
     def _renew(self, old: Mesh, observation: Observation) -> None:
         """Replaces the mesh by a new one of about the same size."""
         built = self._build(observation, self._region)
-        if self._loss_monitor.differs_in_size(built.mesh, old):
-            raise DetectionError(f"what is in sight has {built.mesh.area * 1e4:.0f} cm², not {old.area * 1e4:.0f} cm²")
+        self._loss_monitor.check_size(built.mesh, old)
         self._adopt(built, observation)
 
     def _grow(self, old: Mesh, observation: Observation) -> None:

@@ -3,9 +3,12 @@
 from dataclasses import dataclass, replace
 from typing import Annotated
 
+import numpy as np
 from annotated_types import Ge, Gt
+from numpy.typing import NDArray
 
 from abs_service.tracker import status
+from abs_service.tracker.detection.initial_detection import DetectionError
 from abs_service.tracker.estimate import Estimate, Status
 from abs_service.tracker.mesh import Mesh
 
@@ -21,8 +24,8 @@ class Settings:
             keep their material points; later, a new mesh is made [s]. For scenes without similar objects.
         every_s: time between two attempts [s].
         confirm: number of consecutive good estimates from which on the status is TRACKING; before, it is DEGRADED.
-        size_ratio: largest ratio between the areas of the detected and the lost object; others are rejected, because
-            an empty scene has surfaces, too.
+        size_ratio: largest ratio between the areas of the detected and the lost object, and between the mean squared
+            distances of their points from their centres; others are rejected, because an empty scene has surfaces, too.
         grow_s: time for which the object must be seen to continue beyond edges of the mesh that something hid at first
             before a new, larger mesh is made [s].
         misfit_s: time for which the free edges must lie off the object's outline (`status.degraded_rim`,
@@ -33,7 +36,7 @@ class Settings:
     keep_s: Annotated[float, Ge(0)] = 0.0
     every_s: Annotated[float, Gt(0)] = 0.2
     confirm: Annotated[int, Ge(1)] = 3
-    size_ratio: Annotated[float, Gt(1)] = 2.0
+    size_ratio: Annotated[float, Gt(1)] = 1.8
     grow_s: Annotated[float, Ge(0)] = 2.0
     misfit_s: Annotated[float, Ge(0)] = 1.0
 
@@ -95,7 +98,28 @@ class LossMonitor:
         """Makes the next estimates DEGRADED as after a loss, because of an event such as "a larger mesh was made"."""
         self._good, self._event = 0, event
 
-    def differs_in_size(self, found: Mesh, lost: Mesh) -> bool:
-        """True if the areas of the detected and the lost object differ by more than `size_ratio`."""
-        ratio = found.area / lost.area
-        return not 1 / self._settings.size_ratio < ratio < self._settings.size_ratio
+    def check_size(self, found: Mesh, lost: Mesh) -> None:
+        """DetectionError if the areas or spreads of the detected and the lost object differ by `size_ratio`."""
+        if self._differ(found.area, lost.area):
+            raise DetectionError(f"what is in sight has {found.area * 1e4:.0f} cm², not {lost.area * 1e4:.0f} cm²")
+        self.check_spread(found.vertices, lost)
+
+    def check_spread(self, found: NDArray[np.float64], lost: Mesh) -> None:
+        """DetectionError if points (k, 3) [m] of the detected object spread otherwise than the lost one.
+
+        A strip may have the area of a sheet, and so have the bits of a room that make a mesh.
+        """
+        reach, expected = _spread(found), _spread(lost.vertices)
+        if self._differ(reach**2, expected**2):
+            raise DetectionError(
+                f"what is in sight spreads by {reach * 1e2:.0f} cm about its centre (root mean square), "
+                f"not by {expected * 1e2:.0f} cm"
+            )
+
+    def _differ(self, found: float, lost: float) -> bool:
+        return not 1 / self._settings.size_ratio < found / lost < self._settings.size_ratio
+
+
+def _spread(points: NDArray[np.float64]) -> float:
+    """Root mean square distance [m] of points (k, 3) from their centre, which a bend hardly changes."""
+    return float(np.sqrt(points.var(axis=0).sum()))

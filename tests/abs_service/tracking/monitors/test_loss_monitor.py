@@ -5,19 +5,22 @@ import dataclasses
 import numpy as np
 import pytest
 
+from abs_service.tracker.detection.initial_detection import DetectionError
 from abs_service.tracker.estimate import Estimate, Status
+from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.shape_quality import ShapeQuality
 from abs_service.tracker.status import Settings as Limits
 from abs_service.tracker.terms.base import RimFit, SensorFit
 from abs_service.tracking.monitors.loss_monitor import LossMonitor, Settings
 from abs_service.tracking.session import TrackingSession
 from drivers.contract.frame import Frame, Kind
-from tests.abs_service.tracker.scenes import sheet
+from tests.abs_service.tracker.scenes import flat, sheet
 from tests.abs_service.tracking.driving import default_plan, drive, rig_of, simulate
 
 FRAME_NS = 33_000_000
 LIMITS = Limits(degraded_rim=0.3, degraded_rim_m=0.005)
 SHEET = simulate("simulated://sheet?seed=1")
+LOST = sheet(size=(0.3, 0.2))
 
 
 def estimate(k: int, status: Status, reasons: tuple[str, ...] = ()) -> Estimate:
@@ -71,13 +74,35 @@ def test_after_a_loss_the_first_good_estimates_are_degraded():
     assert after[2].reasons == ()
 
 
-def test_objects_of_another_size_are_rejected():
-    monitor = LossMonitor(Settings(size_ratio=2.0), LIMITS)
-    lost = sheet(size=(0.3, 0.2))
-    assert lost.area == pytest.approx(0.06, rel=0.05)
-    assert not monitor.differs_in_size(sheet(size=(0.25, 0.2)), lost)
-    assert monitor.differs_in_size(sheet(size=(1.5, 1.0)), lost)
-    assert monitor.differs_in_size(sheet(size=(0.1, 0.1)), lost)
+@pytest.mark.parametrize(
+    "found",
+    [
+        sheet(size=(1.5, 1.0)),
+        sheet(size=(0.1, 0.1)),
+        sheet(size=(0.42, 0.28)),
+        sheet(size=(0.21, 0.14)),
+        sheet(size=(0.75, 0.08)),
+    ],
+    ids=["wall", "scrap", "double", "half", "strip"],
+)
+def test_objects_of_another_size_are_rejected(found: Mesh):
+    with pytest.raises(DetectionError, match="what is in sight"):
+        LossMonitor(Settings(), LIMITS).check_size(found, LOST)
+
+
+@pytest.mark.parametrize("found", [sheet(size=(0.25, 0.2)), sheet(height=flat)], ids=["cut", "unbent"])
+def test_the_same_object_is_accepted(found: Mesh):
+    LossMonitor(Settings(), LIMITS).check_size(found, LOST)
+
+
+def test_far_bits_of_a_room_with_the_area_of_the_object_are_rejected():
+    halves = [sheet(rows=5, columns=9, size=(0.3, 0.1)) for _ in range(2)]
+    apart = np.concatenate([halves[0].vertices, halves[1].vertices + np.array([1.0, 0.0, 0.5])])
+    faces = np.concatenate([halves[0].faces, halves[1].faces + len(halves[0].vertices)])
+    bits = dataclasses.replace(halves[0], vertices=apart, faces=faces)
+    assert bits.area == pytest.approx(LOST.area, rel=0.1)
+    with pytest.raises(DetectionError, match=r"spreads by 5\d cm about its centre \(root mean square\), not by 11 cm"):
+        LossMonitor(Settings(), LIMITS).check_size(bits, LOST)
 
 
 def without_object(k: int, frames: list[Frame]) -> list[Frame]:

@@ -1,0 +1,87 @@
+"""After a loss the object is found again wherever it is, however it is bent; a thing of another size is refused."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from abs_service.tracker.detection.regions import nearest, seed
+from abs_service.tracker.estimate import Status
+from abs_service.tracker.optimizers import cma
+from abs_service.tracking.monitors import loss_monitor
+from abs_service.tracking.session import TrackingSession
+from calib import pose
+from drivers.simulated.scene.body import SurfaceBody
+from drivers.simulated.scene.motion import Placement
+from drivers.simulated.scene.texture import Texture
+from drivers.simulated.shapes.rectangle import PlacedRectangle
+from tests.abs_service.tracking.driving import default_plan, drive, rig_of, simulate
+
+SIMULATION = simulate("simulated://sheet?seed=1&speed=0&color=160x120")
+SHEET = SIMULATION.scene.surfaces[0].at(0)
+TEXTURE = Texture(np.full((2, 2, 4), 0.5, np.float32), 1.0)
+NEAREST, QUICK = nearest.Settings(), cma.Settings(generations=2)
+#: Exposure from which something else is in sight, and number of exposures.
+SWAPPED, COUNT = 3, 16
+
+
+@dataclasses.dataclass(frozen=True)
+class Swapped:
+    """The sheet, and later another thing in its place."""
+
+    other: SurfaceBody
+
+    def at(self, t: float) -> SurfaceBody:
+        return SHEET if t < (SWAPPED - 0.5) / SIMULATION.rate_hz else self.other
+
+
+def thing(width: float, height: float, turn=(0.0, 0.0, 0.0), place=(0.1, 0.05, 1.1), curvature=0.0) -> SurfaceBody:
+    placement = Placement(pose.from_rotation_vector(turn, place), curvature)
+    return PlacedRectangle(width, height, TEXTURE, placement)
+
+
+def swapped(other: SurfaceBody, region=NEAREST, keep_s=0.0):
+    """Steps of a session before whose cameras the sheet is exchanged, and the number of its meshes."""
+    scene = dataclasses.replace(SIMULATION.scene, surfaces=(Swapped(other),))
+    settings = loss_monitor.Settings(after_s=0.1, every_s=0.1, keep_s=keep_s)
+    tracking = TrackingSession(
+        rig_of(SIMULATION), default_plan(region=region, reinitialization=settings, optimizer=QUICK)
+    )
+    steps = list(drive(tracking, dataclasses.replace(SIMULATION, scene=scene), range(COUNT)))
+    assert [step.estimate.status for step in steps[:SWAPPED]] == [Status.TRACKING] * SWAPPED
+    return steps, tracking.mesh_version
+
+
+@pytest.mark.parametrize("region", [seed.Settings(pixel=(88, 72)), NEAREST], ids=["seed", "nearest"])
+def test_a_strip_of_the_same_area_is_not_the_lost_sheet(region):
+    steps, meshes = swapped(thing(0.75, 0.08, place=(0.0, 0.0, 1.25)), region)
+    assert Status.TRACKING not in {step.estimate.status for step in steps[SWAPPED:]}
+    assert meshes == 1
+    assert any("about its centre" in reason for step in steps for reason in step.estimate.reasons)
+
+
+@pytest.mark.parametrize(
+    ("scale", "keep_s"), [(0.7, 0.0), (1.4, 0.0), (1.4, 10.0)], ids=["half", "double", "kept mesh"]
+)
+def test_a_sheet_of_half_or_double_the_area_is_not_the_lost_one(scale, keep_s):
+    steps, meshes = swapped(thing(0.3 * scale, 0.2 * scale), keep_s=keep_s)
+    assert Status.TRACKING not in {step.estimate.status for step in steps[SWAPPED:]}
+    assert meshes == 1
+    assert any("what is in sight" in reason for step in steps for reason in step.estimate.reasons)
+
+
+@pytest.mark.parametrize(
+    "back",
+    [
+        thing(0.3, 0.2, place=(0.12, 0.08, 1.1), turn=(0.0, 0.0, np.deg2rad(30))),
+        thing(0.3, 0.2, turn=(0.3, 0.4, 0.0), curvature=np.deg2rad(100) / 0.3),
+    ],
+    ids=["moved", "bent"],
+)
+def test_the_same_sheet_is_found_at_the_first_attempt(back):
+    steps, meshes = swapped(back)
+    statuses = [step.estimate.status for step in steps]
+    assert meshes == 2
+    lost = statuses.index(Status.LOST)
+    assert statuses[-1] == Status.TRACKING
+    assert statuses.index(Status.TRACKING, lost) <= lost + 6  # three frames LOST, two DEGRADED
