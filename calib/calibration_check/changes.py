@@ -19,9 +19,13 @@ from calib.solve.bundle.adjustment import Adjustment, NotSolvedError
 from calib.solve.bundle.parameters.layout import POSE
 from calib.solve.solution import Solution
 from calib.solve.validation.contradictions import Contradiction, contradictions
+from calib.solve.validation.steadiness import Change, changes_of_place
 
 #: Minimum number of common shots of two sensors.
 MIN_SHOTS = 3
+
+#: Accuracy of projections that a motion between shots spoils if it shifts pictures by half of this [px].
+NEEDED_PX = 1.0
 
 #: Threshold of significance: exceeded by chance in one check of a thousand.
 QUANTILE = float(stats.chi2.ppf(0.999, 6))
@@ -40,6 +44,7 @@ class PairChange:
         sigma_px: standard deviation of that shift, from the stored and the new covariance [px].
         squared: squared Mahalanobis distance of turn and move; chi-squared with 6 degrees of freedom without motion.
         contradicting: shots that contradict the others and were left out.
+        during: motion between these shots, from one of them on; empty, or one.
     """
 
     first: str
@@ -51,6 +56,7 @@ class PairChange:
     sigma_px: float
     squared: float
     contradicting: tuple[Contradiction, ...] = ()
+    during: tuple[Change, ...] = ()
 
     @property
     def is_significant(self) -> bool:
@@ -96,6 +102,7 @@ def _change(stored: Stored, views: Views, pair: tuple[str, str]) -> PairChange:
         float(np.sqrt(np.sum(np.square(spread)))),
         float(change @ np.linalg.solve(covariance, change)),
         tuple(contradicting),
+        tuple(changes_of_place(solution, NEEDED_PX)),
     )
 
 

@@ -67,6 +67,8 @@ def verdicts(found: Comparison, motion: Level, reaches: Mapping[str, Reach]) -> 
         reaches: of the sensors that measure distances.
     """
     chosen, rivals = found.chosen, found.rivals
+    if chosen.hypothesis.kind == Kind.UNCHANGED:
+        return []
     level = max(_level(each, motion, reaches) for each in (chosen, *rivals))
     if level == Level.GOOD:
         return []
@@ -129,8 +131,6 @@ def _mistaken(mistake: Mistake) -> str:
 def _level(explanation: Explanation, motion: Level, reaches: Mapping[str, Reach]) -> Level:
     """Level of a change by its effect on images, or on distances in the middle of the boards."""
     kind = explanation.hypothesis.kind
-    if kind == Kind.UNCHANGED:
-        return Level.GOOD
     if kind == Kind.BOARD:
         middles = [(reach.near + reach.far) / 2 for reach in reaches.values()]
         return max(motion, _of_distance(max(middles, default=0.0) * (explanation.board_size - 1)))

@@ -183,6 +183,10 @@ def _of_pair(change: PairChange, comparison: Comparison) -> Verdict:
     if not change.is_significant and level == Level.DOUBTFUL:
         advice = "Show the board to both at once, nearer, tilted and in more places."
         return Verdict(level, f"could not be compared well enough: {said}", advice, about)
+    if change.during:
+        text = f"moved to each other during these shots, from about shot {change.during[0].shot} on: {said}"
+        advice = "Fasten the sensors, and calibrate the rig again."
+        return Verdict(Level.BAD if change.during[0].shift_px > SPOILT_PX else Level.DOUBTFUL, text, advice, about)
     if level == Level.GOOD:
         return Verdict(level, f"stand as they were calibrated: {said}", about=about)
     if comparison.chosen.hypothesis.kind == Kind.UNCHANGED:

@@ -124,3 +124,24 @@ def test_a_board_of_another_size_is_no_motion_and_no_distance_bias() -> None:
 def test_a_board_in_another_unit_is_told_from_everything_else(size: float, sensors: tuple[str, ...]) -> None:
     (worst,) = seen_with(size, {name: three_heads()[name] for name in sensors}).verdicts
     assert worst.text.startswith(f"The squares of the board are about {size:.3g} times as large as described")
+
+
+def test_a_sensor_that_is_bumped_between_the_shots_is_said_to_have_moved_then() -> None:
+    heads = {name: head for name, head in three_heads().items() if name != "tof"}
+    color = heads["color"]
+    turn = pose.from_rotation_vector((0, np.radians(0.3), 0), np.zeros(3))
+    after = {**heads, "color": replace(color, camera=replace(color.camera, T_rs=color.camera.T_rs @ turn))}
+    random = np.random.default_rng(1)
+    boards = random_boards(16, random)
+    seen = [
+        view
+        for now, shots in ((heads, range(8)), (after, range(8, 16)))
+        for view in look(now, {shot: boards[shot] for shot in shots}, random).corners
+    ]
+    sensors = {name: rig_file.SensorCalibration(head.camera) for name, head in heads.items()}
+    known = rig_file.RigCalibration("lab", sensors, ORIGIN, "good")
+    report = verification.verify(known, BoardObservations(tuple(seen), ()), ORIGIN)
+    worst = report.verdicts[0]
+    assert (worst.level, worst.about) == (Level.BAD, "light and color")
+    assert worst.text.startswith("moved to each other during these shots, from about shot 8 on: ")
+    assert not any("0.0 mm and 0.00°" in verdict.text for verdict in report.verdicts)
