@@ -22,6 +22,9 @@ MIN_RADIUS_PX = 1.5
 #: Distances around a grid point that deviate by more from their median belong to another surface [m].
 LARGEST_RELIEF_M = 0.03
 
+#: Or by more from a plane through all of them, if that is too steep for it: it shows no jump that it does not [m].
+LARGEST_BEND_M = 0.01
+
 #: A triangle with a side longer than this multiple of the typical side spans a jump between two surfaces. A vertex at a
 #: jump takes a mean of both surfaces, so one side shows only a part of it (decision 0007); a plane's sides are no
 #: longer than that, at any slant up to 70°.
@@ -98,17 +101,32 @@ def _local_planes(
     column, row = np.moveaxis(np.where(inside[..., None], around, 0), -1, 0)
     values = np.where(within & inside, distance[row, column], np.nan).astype(np.float64)
     near = np.abs(values - _row_medians(values)) < LARGEST_RELIEF_M
+    least = np.maximum(MIN_COVER * np.count_nonzero(within, axis=1), 3)
+    known = np.isfinite(values)
+    steep = np.flatnonzero((np.count_nonzero(near, axis=1) < least) & (np.count_nonzero(known, axis=1) >= least))
+    near[steep] = np.abs(values[steep] - _planes(values[steep], offset[steep], known[steep])[0]) < LARGEST_BEND_M
     count = np.count_nonzero(near, axis=1)
-    usable = np.flatnonzero(count >= np.maximum(MIN_COVER * np.count_nonzero(within, axis=1), 3))
+    usable = np.flatnonzero(count >= least)
     near, values = near[usable], np.where(near[usable], values[usable], 0.0)
-    planes = np.concatenate([near[..., None], offset[usable] * near[..., None]], axis=2)
-    transposed = planes.transpose(0, 2, 1)
-    inverse = np.linalg.pinv(transposed @ planes, rcond=1e-10, hermitian=True) @ transposed  # pixels may lie in a line
-    fitted = (inverse @ values[..., None])[..., 0]
+    fitted, inverse = _planes(values, offset[usable], near)
     result, share = np.full((2, len(pixels)), np.nan)
-    result[usable], share[usable] = fitted[:, 0], np.linalg.norm(inverse[:, 0], axis=1)
-    squares = float(np.sum((values - (planes @ fitted[..., None])[..., 0]) ** 2))
+    result[usable], share[usable] = (inverse[:, :1] @ values[..., None])[:, 0, 0], np.linalg.norm(inverse[:, 0], axis=1)
+    squares = float(np.sum((values - fitted) ** 2))
     return result, share * np.sqrt(squares / max(int(np.sum(count[usable] - 3)), 1))
+
+
+def _planes(
+    values: NDArray[np.float64], offset: NDArray[np.float64], used: NDArray[np.bool_]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Planes through the used ones of values (g, s) at pixel offsets (g, s, 2).
+
+    Returns:
+        Their values there (g, s), 0 for the others, and their pseudoinverses (g, 3, s): coefficients from values.
+    """
+    rows = np.concatenate([used[..., None], offset * used[..., None]], axis=2)
+    transposed = rows.transpose(0, 2, 1)
+    inverse = np.linalg.pinv(transposed @ rows, rcond=1e-10, hermitian=True) @ transposed  # pixels may lie in a line
+    return (rows @ (inverse @ np.where(used, values, 0.0)[..., None]))[..., 0], inverse
 
 
 def _row_medians(values: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -92,6 +92,16 @@ def test_noise_is_averaged():
     assert points[:, 2].std() < 3e-3
 
 
+def test_a_steep_plane_has_vertices_though_its_cells_are_large():
+    """A table that fills the image, seen at 60°: distances around a vertex differ by more than its relief may."""
+    cosine, normal = 0.5, np.array([0.0, np.sqrt(0.75), 0.5])
+    distance = (cosine / (TOF.rays() @ normal)).astype(np.float32)
+    mesh, fine = (grid_mesh(InitialDetection(distance, TOF, vertices)) for vertices in (300, 2000))
+    assert area(mesh) > 0.9 * area(fine)
+    off = pose.transform(TOF.T_sr, mesh.vertices) @ normal - cosine
+    assert np.abs(off).max() < 5e-3
+
+
 def test_no_face_spans_a_jump_in_distance():
     """A step of 20 cm between the halves: no gap in the image, but two surfaces."""
     near, far = rectangle(placed()), rectangle(placed(z=1.2))

@@ -1,5 +1,6 @@
 """Classes of a mesh's rim in the first depth image: where the object ends, and where only the mesh does."""
 
+from collections.abc import Callable
 from enum import IntEnum
 
 import numpy as np
@@ -11,6 +12,12 @@ from calib.camera import Camera
 
 #: The object continues beyond the outermost vertices by no more than so many times their distance from the next ones.
 LARGEST_GAP_STEPS = 2.0
+
+#: The end of the object is known if the outline is so near to where it is extrapolated [px].
+LARGEST_MISS_PX = 4.0
+
+#: Something hides an edge if it is in front of a point so many steps beyond it.
+_HIDING_STEPS = (0.5, 1.0, 1.5, LARGEST_GAP_STEPS)
 
 #: A surface that is seen at a smaller cosine at its rim turns away from the sensor: the outline is a silhouette, which
 #: wanders over a body as it turns, not the end of a sheet.
@@ -24,7 +31,7 @@ class RimClass(IntEnum):
     """Reason why the mesh ends at a vertex."""
 
     FREE = 0  # the object ends: beside it there is a background, or no return
-    CONTACT = 1  # measured surface goes on: another object, or a mask cuts this one
+    CONTACT = 1  # measured surface goes on: another object, a mask cuts this one, or its mesh ends far inside it
     SILHOUETTE = 2  # the surface turns away from the sensor
     OCCLUDED = 3  # an occluder lies before it, or the measurement has a hole
     BORDER = 4  # the image ends
@@ -34,10 +41,9 @@ def classify_rim(
     camera: Camera,
     rim: Rim,
     surface: Surface,
-    points: NDArray[np.float32],
     inside: NDArray[np.float64],
     gradients: NDArray[np.float64],
-    hidden: NDArray[np.bool_],
+    inside_at: Callable[[NDArray[np.float64]], NDArray[np.float64]],
 ) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
     """`RimClass` (k,) of the outer vertices, and the gap (k,) between them and the end of the object.
 
@@ -48,27 +54,29 @@ def classify_rim(
         camera: the depth camera.
         rim: outermost vertices.
         surface: the mesh in the first image, a population of one.
-        points: outermost vertices (k, 3) [m].
-        inside: their distances inside the outline (k,) [px], huge where unknown.
+        inside: distances (k,) of the outermost vertices inside the outline [px], huge where unknown.
         gradients: image gradients of these distances (k, 2).
-        hidden: True (k,) if it is unknown whether the object continues beyond them.
+        inside_at: distances (k,) of points (k, 3) inside it, −∞ far outside, NaN where unknown.
     """
-    inner = surface.vertices[0].T[rim.inner].astype(np.float64)
+    outer, inner = (surface.vertices[0].T[which].astype(np.float64) for which in (rim.outer, rim.inner))
     # Extrapolated to the end of the surface, which lies about as far outside the outer vertex as the inner one inside.
     end_cosine = 2 * _cosine(camera, surface, rim.outer) - _cosine(camera, surface, rim.inner)
-    place = camera.project(points.astype(np.float64))
+    place = camera.project(outer)
     per_step = -np.einsum("ki,ki->k", gradients, place - camera.project(inner))
     with np.errstate(divide="ignore", invalid="ignore"):
         beyond = np.where(per_step > 0, inside / per_step, np.inf)
     classes = np.full(len(beyond), RimClass.FREE, np.uint8)
-    goes_on = ~(beyond <= LARGEST_GAP_STEPS)
+    gap = np.where(beyond <= LARGEST_GAP_STEPS, np.maximum(beyond, 0.0), 0.0)
+    hidden = np.any([np.isnan(inside_at(outer + by * (outer - inner))) for by in _HIDING_STEPS], axis=0)
+    # If the mesh ends far inside the object, or the outline bends, it is nearest elsewhere than where the edge points.
+    missed = np.abs(inside_at(outer + gap[:, None] * (outer - inner))) > LARGEST_MISS_PX
+    goes_on = ~(beyond <= LARGEST_GAP_STEPS) | (missed & (gap > 0))
     classes[goes_on] = np.where(hidden, RimClass.OCCLUDED, RimClass.CONTACT)[goes_on]
     classes[end_cosine < MIN_COSINE] = RimClass.SILHOUETTE
     classes[inside > camera.width + camera.height] = RimClass.OCCLUDED
     last = np.array([camera.width, camera.height]) - 1
     classes[~np.all((place >= BORDER_PX) & (place <= last - BORDER_PX), axis=1)] = RimClass.BORDER
-    largest = 0.0 if rim.is_end else LARGEST_GAP_STEPS
-    gap = np.where(classes == RimClass.FREE, np.clip(beyond, 0.0, largest), 0.0)
+    gap[(classes != RimClass.FREE) | rim.is_end] = 0.0
     return classes, gap.astype(np.float32)
 
 

@@ -32,9 +32,6 @@ UNJUDGED_DEVIATIONS = 3.0
 #: An outer vertex is hidden if the mesh's own surface lies so far in front of it [m].
 HIDDEN_BEHIND_M = 0.01
 
-#: Something hides an edge in the first image if it is in front of a point so many steps beyond it.
-_HIDING_STEPS = (0.5, 1.0, 1.5, LARGEST_GAP_STEPS)
-
 #: A free edge is off the outline if it is farther from it than so many pixels, and than the bound of its cost.
 OFF_PX = 3.0
 
@@ -150,9 +147,8 @@ class RimOutline:
         part, self._inwards = inwards(distance, seen, int(np.ceil(self._bound)) + 1)
         self._corner = np.add(corner(window), corner(part))[::-1].astype(np.float32)
         if not self._begun:
-            points, values, gradients = self._locate(predicted)
-            unknown = np.isnan(self._beyond_by(predicted, np.arange(len(values)), _HIDING_STEPS))
-            measured = points, values, gradients, np.any(unknown, axis=0)
+            _, values, gradients = self._locate(predicted)
+            measured = values, gradients, self._inside_at
             self.classes, self._beyond = classify_rim(self._camera, self._rim, predicted, *measured)
             self._begun = True
         free = np.flatnonzero(self.classes == RimClass.FREE)

@@ -42,6 +42,21 @@ def test_an_edge_on_a_table_or_cut_by_a_mask_is_in_contact():
     assert here.visible == np.count_nonzero(found.classes == RimClass.FREE)
 
 
+def test_an_edge_beside_a_notch_of_a_larger_object_is_no_free_edge():
+    """The object goes on to the right, but for a notch: the outline is near, and not where the edges point."""
+    coarse = sheet(5, 7, flat)
+    rays = CAMERA.unproject(np.ones((CAMERA.height, CAMERA.width)))
+    x, y = rays[..., 0] / rays[..., 2], rays[..., 1] / rays[..., 2]
+    goes_on = (x > 0) & (np.abs(y) < 0.1) & ~((x > 0.18) & (y < -0.04))
+    found = outline(np.where(goes_on, 1.0 / rays[..., 2], picture(coarse)).astype(np.float32), coarse)
+    outer = coarse.vertices[Rim.of(coarse).outer]
+    right = outer[:, 0] > 0.14
+    assert found.classes[right & (outer[:, 1] < -0.04)] == RimClass.FREE  # before the notch
+    assert np.all(found.classes[right & (np.abs(outer[:, 1] - 0.025) < 0.03)] == RimClass.CONTACT)
+    here = found.fit(moved(coarse, 0.0))
+    assert (here.outside, here.inside) == (0, 0)
+
+
 @pytest.mark.parametrize("beyond", [0.002, 0.012, 0.025])
 def test_an_edge_up_to_two_cells_before_an_occluder_is_occluded_until_that_leaves(beyond: float):
     """The sheet goes on to the right, where something is in front of it; the mesh ends a little before that."""
