@@ -82,6 +82,15 @@ def data_set() -> Callable[[str], Path]:
     return data_set
 
 
+@pytest.fixture(autouse=True)
+def signal_handlers():
+    """Handlers that a command sets, in the test's own process, are those of before when the test has ended."""
+    before = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
 @pytest.fixture
 def endpoint():
     """An address on which nobody listens."""

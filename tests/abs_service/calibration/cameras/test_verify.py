@@ -3,7 +3,6 @@
 import dataclasses
 import json
 import signal
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -104,9 +103,8 @@ device = "sim"
 
 
 @pytest.fixture
-def live(tmp_path: Path) -> Iterator[list[str]]:
+def live(tmp_path: Path) -> list[str]:
     """Arguments that verify a rig by its running devices; the colour camera of which stands 15 mm off in truth."""
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     (tmp_path / "rig.toml").write_text(RIG, encoding="utf-8")
     target_file.write(SCENE.target, tmp_path / "board.toml")
     heads = SCENE.simulation.heads
@@ -117,9 +115,7 @@ def live(tmp_path: Path) -> Iterator[list[str]]:
     rig_file.write(calibration(cameras), tmp_path / "lab.calibration.toml")
     names = ("lab.calibration.toml", "rig.toml", "board.toml")
     stored, rig, board = (str(tmp_path / name) for name in names)
-    yield ["calibrate", "verify", stored, rig, "--target", board]
-    for number, handler in before.items():
-        signal.signal(number, handler)
+    return ["calibrate", "verify", stored, rig, "--target", board]
 
 
 @pytest.mark.slow
@@ -137,13 +133,13 @@ def test_running_devices_are_verified_by_views_that_differ(live: list[str], tmp_
 
 @pytest.mark.slow
 def test_ctrl_c_ends_the_looking_and_what_was_seen_counts(live: list[str], capsys, monkeypatch) -> None:
-    seen = BoardObservations()
+    seen, once = BoardObservations(), [signal.SIGINT]  # a second one ends the process on the spot
 
     def see_and_stop(*arguments) -> BoardObservations:
         nonlocal seen
         seen += (new := see(*arguments))
-        if len({view.shot for view in seen.corners}) == 3:
-            signal.raise_signal(signal.SIGINT)
+        if len({view.shot for view in seen.corners}) == 3 and once:
+            signal.raise_signal(once.pop())
         return new
 
     monkeypatch.setattr(command, "see", see_and_stop)

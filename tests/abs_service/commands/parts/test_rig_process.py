@@ -16,16 +16,8 @@ from abs_service.config.tables.bus import BusTable, TlsTable
 from tests.conftest import encrypted
 
 
-@pytest.fixture
-def handlers():
-    before = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)}
-    yield
-    for number, handler in before.items():
-        signal.signal(number, handler)
-
-
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_the_first_signal_asks_and_the_second_forces(handlers, monkeypatch, number):
+def test_the_first_signal_asks_and_the_second_forces(monkeypatch, number):
     forced = []
     monkeypatch.setattr(os, "_exit", forced.append)
     stop = rig_process.stop_on_signals()
@@ -37,7 +29,7 @@ def test_the_first_signal_asks_and_the_second_forces(handlers, monkeypatch, numb
     assert forced == [128 + number]
 
 
-def test_many_hangups_without_a_terminal_are_one_wish(handlers, monkeypatch):
+def test_many_hangups_without_a_terminal_are_one_wish(monkeypatch):
     def no_terminal(path, mode):
         raise OSError(errno.ENXIO, path)
 
