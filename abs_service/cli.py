@@ -147,13 +147,14 @@ def main(argv: Sequence[str] | None = None) -> int:
 @contextmanager
 def _ended_by_interrupt() -> Iterator[None]:
     """Within it, Ctrl-C is no exception: native libraries take one for a failure of their imports, or swallow it."""
-    before = signal.getsignal(signal.SIGINT)
-    if before is signal.default_int_handler:
-        signal.signal(signal.SIGINT, lambda *_: os._exit(Exit.INTERRUPTED))
+    if signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        yield
+        return
+    signal.signal(signal.SIGINT, lambda *_: os._exit(Exit.INTERRUPTED))
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def _compute_with_one_thread() -> None:

@@ -86,7 +86,8 @@ def _estimates(solution: Solution, distance: float) -> Iterator[ShapeError]:
     clusters = np.unique(equations.poses, return_inverse=True)[1][equations.shots_of_rows]
     if len(set(clusters.tolist())) < MIN_POSES:
         return
-    jacobian, columns = equations.jacobian(np.zeros(equations.layout.size)), _columns(equations)
+    jacobian = equations.jacobian(np.zeros(equations.layout.size))
+    columns = _columns(equations, jacobian.toarray())
     curvature = (jacobian.T @ jacobian).toarray()
     sizes = np.sqrt(np.diag(curvature))
     curvature = curvature / np.outer(sizes, sizes) + DAMPING * np.eye(len(sizes))
@@ -103,10 +104,9 @@ def _estimates(solution: Solution, distance: float) -> Iterator[ShapeError]:
         yield ShapeError(number == 0, size, sigma, _effect(solution, -changes * size, distance))
 
 
-def _columns(equations: Equations) -> NDArray[np.float64]:
-    """Derivatives of the residuals with respect to a stretch, and three bends of the board (n, 4)."""
+def _columns(equations: Equations, jacobian: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Derivatives of the residuals with respect to a stretch, and three bends of the board (n, 4); see `Equations`."""
     layout = equations.layout
-    jacobian = equations.jacobian(np.zeros(layout.size)).toarray()
     columns = np.zeros((jacobian.shape[0], 4))
     turns = np.stack([equations.base.boards[shot][:3, :3] for shot in layout.shots])
     for group, rows in zip(equations.groups, equations.slices(), strict=True):

@@ -91,13 +91,14 @@ def assess(
 
 def _unlike(solution: Solution, misprinted: Sequence[str], needed_px: float) -> tuple[list[str], list[Contradiction]]:
     """Reasons to doubt that all shots show the described board and one rig, and shots that contradict the others."""
-    moved, refocused = changes_of_place(solution, needed_px), changes_of_optics(solution, needed_px)
+    moved = changes_of_place(solution, needed_px)
+    # What happened to a sensor looks as if its image changed, and a wrong board as if every shot had another lens.
+    refocused = [] if moved else changes_of_optics(solution, needed_px)
     contradicting = [] if moved else contradictions(solution)
     scattered = [] if moved else _scattered(solution, contradicting)
     if scattered:
         contradicting = []  # without a rest, nothing contradicts it
-    # What happened to a sensor looks as if its image changed, and a wrong board as if every shot had another lens.
-    optics = [] if moved else [_of_optics(one, len(solution.task.sensors)) for one in refocused]
+    optics = [_of_optics(one, len(solution.task.sensors)) for one in refocused]
     is_explained = moved or refocused or misprinted or scattered or contradicting
     focus = {} if is_explained else focal_scatter(solution, needed_px)
     reasons = [*map(_of_place, moved), *optics, *misprinted, *(_of_focus(*each) for each in focus.items())]

@@ -67,9 +67,10 @@ def classify_rim(
         beyond = np.where(per_step > 0, inside / per_step, np.inf)
     classes = np.full(len(beyond), RimClass.FREE, np.uint8)
     gap = np.where(beyond <= LARGEST_GAP_STEPS, np.maximum(beyond, 0.0), 0.0)
-    hidden = np.any([np.isnan(inside_at(outer + by * (outer - inner))) for by in _HIDING_STEPS], axis=0)
+    step = outer - inner
+    hidden = np.any([np.isnan(inside_at(outer + by * step)) for by in _HIDING_STEPS], axis=0)
     # If the mesh ends far inside the object, or the outline bends, it is nearest elsewhere than where the edge points.
-    missed = np.abs(inside_at(outer + gap[:, None] * (outer - inner))) > LARGEST_MISS_PX
+    missed = np.abs(inside_at(outer + gap[:, None] * step)) > LARGEST_MISS_PX
     goes_on = ~(beyond <= LARGEST_GAP_STEPS) | (missed & (gap > 0))
     classes[goes_on] = np.where(hidden, RimClass.OCCLUDED, RimClass.CONTACT)[goes_on]
     classes[end_cosine < MIN_COSINE] = RimClass.SILHOUETTE

@@ -5,7 +5,6 @@ between the pixels on the object and those beside it. Which stretches of the rim
 image (`rim_classes`).
 """
 
-from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
@@ -187,7 +186,7 @@ class RimOutline:
         known = ~np.isnan(away)
         pixel_m = np.linalg.norm(points - self._camera.center, axis=1) / self._camera.fx
         covered = np.flatnonzero(self.classes == RimClass.OCCLUDED)
-        beyond = self._beyond_by(surface, covered, (LARGEST_GAP_STEPS,))
+        beyond = self._beyond_gap(surface, covered)
         return RimFit(
             visible=int(np.count_nonzero(known)),
             outside=int(np.count_nonzero(away < -self._far)),
@@ -210,11 +209,11 @@ class RimOutline:
         moved = motion(np.clip(away[known], -self._bound, self._bound), directions, places[known])
         return max(displacement(off_m[known], directions), moved * float(np.mean(pixel_m)))
 
-    def _beyond_by(self, surface: Surface, which: NDArray[np.intp], steps: Sequence[float]) -> NDArray[np.float64]:
-        """Distances inside the outline (steps, m) some steps beyond outer vertices (m,), see `_inside_at`."""
+    def _beyond_gap(self, surface: Surface, which: NDArray[np.intp]) -> NDArray[np.float64]:
+        """Distances inside the outline (m,) the largest gap beyond outer vertices (m,), see `_inside_at`."""
         vertices = surface.vertices[0].T.astype(np.float64)
         outer, inner = vertices[self._rim.outer[which]], vertices[self._rim.inner[which]]
-        return np.stack([self._inside_at(outer + by * (outer - inner)) for by in steps])
+        return self._inside_at(outer + LARGEST_GAP_STEPS * (outer - inner))
 
     def _inside_at(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Distance inside the outline (k,) of points (k, 3) [px]: −∞ far outside, NaN if unknown."""
