@@ -80,6 +80,7 @@ class PointLinearization:
         points: index (m,) of the point.
         sparse_jacobian: derivative of the points with respect to theta.
         positions: of all points (n, 3) [m].
+        shared: derivatives (m, s) with respect to errors that the residuals share, times those errors' deviations.
     """
 
     residual: NDArray[np.float64]
@@ -87,6 +88,7 @@ class PointLinearization:
     points: NDArray[np.int64]
     sparse_jacobian: SparseJacobian
     positions: NDArray[np.floating]
+    shared: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
 
     @property
     def jacobian(self) -> NDArray[np.float64]:
@@ -126,7 +128,9 @@ class PointLinearization:
         apply_chain_rule(
             self.residual, self.rows, self.points, *of_points, start[:-1].copy(), residual, jacobian, points
         )
-        return [GroupedLinearization(residual, jacobian, sparse_jacobian.parameters, start, self.positions[points])]
+        shared = self.transposed_times(self.shared, sparse_jacobian.dimension).T
+        positions = self.positions[points]
+        return [GroupedLinearization(residual, jacobian, sparse_jacobian.parameters, start, positions, shared)]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

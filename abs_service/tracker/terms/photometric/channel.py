@@ -23,6 +23,7 @@ from abs_service.tracker.terms.photometric.channel_cost import (
     fill,
 )
 from abs_service.tracker.terms.photometric.illumination import Illumination
+from abs_service.tracker.terms.photometric.registration_bias import RegistrationBias
 from abs_service.tracker.terms.photometric.shadow import Shadow
 from abs_service.tracker.terms.photometric.texture_registration_noise import (
     NO_REGISTRATION_NOISE,
@@ -60,6 +61,7 @@ class ChannelTerm:
         self._view = synthesizer.view(sensor, appearance)
         self._illumination = illumination
         self._shadow = Shadow(self._view.camera)
+        self._bias = RegistrationBias(self._view.camera)
         self._noise = noise
         self._bounds = bounds
         self._registration_noise = registration_noise
@@ -84,6 +86,8 @@ class ChannelTerm:
         copy(self._image, *limits(window, self._image.shape), texture)
         self._texture = texture.reshape(-1, 4)
         self._view.look(predicted)
+        if not self._is_mosaic:
+            self._bias.observe(self._image[..., VALUE, None], self._view.spread(predicted, predicted.vertices[0].T))
         seen = self._view.synthesize(predicted)
         self._illumination.adapt(self._by_channel(seen), seen.attributes[0].T)
         self._widening = NO_WIDENING
@@ -132,8 +136,9 @@ class ChannelTerm:
         deviation = np.minimum(deviation, np.median(np.abs(residual)) / NORMAL_MEDIAN)
         noise = deviation**2 @ np.einsum("mi,mij->m", gains[use], projection[use] ** 2)
         rows = shortened(rows, float(noise))
-        samples = self._view.follow(surface, sparse_jacobian)
-        return PointLinearization(residual[use], rows, np.flatnonzero(use), samples, vertices)
+        samples, points = self._view.follow(surface, sparse_jacobian), np.flatnonzero(use)
+        bias = self._bias.derivatives(vertices, rows, points)
+        return PointLinearization(residual[use], rows, points, samples, vertices, bias)
 
     def fit(self, surface: Surface) -> SensorFit:
         """Agreement of the sensor with a population of one."""

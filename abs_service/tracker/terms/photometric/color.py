@@ -11,6 +11,7 @@ from abs_service.tracker.terms.base import Bounds, SensorFit, facing, summarize
 from abs_service.tracker.terms.gradients import noiseless_color_rows
 from abs_service.tracker.terms.linearization import PointLinearization
 from abs_service.tracker.terms.photometric.illumination import Exposed
+from abs_service.tracker.terms.photometric.registration_bias import RegistrationBias
 from abs_service.tracker.terms.photometric.shadow import Shadow
 from abs_service.tracker.terms.photometric.texture_registration_noise import (
     NO_REGISTRATION_NOISE,
@@ -42,6 +43,7 @@ class ColorTerm:
         self._synthesizer = synthesizer
         self._view = synthesizer.view(sensor, colors)
         self._shadow = Shadow(self._view.camera)
+        self._bias = RegistrationBias(self._view.camera)
         self._bounds = bounds
         self._sigma = np.array([[noise.sigma]], np.float32)
         self._constant = bounds.inlier + 3 * (np.log(noise.sigma) + LOG_SQRT_2PI)
@@ -64,6 +66,7 @@ class ColorTerm:
         self._bordered.inside[:] = self._image[window]
         self._texture = texture.reshape(-1, 3)
         self._view.look(predicted)
+        self._bias.observe(self._image, self._view.spread(predicted, predicted.vertices[0].T))
         seen = self._view.synthesize(predicted)
         self._illumination.adapt(self._texture[seen.pixel[0]], seen.attributes[0].T)
         widening = self._registration_noise.widening(self._view, predicted, self._sigma)
@@ -121,10 +124,11 @@ class ColorTerm:
         use = measured & (self._normalizer + 0.5 * np.sum(residual**2, axis=1) < self._bounds.outlier)
         vertices = self._view.spread(surface, surface.vertices[0].T)
         inverse = np.broadcast_to(self._inverse, residual.shape)[use]
-        rows = noiseless_color_rows(self._image, self._view.camera, vertices[use], inverse)
+        rows = noiseless_color_rows(self._image, self._view.camera, vertices[use], inverse).reshape(-1, 3)
         points = np.repeat(np.flatnonzero(use), residual.shape[1])
         samples = self._view.follow(surface, sparse_jacobian)
-        return PointLinearization(residual[use].ravel(), rows.reshape(-1, 3), points, samples, vertices)
+        bias = self._bias.derivatives(vertices, rows, points)
+        return PointLinearization(residual[use].ravel(), rows, points, samples, vertices, bias)
 
     def fit(self, surface: Surface) -> SensorFit:
         """Agreement of the sensor with a population of one."""

@@ -71,13 +71,16 @@ def test_the_chain_rule_is_a_product_of_matrices(seed, count):
     points, rows = generator.integers(0, 9, count), generator.standard_normal((count, 3))
     expected = np.einsum("mi,mid->md", rows, sparse_jacobian.dense[points])
     positions = generator.standard_normal((9, 3))
-    linear = PointLinearization(generator.standard_normal(count), rows, points, sparse_jacobian, positions)
+    shared = generator.standard_normal((count, 2))
+    linear = PointLinearization(generator.standard_normal(count), rows, points, sparse_jacobian, positions, shared)
     np.testing.assert_allclose(linear.jacobian, expected, rtol=0, atol=1e-12)
     parts, order = stack(linear.parts(), 7), np.argsort(group[points], kind="stable")
     np.testing.assert_array_equal(parts.residual, linear.residual[order])
     np.testing.assert_allclose(parts.jacobian, expected[order], rtol=0, atol=1e-12)
     placed = np.concatenate([np.zeros((0, 3)), *(part.positions for part in linear.parts())])
     np.testing.assert_array_equal(placed, positions[points][order])
+    (part,) = linear.parts()
+    np.testing.assert_allclose(part.shared, shared.T @ expected, rtol=0, atol=1e-12)
 
 
 def test_grazing_views_do_not_explode():
