@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.synthesis.perspective import project_with_jacobian
+from abs_service.tracker.terms.image_noise import noise_deviation
 from calib.camera import Camera
 from calib.jit import kernel
 
@@ -21,12 +22,6 @@ _NOISE_GAIN = float(np.sum((_REGRESSION * _STEPS) ** 2))
 #: The noise's deviation is a median, so its share in the mean square of m rows is known to 2.5/√m. Two such deviations
 #: more are taken away.
 _NOISE_SCATTER = 5.0
-
-#: Median of the absolute value of a normal distribution, in standard deviations.
-NORMAL_MEDIAN = 0.6745
-
-#: Second difference; and the median of the sum of the products of two with noise of deviation 1, without its sign.
-_SECOND, _MEDIAN_LEFT = np.array([1.0, -2.0, 1.0]), 6 * NORMAL_MEDIAN
 
 #: Smallest cosine between line of sight and normal; at grazing views a row would grow without bound.
 MIN_COSINE = 0.2
@@ -108,22 +103,6 @@ def _image_rows(
     rows = np.empty((len(places), image.shape[2], 3))
     _color_rows(image, places, _REGRESSION, projection, rows)
     return rows
-
-
-def noise_deviation(image: NDArray[np.float32] | NDArray[np.uint8], places: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Standard deviation (channels,) of the noise of an image's pixels, from those around places (n, 2); 0 if unknown.
-
-    The difference of two Laplacians leaves noise, and little of a picture (J. Immerkær: Fast noise variance estimation.
-    Computer Vision and Image Understanding 64, 1996); here its median, which edges hardly change.
-    """
-    known = places[np.isfinite(places).all(axis=1)]  # a candidate may lie behind the camera, or far beside the image
-    middle = np.clip(np.floor(known + 0.5), 0, np.array(image.shape[1::-1]) - 1).astype(np.intp)
-    corner = middle[:, None] + np.arange(-1, 2)[:, None]
-    column, row = (np.clip(corner[..., axis], 0, image.shape[1 - axis] - 1) for axis in (0, 1))
-    patches = image[row[:, :, None], column[:, None]].astype(np.float64)
-    left = np.abs(np.einsum("i,j,nijc->nc", _SECOND, _SECOND, patches))
-    left = left[np.isfinite(left).all(axis=1)]
-    return np.median(left, axis=0) / _MEDIAN_LEFT if len(left) else np.zeros(image.shape[2])
 
 
 def channel_gradients(

@@ -11,7 +11,8 @@ from abs_service.tracker.synthesis.base import Synthesis, Synthesizer
 from abs_service.tracker.synthesis.perspective import project_with_jacobian
 from abs_service.tracker.synthesis.window import NOTHING_HAS, Bordered, corner
 from abs_service.tracker.terms.base import Bounds, SensorFit, facing, summarize
-from abs_service.tracker.terms.gradients import NORMAL_MEDIAN, channel_gradients, noise_deviation, shortened
+from abs_service.tracker.terms.gradients import channel_gradients, shortened
+from abs_service.tracker.terms.image_noise import NORMAL_MEDIAN, noise_deviation
 from abs_service.tracker.terms.linearization import PointLinearization
 from abs_service.tracker.terms.photometric.channel_cost import (
     CHANNEL,

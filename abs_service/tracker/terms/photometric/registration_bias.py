@@ -11,7 +11,7 @@ J. R. Braasch, M. A. Sutton, Optical Engineering 39, 2000). No residual shows it
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.terms.gradients import noise_deviation
+from abs_service.tracker.terms.image_noise import noise_deviation
 from calib.camera import Camera
 
 #: Deviation of the factor on f'': of ½ p (1 − p) at a place p between two pixels, and of ½ δ² at a distance δ from a

@@ -2,12 +2,15 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from abs_service.pairing.images import BAYER_ORDERS, ONE_CHANNEL, ChannelImage
 from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.objectives import likelihood
 from abs_service.tracker.synthesis.sparse import Sparse
-from abs_service.tracker.terms.gradients import channel_gradients, color_rows, noise_deviation, noiseless_color_rows
+from abs_service.tracker.terms.gradients import channel_gradients, color_rows, noiseless_color_rows
+from abs_service.tracker.terms.image_noise import NORMAL_MEDIAN, noise_deviation
 from abs_service.tracker.terms.photometric.channel import ChannelTerm
 from abs_service.tracker.terms.photometric.illumination import Passive
 from abs_service.tracker.terms.photometric.vertex_values import at_vertices
@@ -42,6 +45,23 @@ def length(image: np.ndarray, corrected: bool = True) -> float:
 def test_the_deviation_of_the_noise_is_found_on_a_ground_and_on_a_print(noise):
     for levels in (0.0, 40.0):
         np.testing.assert_allclose(noise_deviation(picture(levels, noise), PLACES), noise, rtol=0.25)
+
+
+@given(st.integers(0, 2**32 - 1), st.sampled_from([np.uint8, np.float32]), st.sampled_from([1, 3]))
+def test_the_kernel_is_the_median_of_differences_of_laplacians(seed, kind, channels):
+    generator = np.random.default_rng(seed)
+    image = generator.uniform(0, 255, (9, 12, channels)).astype(kind)
+    if kind == np.float32:
+        image[generator.random(image.shape[:2]) < 0.05] = np.nan
+    places = generator.uniform(-3, 15, (40, 2))
+    second = np.array([1.0, -2.0, 1.0])
+    middle = np.clip(np.floor(places + 0.5), 0, (11, 8)).astype(int)
+    columns, rows = (np.clip(middle[:, i, None] + np.arange(-1, 2), 0, (11, 8)[i]) for i in (0, 1))
+    patches = image[rows[:, :, None], columns[:, None]].astype(np.float64)
+    left = np.abs(np.einsum("i,j,nijc->nc", second, second, patches))
+    left = left[np.isfinite(left).all(axis=1)]
+    expected = np.median(left, axis=0) / (6 * NORMAL_MEDIAN) if len(left) else np.zeros(channels)
+    np.testing.assert_allclose(noise_deviation(image, places), expected, rtol=1e-12)
 
 
 def test_an_image_of_which_nothing_is_known_has_no_noise():
