@@ -27,6 +27,7 @@ _LEVELS = {
     DeviceState.STALLED: Level.WARNING,
     DeviceState.RECONNECTING: Level.ERROR,
     DeviceState.FAILED: Level.ERROR,
+    DeviceState.BROKEN: Level.ERROR,
 }
 
 
@@ -174,6 +175,8 @@ class DeviceSupervisor:
             if (state, reason) != shown:
                 shown = (state, reason)
                 self._report_state(state, reason)
+            if state == DeviceState.BROKEN:
+                raise FinalError(reason)
             if state == DeviceState.FAILED:
                 return reason
             if state == DeviceState.CLOSED:

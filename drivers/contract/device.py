@@ -39,7 +39,10 @@ __all__ = [
 
 
 class DeviceState(StrEnum):
-    """Life cycle state. Drivers report CLOSED, OPENING, STREAMING and FAILED; the device supervisor the others."""
+    """Life cycle state. The device supervisor alone reports STALLED and RECONNECTING.
+
+    After FAILED, opening the device again may help; after BROKEN, nothing does, as with a damaged recording.
+    """
 
     CLOSED = "closed"
     OPENING = "opening"
@@ -47,6 +50,12 @@ class DeviceState(StrEnum):
     STALLED = "stalled"
     RECONNECTING = "reconnecting"
     FAILED = "failed"
+    BROKEN = "broken"
+
+    @property
+    def is_over(self) -> bool:
+        """True if nothing is delivered until the next start."""
+        return self in (DeviceState.CLOSED, DeviceState.FAILED, DeviceState.BROKEN)
 
 
 @dataclass(frozen=True, slots=True)

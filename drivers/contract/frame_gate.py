@@ -13,9 +13,6 @@ from drivers.contract.clock import Stamp
 from drivers.contract.device import DeviceError, DeviceState, Sink, Truth
 from drivers.contract.frame import Frame
 
-#: States without delivery until the next start.
-_ENDED = frozenset({DeviceState.CLOSED, DeviceState.FAILED})
-
 
 class FrameGate:
     """Passes frames and states of one device to its sink. Thread-safe.
@@ -64,7 +61,7 @@ class FrameGate:
         with self._lock:
             if self._released:
                 raise DeviceError("the device was closed; it has to be opened anew")
-            if self._sink is not None and self._state not in _ENDED:
+            if self._sink is not None and not self._state.is_over:
                 return None
             self._sink = sink
             self._epoch += 1
@@ -75,7 +72,7 @@ class FrameGate:
     def end(self, reason: str) -> None:
         """Reports CLOSED, unless an end was reported already; nothing is delivered after it returns."""
         with self._lock:
-            if self._state not in _ENDED:
+            if not self._state.is_over:
                 self.report_state(DeviceState.CLOSED, reason)
             self._state = DeviceState.CLOSED
             self._sink = None

@@ -13,6 +13,9 @@ from drivers.contract.frame_gate import FrameGate
 from drivers.replay.contents import RecordingError
 from drivers.replay.recording import Recording
 
+#: A recording in which nothing comes for longer [s] is said to pause: it is waited for as it was recorded.
+PAUSE_S = 5.0
+
 #: Waits until the event is set or the timeout [s] has passed; returns True if it is set.
 Wait = Callable[[threading.Event, float], bool]
 
@@ -56,7 +59,7 @@ class ReplayDevice:
         self._clock = clock
         self._wait = wait
         self._delay_s = delay_s
-        self._gate = FrameGate(self.capabilities.streams, causes=["unpaired"])
+        self._gate = FrameGate(self.capabilities.streams, causes=["unpaired", "malformed"])
         self._next_epoch = 0
         self._thread = threading.Thread()
 
@@ -67,7 +70,7 @@ class ReplayDevice:
 
     @property
     def counters(self) -> Mapping[str, int]:
-        """`frames` delivered, and `unpaired` images or metadata in the file."""
+        """`frames` delivered; `malformed` frames and `unpaired` images or metadata in the file."""
         return self._gate.counters
 
     @property
@@ -103,7 +106,8 @@ class ReplayDevice:
             while self._play(stop) and self._loop:
                 pass
         except (RecordingError, OSError) as error:
-            self._gate.report_state(DeviceState.FAILED, str(error))
+            # Final: opened again, it would play from the beginning up to here, for ever.
+            self._gate.report_state(DeviceState.BROKEN, str(error))
             return
         if not stop.is_set():
             self._gate.end("the recording ended")
@@ -113,10 +117,13 @@ class ReplayDevice:
         start_ns = self._clock()
         epochs: dict[int, int] = {}
         first_ns: int | None = None
+        malformed = 0
         for item in self._recording.frames():
+            self._gate.drop("malformed", self._recording.malformed - malformed)
+            malformed = self._recording.malformed
             first_ns = item.t_host_ns if first_ns is None else first_ns
             t_host_ns = start_ns + round((item.t_host_ns - first_ns) / self._speed)
-            if self._wait(stop, max(t_host_ns - self._clock(), 0) * 1e-9):
+            if self._wait_for(t_host_ns, stop):
                 break
             if isinstance(item, Truth):
                 self._gate.deliver_truth(replace(item, t_host_ns=t_host_ns))
@@ -125,9 +132,22 @@ class ReplayDevice:
             times = {"t_host_ns": t_host_ns, "t_arrival_ns": self._clock(), "host_clock": ""}
             self._gate.deliver(replace(item, **times, epoch=epoch))
         else:
+            self._gate.drop("malformed", self._recording.malformed - malformed)
             self._gate.drop("unpaired", self._recording.unpaired)
         self._next_epoch += len(epochs)
         return not stop.is_set()
+
+    def _wait_for(self, t_host_ns: int, stop: threading.Event) -> bool:
+        """Waits until a host time; returns True if the replay is stopped. A long wait is said."""
+        left_s = max(t_host_ns - self._clock(), 0) * 1e-9
+        is_pause = left_s > PAUSE_S
+        if is_pause:
+            what = f"nothing was recorded for the next {left_s:.0f} s of the replay"
+            self._gate.warn("pause", f"{what}, which waits for them; `abs-service replay` without --speed does not")
+        is_stopped = self._wait(stop, left_s)
+        if is_pause:
+            self._gate.warn("pause", "")
+        return is_stopped
 
 
 def _streams(recording: Recording, speed: float) -> tuple[StreamInfo, ...]:

@@ -1,7 +1,9 @@
 """Offline reader of recordings: a deterministic sequence of frames and truths, without a clock or drops."""
 
+import logging
 import re
 from collections.abc import Collection, Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 
 from absmsg.v1.deformation_state_pb2 import DeformationState
@@ -21,6 +23,7 @@ from drivers.replay.messages import messages
 STATE_SCHEMA = DeformationState.DESCRIPTOR.full_name
 MODEL_SCHEMA = SensorModel.DESCRIPTOR.full_name
 
+_log = logging.getLogger(__name__)
 _IMAGE = re.compile(r"/(?P<sensor>[^/]+)/(?P<stream>[^/]+)/image")
 
 
@@ -43,6 +46,7 @@ class Recording:
         recalibrated: sensors of which another calibration follows within the file.
         config: the rig's configuration as TOML; "" if none was attached.
         unpaired: number of images and metadata messages without counterpart in the last pass of `frames`.
+        malformed: number of frames and truths that were left out in the last pass, since they cannot be decoded.
 
     Raises:
         RecordingError: missing file, not MCAP, or not a recording of abs-service.
@@ -57,7 +61,7 @@ class Recording:
         self.contents = contents
         self.wall_offset_ns = self._wall_offset()
         self.config = contents.attachments.get("rig.toml", b"").decode("utf-8", "replace")
-        self.unpaired = 0
+        self.unpaired = self.malformed = 0
         self.counts = _image_counts(path, contents)
         self.models = self._read_models()
         self.cameras = {sensor: self._camera(model) for sensor, model in self.models.items()}
@@ -66,19 +70,20 @@ class Recording:
     def frames(self, streams: Collection[tuple[str, str]] = ()) -> Iterator[Frame | Truth]:
         """Frames and truths in order of time; each is decoded when it is reached.
 
+        Malformed ones are left out and counted; a warning names the first.
+
         Args:
             streams: (sensor, stream) of the frames, others are not decoded; all if none is named.
 
         Raises:
-            RecordingError: a corrupt chunk, or a malformed frame or truth.
+            RecordingError: a corrupt chunk, or all frames are malformed.
         """
+        self.malformed, count, first = 0, 0, ""
         waiting: dict[tuple[str, int, int], tuple[str, bytes]] = {}
         wanted = {*encoded_image.SCHEMAS, codec.INFO_SCHEMA, codec.TRUTH_SCHEMA}
         for topic, message in messages(self.path, self.contents, wanted):
-            try:
-                if topic.schema == codec.TRUTH_SCHEMA:
-                    yield codec.decode_truth(message.data)
-                    continue
+            partner = None
+            if topic.schema != codec.TRUTH_SCHEMA:
                 stream = topic.name.rpartition("/")[0]
                 if streams and tuple(stream[1:].split("/")) not in streams:
                     continue
@@ -86,20 +91,25 @@ class Recording:
                 partner = waiting.pop(key, None)
                 if partner is None:
                     waiting[key] = topic.schema, message.data
-                elif topic.schema == codec.INFO_SCHEMA:
-                    yield codec.decode(encoded_image.decode(*partner), message.data)
-                else:
-                    yield codec.decode(encoded_image.decode(topic.schema, message.data), partner[1])
+                    continue
+            try:
+                item = _decoded((topic.schema, message.data), partner)
             except CodecError as error:
-                raise RecordingError(f"{self.path}: {topic.name} at {message.log_time} ns: {error}") from error
+                self.malformed += 1
+                if self.malformed == 1:
+                    first = f"{self.path}: {topic.name} at {message.log_time} ns: {error}"
+                    _log.warning("%s; it is left out, and so are others like it", first)
+                continue
+            count += 1
+            yield item
         self.unpaired = len(waiting)
+        if first and not count:
+            raise RecordingError(first)
 
     def _wall_offset(self) -> int:
         for _, message in messages(self.path, self.contents, {codec.INFO_SCHEMA}):
-            try:
+            with suppress(DecodeError):  # counted when frames are read
                 return message.log_time - FrameInfo.FromString(message.data).header.t_host_ns
-            except DecodeError as error:
-                raise RecordingError(f"{self.path}: a frame is described by no {codec.INFO_SCHEMA}: {error}") from error
         return 0
 
     def _read_models(self) -> dict[str, SensorModel]:
@@ -129,6 +139,14 @@ class Recording:
             return decode_camera(model)
         except CodecError as error:
             raise RecordingError(f"{self.path}: {error}") from error
+
+
+def _decoded(message: tuple[str, bytes], partner: tuple[str, bytes] | None) -> Frame | Truth:
+    """A truth, or the frame of an image and its description, in whatever order they come; by schema and content."""
+    if partner is None:
+        return codec.decode_truth(message[1])
+    image, info = (partner, message) if message[0] == codec.INFO_SCHEMA else (message, partner)
+    return codec.decode(encoded_image.decode(*image), info[1])
 
 
 def _image_counts(path: Path, contents: Contents) -> Mapping[tuple[str, str], int]:

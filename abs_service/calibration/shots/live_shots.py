@@ -113,7 +113,7 @@ class LiveShots:
 
     def _check_devices(self) -> None:
         for name, inbox in self._inboxes.items():
-            if inbox.state == DeviceState.FAILED:
+            if inbox.state in (DeviceState.FAILED, DeviceState.BROKEN):
                 raise ShotsError(f"device {name} failed: {inbox.reason}")
 
 

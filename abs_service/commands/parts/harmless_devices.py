@@ -94,7 +94,7 @@ class _Sink:
         pass
 
     def on_state(self, state: DeviceState, reason: str) -> None:
-        if state in (DeviceState.CLOSED, DeviceState.FAILED):
+        if state.is_over:
             self._arrived.put(None)
 
     def on_warning(self, condition: str, message: str) -> None:

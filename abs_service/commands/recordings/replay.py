@@ -77,6 +77,8 @@ def run(arguments: argparse.Namespace) -> int:
     output = sys.stderr if arguments.json else sys.stdout
     for name, tracker in trackers.items():
         print(*(f"{name}: {line}" for line in [*tracker.log.summary(), *_unused(tracker)]), sep="\n", file=output)
+    if recording.malformed:
+        print(f"{recording.malformed} frames cannot be decoded and were left out", file=output)
     if recording.unpaired:
         print(f"{recording.unpaired} images or descriptions without their counterpart", file=output)
     print(f"wrote {out}", file=output)

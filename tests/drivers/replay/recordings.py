@@ -10,6 +10,7 @@ from abs_service.capture import sensor_metadata
 from calib.camera import Camera
 from drivers.contract.device import Truth
 from drivers.contract.frame import Frame
+from drivers.encoding import codec
 from drivers.encoding.mcap_file import Compression, McapFile
 from drivers.replay.contents import scan
 from drivers.simulated.address import parse
@@ -50,6 +51,24 @@ def write(
         for item in items:
             write_item(file, item)
         file.finish() if finish else file.flush()
+    return path
+
+
+def write_malformed(path: Path, items: Iterable[Frame | Truth]) -> Path:
+    """Like `write`, with a colour image in its middle that is none."""
+    items = list(items)
+    with path.open("wb") as stream:
+        file = McapFile(stream)
+        for sensor, camera in CAMERAS.items():
+            write_model(file, sensor, camera)
+        for number, item in enumerate(items):
+            if number == len(items) // 2:
+                frame = next(one for one in items if isinstance(one, Frame) and one.sensor == "color")
+                info = codec.encode_info(frame, Header())
+                file.write("/color/color/image", codec.IMAGE_SCHEMA, b"\xff\xff", WALL_NS, 99)
+                file.write("/color/color/info", codec.INFO_SCHEMA, info, WALL_NS, 99)
+            write_item(file, item)
+        file.finish()
     return path
 
 

@@ -17,6 +17,7 @@ from tests.drivers.replay.recordings import (
     damage,
     recorded,
     write,
+    write_malformed,
 )
 
 BEGIN_NS = 77_000_000_000
@@ -36,7 +37,7 @@ def test_a_replay_has_real_time_pace_and_current_times(tmp_path: Path, speed: fl
         if isinstance(item, Frame):
             assert 0 <= item.t_arrival_ns - item.t_host_ns < 10
             assert item.epoch == 0
-    assert device.counters == {"frames": 18, "unpaired": 0}
+    assert device.counters == {"frames": 18, "unpaired": 0, "malformed": 0}
     assert sink.states[-1] == (DeviceState.CLOSED, "the recording ended")
     assert [(s.sensor, s.stream) for s in device.capabilities.streams] == [
         ("tof", "depth"),
@@ -76,15 +77,41 @@ def test_every_loop_and_every_start_is_a_new_epoch(tmp_path: Path) -> None:
     assert again.frames[0].epoch > epochs[-1]
 
 
-def test_a_replay_of_a_corrupt_file_fails_with_the_reason(tmp_path: Path) -> None:
+def test_a_replay_of_a_corrupt_file_ends_for_good_with_the_reason(tmp_path: Path) -> None:
     path = write(tmp_path / "a.mcap", recorded(20))
     device = open_device(f"replay://{path}?speed=100", ManualTime(BEGIN_NS).clock)
     damage(path)
     sink = RecordingSink()
     device.start(sink)
-    reason = sink.wait_for(DeviceState.FAILED)
+    reason = sink.wait_for(DeviceState.BROKEN)
     device.close()
+    assert "a.mcap: the chunk" in reason
     assert "is damaged" in reason
+    assert "`abs-service recover`" in reason
+
+
+def test_malformed_frames_are_counted_and_left_out_of_a_replay(tmp_path: Path) -> None:
+    time, sink = ManualTime(BEGIN_NS), RecordingSink()
+    recording = Recording(write_malformed(tmp_path / "a.mcap", recorded(2)))
+    device = ReplayDevice("", recording, 1.0, False, time.clock, time.wait)
+    device.start(sink)
+    sink.wait_for(DeviceState.CLOSED)
+    device.close()
+    assert device.counters == {"frames": 6, "unpaired": 0, "malformed": 1}
+
+
+def test_a_long_pause_of_a_recording_is_said_while_it_is_waited_for(tmp_path: Path) -> None:
+    late = [dataclasses.replace(item, t_host_ns=item.t_host_ns + 3600 * 10**9) for item in recorded(3)[8:]]
+    time, sink = ManualTime(BEGIN_NS), RecordingSink()
+    recording = Recording(write(tmp_path / "a.mcap", [*recorded(2), *late]))
+    device = ReplayDevice("", recording, 2.0, False, time.clock, time.wait)
+    device.start(sink)
+    sink.wait_for(DeviceState.CLOSED)
+    device.close()
+    (condition, message), *ends = sink.warnings
+    assert message.startswith("nothing was recorded for the next 1800 s of the replay")
+    assert ends == [(condition, "")]
+    assert sink.items[-1].t_host_ns - sink.items[0].t_host_ns >= 1800 * 10**9
 
 
 def test_a_relative_path_and_cameras(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

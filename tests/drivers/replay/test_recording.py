@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from absmsg.v1.common_pb2 import Header
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 from mcap.writer import MCAP0_MAGIC, IndexType, Writer
 
@@ -27,6 +26,7 @@ from tests.drivers.replay.recordings import (
     recorded,
     write,
     write_item,
+    write_malformed,
     write_model,
 )
 
@@ -127,23 +127,21 @@ def test_an_image_without_metadata_is_counted(tmp_path: Path) -> None:
     assert recording.unpaired == 1
 
 
+def test_a_malformed_frame_is_left_out_counted_and_named(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    items = recorded(2)
+    recording = Recording(write_malformed(tmp_path / "a.mcap", items))
+    assert_same(recording.frames(), items)
+    assert recording.malformed == 1
+    assert "a.mcap: /color/color/info at" in caplog.text
+    assert "2 bytes are no foxglove.RawImage" in caplog.text
+
+
 def test_frames_of_other_streams_are_not_decoded(tmp_path: Path) -> None:
     items = recorded(2)
-    path = tmp_path / "a.mcap"
-    with path.open("wb") as stream:
-        file = McapFile(stream)
-        for item in items:
-            write_item(file, item)
-        frame = next(item for item in items if isinstance(item, Frame) and item.sensor == "color")
-        info = codec.encode_info(frame, Header())
-        file.write("/color/color/image", codec.IMAGE_SCHEMA, b"\xff\xff", WALL_NS, 99)
-        file.write("/color/color/info", codec.INFO_SCHEMA, info, WALL_NS, 99)
-        file.finish()
-    recording = Recording(path)
-    with pytest.raises(RecordingError, match="/color/color"):
-        list(recording.frames())
+    recording = Recording(write_malformed(tmp_path / "a.mcap", items))
     depths = [item for item in items if not isinstance(item, Frame) or item.key == ("tof", "depth")]
     assert_same(recording.frames([("tof", "depth")]), depths)
+    assert recording.malformed == 0
 
 
 @pytest.mark.parametrize(

@@ -47,6 +47,13 @@ def test_the_exit_code_says_that_the_devices_have_ended(captured):
     assert captured(FakeDevice(start=ends), threading.Event()) == Exit.ENDED
 
 
+def test_what_is_damaged_is_not_opened_again(captured, capfd):
+    device = FakeDevice(start=lambda sink: sink.on_state(DeviceState.BROKEN, "any.mcap: a chunk is damaged"))
+    assert captured(device, threading.Event()) == Exit.USER
+    assert "any.mcap: a chunk is damaged" in capfd.readouterr().err
+    assert device.closed.is_set()
+
+
 def test_the_exit_code_says_that_it_was_told_to_end(captured):
     stop = threading.Event()
 
