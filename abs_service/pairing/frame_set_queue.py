@@ -103,8 +103,8 @@ class FrameSetQueue:
 
     @property
     def clock_doubt(self) -> str:
-        """See `CommonClock.doubt`."""
-        return self._common_clock.doubt
+        """See `CommonClock.doubt` and `Synchroniser.doubt`."""
+        return "; ".join(filter(None, (self._common_clock.doubt, self._synchroniser.doubt)))
 
     @property
     def last_error(self) -> str:

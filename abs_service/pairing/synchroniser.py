@@ -10,6 +10,8 @@ from drivers.contract.frame import Frame, FrameSet
 
 #: Queue length per stream.
 DEPTH = 32
+#: So many frames in a row with stamps in the future are no accident.
+FUTURE_IN_A_ROW = 15
 
 
 class Synchroniser:
@@ -22,7 +24,7 @@ class Synchroniser:
 
     Frames are compared by the middle of their exposures (`Frame.at_middle`), on one host's clock. When the reference
     stream changes it, as after a reboot of that host, all streams begin anew. A stream's size and encoding are those of
-    the first frame of its epoch.
+    the first frame of its epoch, until many in a row have others.
 
     Args:
         reference: stream whose frames give the sets their time.
@@ -48,6 +50,7 @@ class Synchroniser:
         self._host_clock: str | None = None
         self._seq = 0
         self._rejected: Counter[str] = Counter()
+        self._in_future: Counter[Key] = Counter()  # in a row
 
     @property
     def tolerance_ns(self) -> int:
@@ -64,6 +67,16 @@ class Synchroniser:
         """
         return dict(self._rejected)
 
+    @property
+    def doubt(self) -> str:
+        """Streams whose latest frames are all of the future, and what to do; "" if there are none."""
+        return "; ".join(
+            f"{sensor}/{stream}: its time stamps are ahead of the arrival of its frames, so that none is used; start "
+            "again what captures it"
+            for (sensor, stream), number in self._in_future.items()
+            if number >= FUTURE_IN_A_ROW
+        )
+
     def add(self, frame: Frame, error_ns: int = 0) -> list[FrameSet]:
         """Takes one frame and returns the sets that are decided now, in order of time.
 
@@ -77,7 +90,9 @@ class Synchroniser:
         if frame.t_host_ns > frame.t_arrival_ns + self._tolerance_ns:
             # If accepted, it would make every later frame of this stream stale.
             self._count(frame.key, "future")
+            self._in_future[frame.key] += 1
             return []
+        self._in_future[frame.key] = 0
         sets = self._follow_clock(frame)
         if frame.host_clock != self._host_clock:
             self._count(frame.key, "other_clock")

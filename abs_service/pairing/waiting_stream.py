@@ -10,7 +10,7 @@ Key = tuple[str, str]
 #: Sequence numbers remembered per stream, to detect duplicates.
 MEMORY = 256
 
-#: So many frames in a row that the latest one would exclude, by its epoch or by more than this time [ns], are right.
+#: So many frames in a row that an earlier one excludes, by epoch, form, or more than this time [ns], are right.
 FOREIGN, FOREIGN_NS = 30, 10_000_000_000
 
 _NEVER_NS = -(1 << 63)
@@ -42,10 +42,13 @@ class WaitingStream:
     def rejection_cause(self, frame: Frame) -> str:
         """Cause for which a frame is rejected; "" if it is accepted.
 
-        One frame of a wrong epoch or time must not stop its stream: after `FOREIGN` older ones, it begins anew.
+        One frame of a wrong epoch, size, encoding or time must not stop its stream: after `FOREIGN` others, it begins
+        anew.
         """
         cause = self._cause(frame)
-        is_foreign = cause == "old_epoch" or (cause == "stale" and self.passed_ns - frame.t_host_ns > FOREIGN_NS)
+        is_foreign = cause in ("old_epoch", "changed") or (
+            cause == "stale" and self.passed_ns - frame.t_host_ns > FOREIGN_NS
+        )
         self._foreign = self._foreign + 1 if is_foreign else 0
         if self._foreign <= FOREIGN:
             return cause

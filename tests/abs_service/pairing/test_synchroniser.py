@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from abs_service.pairing.synchroniser import DEPTH
+from abs_service.pairing.waiting_stream import FOREIGN
 from drivers.contract.frame import Reference
 from tests.abs_service.pairing.streams import AMPLITUDE, COLOR, MS, TOF, frame, synchroniser
 
@@ -121,6 +122,24 @@ def test_a_new_epoch_may_count_anew_and_have_another_size():
     (formed,) = sync.add(frame(COLOR, 133))
     assert formed.frames[TOF].data.shape == (4, 4)
     assert sync.counters == {}
+
+
+def test_a_stream_that_changes_within_its_epoch_is_used_again():
+    sync = synchroniser()
+    sets = sync.group(frame(TOF, 33 * k, size=(2, 3) if k < 5 else (4, 4)) for k in range(5 + 2 * FOREIGN))
+    assert [formed.frames[TOF].data.shape for formed in sets] == 5 * [(2, 3)] + FOREIGN * [(4, 4)]
+    assert sync.counters == {"tof/depth.changed": FOREIGN}
+
+
+def test_stamps_of_the_future_are_said_until_they_are_right():
+    sync = synchroniser()
+    said = []
+    for k in range(60):
+        sync.add(frame(COLOR, 33 * k, late_ms=-3_600_000 if 10 <= k < 30 else 0))
+        said.append(sync.doubt)
+    assert [bool(text) for text in said] == 24 * [False] + 6 * [True] + 30 * [False]
+    assert said[29].startswith("color/color: its time stamps are ahead of the arrival")
+    assert sync.counters["color/color.future"] == 20
 
 
 def elsewhere(key, t_s, host, *, epoch=0, received_s=0.0):
