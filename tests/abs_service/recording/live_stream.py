@@ -1,6 +1,7 @@
 """A stream of images on the bus, and its recordings."""
 
 import queue
+import signal
 import threading
 
 import numpy as np
@@ -29,6 +30,7 @@ class Stream:
         self._stop = threading.Event()
         self._bus = ZenohBus.open("demo", endpoint, Role.ROUTER)
         self.health = queue.SimpleQueue()
+        self._heard, self._ended = "", ""  # boot identities of the recorder that was heard last, and of one that ended
         self._bus.subscribe("health/record", lambda sample: self.health.put(Health.FromString(sample.payload)))
         self._thread = threading.Thread(target=self._run)
 
@@ -49,9 +51,19 @@ class Stream:
 
     def wait_for(self, condition):
         """The first health of the recorder that meets a condition."""
-        while not condition(health := self.health.get(timeout=20)):
-            pass
-        return health
+        while True:
+            health = self.health.get(timeout=20)
+            if health.header.boot_id == self._ended:
+                continue
+            self._heard = health.header.boot_id
+            if condition(health):
+                return health
+
+    def kill(self, recorder):
+        """Kills the recorder; what it said before and was not yet looked at is not taken for its successor's."""
+        recorder.send_signal(signal.SIGKILL)
+        recorder.wait()
+        self._ended = self._heard
 
     def _run(self):
         publisher = self._bus.publisher(TOPIC, codec.IMAGE_SCHEMA, IMAGES)

@@ -64,9 +64,8 @@ def test_a_killed_recorder_loses_a_second_at_most_and_the_next_one_recovers_the_
             recorder = launch("record", rig)
             stream.wait_for(is_recording)
             time.sleep(chance.uniform(0.0, 0.7))
-            recorder.send_signal(signal.SIGKILL)
-            recorder.wait()
             killed_s.append(time.time())
+            stream.kill(recorder)
         recorder = launch("record", rig)
         stream.wait_for(lambda health: health.counters["recovered"] == 1)
         recorder.send_signal(signal.SIGTERM)
@@ -165,8 +164,7 @@ def test_it_records_with_what_was_before_when_it_is_asked_and_goes_on_after_a_ki
         asked_s = time.time()
         assert launch("trigger", rig).wait(20) == 0
         stream.wait_for(is_recording)
-        recorder.send_signal(signal.SIGKILL)
-        recorder.wait()
+        stream.kill(recorder)
         recorder = launch("record", rig)
         stream.wait_for(lambda health: health.labels["trigger"] == "asked for" and is_recording(health))
         assert launch("trigger", rig, "--stop").wait(20) == 0
