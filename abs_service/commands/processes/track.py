@@ -9,9 +9,9 @@ Without CONFIG TRACKER it is the only tracker of the simulated demo rig.
 import argparse
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future, wait
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from functools import partial
 from queue import SimpleQueue
 
@@ -93,20 +93,18 @@ def _track(
     tracking = TrackingSession(rig, plan)
     act = partial(chosen_region.reinitialize, tracking, rig, plan, name)
     commands.answer_reinitialize(bus, name, headers, health, act)
-    clocks, measuring = _clocks(bus, headers, monitor.changed)
-    sets = _frame_sets(bus, settings, name, rig, clocks)
-    tracker_health = TrackerHealth(health, sets, time.monotonic_ns)
-    publisher, budget_ms = _publisher(bus, settings, name, rig, headers), settings.trackers[name].budget_ms
-    live = LiveTracker(tracking, sets, publisher, tracker_health, time.monotonic_ns, clocks, budget_ms)
-    while not (stop.is_set() or monitor.changed.is_set()):
-        live.process_next()
-        if health.due():
-            headers.clock.measure()
-            _report(tracker_health, bus, health)
-    tracker_health.report()
-    health.publish()
-    monitor.changed.set()
-    measuring.join()  # it uses the bus
+    with _measured_clocks(bus, headers) as clocks:
+        sets = _frame_sets(bus, settings, name, rig, clocks)
+        tracker_health = TrackerHealth(health, sets, time.monotonic_ns)
+        publisher, budget_ms = _publisher(bus, settings, name, rig, headers), settings.trackers[name].budget_ms
+        live = LiveTracker(tracking, sets, publisher, tracker_health, time.monotonic_ns, clocks, budget_ms)
+        while not (stop.is_set() or monitor.changed.is_set()):
+            live.process_next()
+            if health.due():
+                headers.clock.measure()
+                _report(tracker_health, bus, health)
+        tracker_health.report()
+        health.publish()
 
 
 def _begin(prepare: Callable[[], None]) -> Future[None]:
@@ -139,12 +137,17 @@ def _report(tracker_health: TrackerHealth, bus: CheckedBus, health: Health) -> N
     health.tick()
 
 
-def _clocks(bus: Bus, headers: HeaderFactory, stop: threading.Event) -> tuple[ClockOffsets, threading.Thread]:
-    """Offsets of other hosts' clocks, which a thread measures until `stop`."""
-    clocks = ClockOffsets(bus, time.monotonic_ns, headers.host_clock)
-    measuring = threading.Thread(target=clocks.measure_until, args=(stop,), name="clocks", daemon=True)
+@contextmanager
+def _measured_clocks(bus: Bus, headers: HeaderFactory) -> Iterator[ClockOffsets]:
+    """Offsets of other hosts' clocks, which a thread measures meanwhile."""
+    clocks, ended = ClockOffsets(bus, time.monotonic_ns, headers.host_clock), threading.Event()
+    measuring = threading.Thread(target=clocks.measure_until, args=(ended,), name="clocks", daemon=True)
     measuring.start()
-    return clocks, measuring
+    try:
+        yield clocks
+    finally:
+        ended.set()
+        measuring.join()  # it uses the bus
 
 
 def _frame_sets(bus: Bus, settings: config.ServiceConfig, name: str, rig: Rig, clocks: ClockOffsets) -> FrameSetQueue:
