@@ -19,6 +19,10 @@ _log = logging.getLogger(__name__)
 
 #: Backoff before a failed device is reopened: doubles with each consecutive failure, up to the longest [s].
 FIRST_BACKOFF_S, LONGEST_BACKOFF_S = 0.5, 10.0
+#: Longest wait for the end of a command, before another one or before the device is closed all the same [s].
+COMMAND_S = 1.0
+#: A driver that has not returned for longer hangs; some take long to open a device [s].
+HANG_S = 30.0
 
 _LEVELS = {
     DeviceState.CLOSED: Level.OK,
@@ -71,7 +75,8 @@ class DeviceSupervisor:
         self._health = health
         self._clock = clock
         self._device: Device | None = None  # while it streams
-        self._lock = threading.Lock()
+        self._lock = threading.Lock()  # of commands to the device
+        self._returned_ns = clock()  # when the driver was last seen to return
         self._stop = threading.Event()
         self._abandoned = False
         self._thread = threading.Thread(target=self._run, name=f"device {name}", daemon=True)
@@ -91,19 +96,33 @@ class DeviceSupervisor:
         self._abandoned = self._thread.is_alive()
 
     def use(self, act: Callable[[Device], _T]) -> _T:
-        """Calls `act` with the device, which is not closed meanwhile, and returns its result.
+        """Calls `act` with the device and returns its result; the device is not closed for a second meanwhile.
 
         Raises:
-            DeviceError: the device is not open, or whatever `act` raises.
+            DeviceError: the device is not open, hangs in a command before this one, or whatever `act` raises.
         """
-        with self._lock:
-            if self._device is None:
+        lock = self._lock
+        if not lock.acquire(timeout=COMMAND_S):
+            raise DeviceError(f"{self._name} has not returned from the command before this one")
+        try:
+            if self._device is None or lock is not self._lock:
                 raise DeviceError(f"{self._name} is not open at present")
             return act(self._device)
+        finally:
+            lock.release()
+
+    def check(self) -> None:
+        """Reports a driver that hangs: only a new process helps, which would interrupt other devices, too."""
+        silent_s = (self._clock() - self._returned_ns) * 1e-9
+        hangs = silent_s > HANG_S and not (self.finished or self.fatal_error)
+        remedy = f"its driver has not returned for {silent_s:.0f} s; end `capture`, which `run` starts again"
+        message = f"{self._name}: {remedy}" if hangs else ""
+        self._health.report(f"driver of {self._name}", Level.ERROR if hangs else Level.OK, message)
 
     def _run(self) -> None:
         backoff_s = FIRST_BACKOFF_S
         while not self._stop.is_set():
+            self._returned_ns = self._clock()
             try:
                 delivered, reason = self._run_once()
             except FinalError as error:
@@ -149,13 +168,22 @@ class DeviceSupervisor:
             self._device = device
             reason = self._watch(device, stall_detector)
         finally:
-            with self._lock:
-                self._device = None
+            self._withdraw()
             device.close()
             self._previous.update(device.counters)
             self._previous.update(stall_detector.counters)
             self._health.count_up_to(self._previous, f"device.{self._name}.")
         return stall_detector.delivered, reason
+
+    def _withdraw(self) -> None:
+        """Takes the device from commands; one that hangs in it keeps its lock, and the next device gets another."""
+        lock = self._lock
+        is_free = lock.acquire(timeout=COMMAND_S)
+        self._device, self._lock = None, threading.Lock()
+        if is_free:
+            lock.release()
+        else:
+            _log.warning("device %s: a command has not returned; it is closed all the same", self._name)
 
     def _check_serial(self, device: Device) -> None:
         """Checks the serial number against that of the first opening."""
@@ -169,6 +197,7 @@ class DeviceSupervisor:
         shown = (DeviceState.OPENING, "")
         while not self._stop.wait(0.1):
             self._measure(device, stall_detector)
+            self._returned_ns = self._clock()
             state, reason = stall_detector.check()
             if state != shown[0]:
                 self._health.count(f"device.{self._name}.stalls", int(state == DeviceState.STALLED))

@@ -123,7 +123,7 @@ def _configure(metadata: MetadataPublisher, arguments: argparse.Namespace) -> No
 
 def _watch(stop: threading.Event, supervisors: list[DeviceSupervisor], *ticks: Callable[[], None]) -> None:
     while not stop.wait(0.1):
-        for tick in ticks:
+        for tick in (*ticks, *(supervisor.check for supervisor in supervisors)):
             tick()
         if any(supervisor.fatal_error for supervisor in supervisors) or all(
             supervisor.finished for supervisor in supervisors
