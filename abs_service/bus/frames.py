@@ -3,12 +3,8 @@
 import threading
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
-from contextlib import suppress
 from dataclasses import replace
 from typing import Self
-
-from absmsg.v1.frame_info_pb2 import FrameInfo
-from google.protobuf.message import DecodeError
 
 from abs_service.bus import keys
 from abs_service.bus.contract import EVENTS, IMAGES, Bus, Publisher, Sample
@@ -165,7 +161,5 @@ class FrameSubscriber:
         self._queue.close()
 
     def _receive(self, sample: Sample) -> None:
-        with suppress(DecodeError):  # reported when it is decoded
-            header = FrameInfo.FromString(sample.attachment).header
-            self._gaps.add(sample.topic, header.boot_id, header.seq)
+        self._gaps.add_image(sample)
         self._queue.put(sample.topic, (sample, self._clock()))

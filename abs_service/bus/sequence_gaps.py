@@ -2,7 +2,12 @@
 
 from collections import Counter
 from collections.abc import Mapping
+from contextlib import suppress
 
+from absmsg.v1.frame_info_pb2 import FrameInfo
+from google.protobuf.message import DecodeError
+
+from abs_service.bus.contract import Sample
 from drivers.encoding.message_check import LARGEST_GAP
 
 #: Publishers of a topic that are followed: those heard last. Two hosts with cameras both publish `health/capture`.
@@ -32,6 +37,13 @@ class SequenceGaps:
             return 0
         self._lost[topic] += gap
         return gap
+
+    def add_image(self, sample: Sample) -> int:
+        """As `add`, for an image, whose number is in its attachment; 0 for a malformed one."""
+        with suppress(DecodeError):
+            header = FrameInfo.FromString(sample.attachment).header
+            return self.add(sample.topic, header.boot_id, header.seq)
+        return 0
 
     def forget(self) -> None:
         """Takes the next message of each topic as the first."""

@@ -11,6 +11,7 @@ from abs_service.bus.contract import Bus, Sample
 from abs_service.bus.health import Health, Level
 from abs_service.bus.queues import BoundedQueue
 from abs_service.bus.stamps import WallClock
+from abs_service.recording.losses import Losses
 from abs_service.recording.recorder_settings import RecorderSettings
 from abs_service.recording.recording_file import free_path, open_for_writing
 from abs_service.recording.sample_writer import SampleWriter
@@ -83,7 +84,7 @@ class Recorder:
         self._stopping = threading.Event()
         self._failed = ""
         self._is_short_of_space = False
-        self._slow_drops = self._failure_drops = 0
+        self._losses = Losses(health)
         self._finished = (0, 0)
         self.failures = 0
         self.written = (0, 0)  # bytes to all recordings, and to all files of estimates
@@ -96,7 +97,7 @@ class Recorder:
 
     def start(self) -> None:
         """Subscribes and begins to write."""
-        self._subscription = self._bus.subscribe("**", self._pre_roll.put)
+        self._subscription = self._bus.subscribe("**", self._receive)
         # Only now, so that nothing falls between the answers and the subscription.
         self._writer.latch(self._bus.query("**", QUERY_S))
         self._thread.start()
@@ -116,16 +117,13 @@ class Recorder:
 
     def report(self) -> None:
         """Updates the counters and gauges of health; call it before `Health.tick`."""
-        self._health.count_up_to(self._queue.dropped, "dropped.")
         self._health.gauge("queue_bytes", self._queue.size)
         self._pre_roll.report(self._health)
-        lost = sum(self._queue.dropped.values())
-        if self._failed:
-            self._failure_drops = lost - self._slow_drops
-            return
-        self._slow_drops = lost - self._failure_drops
-        message = f"the disk is too slow: {self._slow_drops} messages dropped" if self._slow_drops else ""
-        self._health.report("queue", Level.WARNING if message else Level.OK, message)
+        self._losses.report(self._queue.dropped, bool(self._failed))
+
+    def _receive(self, sample: Sample) -> None:
+        self._losses.arrive(sample)
+        self._pre_roll.put(sample)
 
     def _run(self) -> None:
         while not self._queue.is_drained:

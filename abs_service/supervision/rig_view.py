@@ -28,7 +28,7 @@ class Stream:
 class Recording:
     """The recorder: file being written, its size, bytes written per second; files, recorded and dropped messages.
 
-    `forecast` says how long the disk lasts; "" in the first seconds.
+    Those that never came are among the dropped ones. `forecast` says how long the disk lasts; "" in the first seconds.
     """
 
     file: Path
@@ -98,7 +98,7 @@ class RigView:
             rate=self.live.received["record"].rate("file_bytes"),
             files=counters["files"],
             recorded=counters["recorded"],
-            dropped=sum(number for name, number in counters.items() if name.startswith("dropped.")),
+            dropped=sum(number for name, number in counters.items() if name.startswith(("dropped.", "lost."))),
             forecast=health.labels.get("forecast", ""),
         )
 

@@ -35,7 +35,7 @@ def _track(health: Health) -> list[str]:
 
 def _record(health: Health) -> list[str]:
     file = health.labels.get("file", "").removesuffix(".active")
-    dropped = sum(number for name, number in health.counters.items() if name.startswith("dropped."))
+    dropped = sum(number for name, number in health.counters.items() if name.startswith(("dropped.", "lost.")))
     return [
         file,
         size(health.gauges["file_bytes"]) if file and "file_bytes" in health.gauges else "",

@@ -166,6 +166,20 @@ def test_gaps_in_the_numbers_are_counted_by_topic(tmp_path):
     assert metadata(recordings(tmp_path)[0])[f"missing.{DEPTH}"] == "3"
 
 
+def test_images_that_never_came_are_said_once_and_counted(tmp_path):
+    rig = Rig(tmp_path)
+    rig.recorder.start()
+    said = []
+    for seqs in ((1, 2), (5, 7), (8,)):
+        for seq in seqs:
+            rig.publish_image(depth(seq))
+        rig.recorder.report()
+        said.append(rig.said)
+    rig.recorder.stop(5)
+    assert [one.message for one in said] == ["", "3 images were lost on their way to the recorder", ""]
+    assert said[-1].counters[f"lost.{DEPTH}"] == 3
+
+
 def test_a_topic_of_two_hosts_has_no_gap_where_they_alternate(tmp_path):
     rig = Rig(tmp_path)
     rig.recorder.start()

@@ -1,0 +1,48 @@
+"""Losses of a recorder, by cause: images that never came, and messages that its queue did not hold."""
+
+from collections.abc import Mapping
+
+from abs_service.bus import keys
+from abs_service.bus.contract import Sample
+from abs_service.bus.health import Health, Level
+from abs_service.bus.sequence_gaps import SequenceGaps
+
+
+class Losses:
+    """Counts and reports losses.
+
+    Args:
+        health: of the recorder.
+    """
+
+    def __init__(self, health: Health) -> None:
+        self._health = health
+        self._gaps = SequenceGaps()
+        self._lost = 0  # at the last report
+        self._slow_drops = self._failure_drops = 0
+
+    def arrive(self, sample: Sample) -> None:
+        """Takes each message in the order of arrival."""
+        if keys.is_image(sample.topic):
+            self._gaps.add_image(sample)
+
+    def report(self, dropped: Mapping[str, int], failed: bool) -> None:
+        """Reports what is new.
+
+        Args:
+            dropped: messages that the queue has dropped so far, by topic.
+            failed: whether recording has failed, which explains drops.
+        """
+        self._health.count_up_to(dropped, "dropped.")
+        self._health.count_up_to(self._gaps.lost, "lost.")
+        before, self._lost = self._lost, sum(self._gaps.lost.values())
+        new = self._lost - before
+        message = f"{new} images were lost on their way to the recorder" if new else ""
+        self._health.report("losses", Level.WARNING if new else Level.OK, message)
+        total = sum(dropped.values())
+        if failed:
+            self._failure_drops = total - self._slow_drops
+            return
+        self._slow_drops = total - self._failure_drops
+        message = f"the disk is too slow: {self._slow_drops} messages dropped" if self._slow_drops else ""
+        self._health.report("queue", Level.WARNING if message else Level.OK, message)
