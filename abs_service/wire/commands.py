@@ -1,6 +1,7 @@
 """Commands to the parts of a rig, their answers, and a line in health and log for each."""
 
 import logging
+from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -29,6 +30,9 @@ _SCHEMAS: Mapping[str, type[Command]] = {
     SET_CONTROLS: SetControls,
 }
 ANSWER = CommandAnswer.DESCRIPTOR.full_name
+
+#: Commands of a topic that the log tells within a period [ns]; their numbers show that there were more.
+LINES, LINES_NS = 10, 1_000_000_000
 
 #: Column and row of a pixel.
 Pixel = tuple[int, int]
@@ -177,8 +181,12 @@ def answer_valid(
     `act` gets the payload of those that are valid and returns what is particular of their answer, or raises
     RefusedError, or any other error, which is logged; `details` makes what the log says of them.
     """
+    told_ns: deque[int] = deque(LINES * [-LINES_NS], maxlen=LINES)
 
     def reply(command: Sample) -> bytes:
+        now_ns = headers.clock.monotonic()
+        if is_told := now_ns - told_ns[0] >= LINES_NS:
+            told_ns.append(now_ns)
         reason, sender = _refusal(command, message, headers.rig)
         answer, said = CommandAnswer(), ""
         if not reason:
@@ -189,10 +197,12 @@ def answer_valid(
                 reason = str(error)
             except Exception as error:  # a mistake of ours, which whoever asks has to know of, too
                 reason = f"{type(error).__name__}: {error}"
-                _log.exception("%s", topic)
+                if is_told:
+                    _log.exception("%s", topic)
         count = health.counted("commands.refused" if reason else "commands.accepted")
         line = printable(f"{topic}{said} from {sender}: {reason or 'accepted'}")
-        _log.warning("command %d: %s", count, line)
+        if is_told:  # a program that asks without end must not fill the disk
+            _log.warning("command %d: %s", count, line)
         health.label("command", line)
         answer.MergeFrom(CommandAnswer(header=headers.now(count), accepted=not reason, reason=printable(reason)))
         return answer.SerializeToString()

@@ -133,6 +133,15 @@ def test_a_mistake_of_ours_is_an_answer_and_a_traceback_of_the_log(caplog):
     assert "Traceback" in caplog.text
 
 
+def test_of_many_commands_the_log_tells_ten_a_second(caplog):
+    bench, now_ns = Bench(), 0
+    headers = HeaderFactory("demo", WallClock(monotonic=lambda: now_ns))
+    commands.answer_reinitialize(bench.bus, "other", headers, bench.health, bench.act)
+    for now_ns in range(0, 2_000_000_000, 20_000_000):  # noqa: B007 - the clock reads it
+        commands.reinitialize(bench.bus, "other", bench.headers, 1.0)
+    assert [record.args[0] for record in caplog.records] == [*range(1, 11), *range(51, 61)]
+
+
 def test_a_command_crosses_real_sessions(open_bus):
     open_bus()
     bench, asking = Bench(open_bus()), open_bus()
