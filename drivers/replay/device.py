@@ -114,15 +114,18 @@ class ReplayDevice:
 
     def _play(self, stop: threading.Event) -> bool:
         """Plays the file once; returns True unless stopped. Each recorded epoch becomes one epoch of the device."""
-        start_ns = self._clock()
+        latest_ns, host_clock = self._clock(), ""
         epochs: dict[int, int] = {}
-        first_ns: int | None = None
+        begins: dict[str, tuple[int, int]] = {}  # by host clock, which a reboot changes: the first time, and its own
         malformed = 0
         for item in self._recording.frames():
             self._gate.drop("malformed", self._recording.malformed - malformed)
             malformed = self._recording.malformed
-            first_ns = item.t_host_ns if first_ns is None else first_ns
-            t_host_ns = start_ns + round((item.t_host_ns - first_ns) / self._speed)
+            host_clock = item.host_clock if isinstance(item, Frame) else host_clock
+            unnamed = begins.pop("", (item.t_host_ns, latest_ns))  # of truths before the first frame
+            first_ns, begin_ns = begins.setdefault(host_clock, unnamed)
+            t_host_ns = begin_ns + round((item.t_host_ns - first_ns) / self._speed)
+            latest_ns = max(latest_ns, t_host_ns)
             if self._wait_for(t_host_ns, stop):
                 break
             if isinstance(item, Truth):

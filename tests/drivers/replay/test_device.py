@@ -4,9 +4,12 @@ import dataclasses
 from pathlib import Path
 
 import pytest
+from absmsg.v1.common_pb2 import Header
 
+from abs_service.capture import mcap_writing
 from drivers.contract.device import AddressError, DeviceState, Truth
 from drivers.contract.frame import Frame
+from drivers.encoding.mcap_file import McapFile
 from drivers.opening import open_device
 from drivers.replay import Recording, ReplayDevice
 from tests.drivers.manual_time import ManualTime
@@ -14,10 +17,12 @@ from tests.drivers.recording_sink import RecordingSink
 from tests.drivers.replay.recordings import (
     BOOT_NS,
     CAMERAS,
+    WALL_NS,
     damage,
     recorded,
     write,
     write_malformed,
+    write_model,
 )
 
 BEGIN_NS = 77_000_000_000
@@ -98,6 +103,27 @@ def test_malformed_frames_are_counted_and_left_out_of_a_replay(tmp_path: Path) -
     sink.wait_for(DeviceState.CLOSED)
     device.close()
     assert device.counters == {"frames": 6, "unpaired": 0, "malformed": 1}
+
+
+def test_a_recording_across_a_reboot_of_its_host_keeps_its_pace(tmp_path: Path) -> None:
+    frames = [item for item in recorded(6) if isinstance(item, Frame)]
+    with (tmp_path / "a.mcap").open("wb") as stream:
+        file = McapFile(stream)
+        for sensor, camera in CAMERAS.items():
+            write_model(file, sensor, camera)
+        for number, boot in enumerate(("first", "second")):
+            for item in frames:
+                wall_ns = WALL_NS + item.t_host_ns + number * 10**9
+                shifted = dataclasses.replace(item, t_host_ns=item.t_host_ns + (1 - number) * 10**15, epoch=number)
+                mcap_writing.write_frame(file, shifted, Header(rig="demo", seq=item.seq, host_clock=boot), wall_ns)
+        file.finish()
+    time, sink = ManualTime(BEGIN_NS), RecordingSink()
+    device = ReplayDevice("", Recording(tmp_path / "a.mcap"), 1.0, False, time.clock, time.wait)
+    device.start(sink)
+    sink.wait_for(DeviceState.CLOSED)
+    device.close()
+    once = [item.t_host_ns - BOOT_NS for item in frames]
+    assert [item.t_host_ns - BEGIN_NS for item in sink.items] == once + [once[-1] + t_ns for t_ns in once]
 
 
 def test_a_long_pause_of_a_recording_is_said_while_it_is_waited_for(tmp_path: Path) -> None:
