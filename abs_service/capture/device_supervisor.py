@@ -89,9 +89,13 @@ class DeviceSupervisor:
         """Begins."""
         self._thread.start()
 
+    def stop(self) -> None:
+        """Begins to close the device, and returns at once."""
+        self._stop.set()
+
     def close(self, timeout_s: float) -> None:
         """Stops and closes the device; a driver that does not return within `timeout_s` is abandoned."""
-        self._stop.set()
+        self.stop()
         self._thread.join(timeout_s)
         self._abandoned = self._thread.is_alive()
 

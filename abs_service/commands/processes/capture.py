@@ -65,8 +65,7 @@ def run(arguments: argparse.Namespace) -> int:
             supervisor.start()
         configure = partial(follow, arguments.reconfigured, partial(_configure, metadata, arguments))
         _watch(stop, supervisors, configure, lambda: tick(metadata, publishers, points, health, clock))
-        for supervisor in supervisors:
-            supervisor.close(CLOSE_S)
+        _close(supervisors)
         for publisher in (*publishers.values(), *points.values()):
             publisher.close()
         _count(publishers, points, health)
@@ -129,6 +128,15 @@ def _watch(stop: threading.Event, supervisors: list[DeviceSupervisor], *ticks: C
             supervisor.finished for supervisor in supervisors
         ):
             return
+
+
+def _close(supervisors: list[DeviceSupervisor]) -> None:
+    """Closes all devices at the same time: a camera may take most of it."""
+    for supervisor in supervisors:
+        supervisor.stop()
+    deadline_s = time.monotonic() + CLOSE_S
+    for supervisor in supervisors:
+        supervisor.close(max(0.0, deadline_s - time.monotonic()))
 
 
 def tick(

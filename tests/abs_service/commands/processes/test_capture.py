@@ -26,12 +26,13 @@ sensors.head.device = "cam"
 
 @pytest.fixture
 def captured(tmp_path, endpoint, monkeypatch):
-    """Runs it with a device, until `stop` or its end; returns the exit code."""
-    (tmp_path / "rig.toml").write_text(RIG)
+    """Runs it with devices, until `stop` or their end; returns the exit code."""
 
-    def captured(device, stop):
+    def captured(device, stop, *others, rig=RIG):
+        (tmp_path / "rig.toml").write_text(rig)
+        devices = iter([device, *others])
         monkeypatch.setattr(capture.rig_process, "stop_on_signals", lambda: stop)
-        monkeypatch.setattr(capture, "open_device", lambda *_: device)
+        monkeypatch.setattr(capture, "open_device", lambda *_: next(devices))
         monkeypatch.setattr(capture.gc_tuning, "freeze_loaded_objects", lambda: None)
         return cli.main(["capture", str(tmp_path / "rig.toml"), "--listen", endpoint])
 
@@ -63,6 +64,23 @@ def test_the_exit_code_says_that_it_was_told_to_end(captured):
         stop.set()
 
     assert captured(FakeDevice(start=works), stop) == Exit.OK
+
+
+def test_all_devices_are_closed_at_the_same_time(captured):
+    stop, started, together, closed = threading.Event(), [], threading.Barrier(2), []
+
+    def works(sink):
+        sink.on_state(DeviceState.STREAMING, "")
+        started.append(sink)
+        if len(started) == 2:
+            stop.set()
+
+    devices = FakeDevice(start=works), FakeDevice(start=works)
+    for device in devices:
+        device.close = lambda: closed.append(together.wait(0.9))
+    another = 'devices.other.uri = "replay://any.mcap"\nsensors.other.device = "other"\n'
+    assert captured(devices[0], stop, devices[1], rig=RIG + another) == Exit.OK
+    assert sorted(closed) == [0, 1]
 
 
 def test_controls_of_a_device_are_set_while_it_is_captured(captured, endpoint):
