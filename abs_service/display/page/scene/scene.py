@@ -28,6 +28,9 @@ POINT_SHARE = 0.1
 #: Where the eye of the first view is, seen from the middle of the mesh, in units of the mesh's extent.
 EYE = np.array([0.65, -0.6, -1.4])
 
+#: Intensity of the light from everywhere, and from a place above and behind the cameras [m]; π shows a colour as it is.
+AMBIENT, LAMP, LAMP_PLACE = 2.0, 1.3, (0.2, -0.6, -1.0)
+
 #: Vertical field of view [rad].
 FOV = 0.75
 
@@ -46,12 +49,14 @@ class Scene:
         self._gravity: dict[str, tuple[float, ...]] = {}  # direction and start of each arrow
         server.on_client_connect(self._aim)
         server.scene.set_up_direction("-y")
-        server.scene.configure_default_lights(enabled=True, cast_shadow=False)
+        _light(server.scene)
 
     def show_mesh(self, tracker: str, view: MeshView, colors: NDArray[np.uint8], stale: bool) -> None:
         """Shows a tracker's mesh with colours (n, 3). A file is loaded out of sight, and seen when the next comes."""
         data = glb(view.vertices, view.faces, np.full_like(colors, STALE) if stale else colors)
         if tracker not in self._meshes:
+            if not self._meshes:
+                self._keep_shader(view.vertices.mean(axis=0))
             self._first[tracker] = view.vertices
             for client in self._server.get_clients().values():
                 self._aim(client)
@@ -104,7 +109,7 @@ class Scene:
         self, sensor: str, points: NDArray[np.float32], spacing_m: float, stale: bool, visible: bool
     ) -> None:
         """Shows the points (n, 3) [m] of one depth sensor, whose neighbours are about `spacing_m` apart."""
-        colors = np.full(points.shape, STALE if stale else POINT, np.uint8)
+        color = STALE if stale else POINT
         shown = self._clouds.get(sensor)
         if shown is None:
             options = {
@@ -114,13 +119,15 @@ class Scene:
                 "point_shading": "flat",
             }
             add = self._server.scene.add_point_cloud
-            self._clouds[sensor] = add(f"/points/{sensor}", points, colors, visible=visible, **options)
+            self._clouds[sensor] = add(f"/points/{sensor}", points, color, visible=visible, **options)
             return
         with self._server.atomic():
             if shown.visible != visible:
                 shown.visible = visible
             if visible:
-                shown.points, shown.colors = points, colors
+                shown.points = points
+            if tuple(shown.colors.ravel()) != color:  # a browser compiles a shader for every colour that it is sent
+                shown.colors = np.array(color, np.uint8)
 
     def show_cameras(self, cameras: dict[str, Camera], visible: bool) -> None:
         """Shows the field of view of every sensor at its pose."""
@@ -136,6 +143,15 @@ class Scene:
             text = f"/cameras/{name}/name"
             self._server.scene.add_label(text, name, position=(0.0, -CAMERA_M, CAMERA_M), visible=visible)
 
+    def _keep_shader(self, middle: NDArray[np.float64]) -> None:
+        """Leaves an invisible mesh in the scene.
+
+        Each pose comes as a new mesh, and a browser compiles the shader again when it has dropped all that it drew.
+        """
+        self._server.scene.add_glb(
+            "/mesh", glb(np.tile(middle, (3, 1)), np.arange(3)[None], np.zeros((3, 3), np.uint8))
+        )
+
     def _aim(self, client: viser.ClientHandle) -> None:
         """Aims the view of a browser at the meshes, from behind the cameras; a narrow one from farther away."""
         if not self._first:
@@ -145,3 +161,15 @@ class Scene:
         camera = client.camera
         eye = middle + EYE * extent_m * max(1.0, 1.0 / camera.aspect)
         camera.position, camera.look_at, camera.fov = eye, middle, FOV
+
+
+def _light(scene: viser.SceneApi) -> None:
+    """Adds plain white light, which leaves the colours of the legend.
+
+    Mirrored surroundings, the server's default, took over half of the time in which a browser without a graphics card
+    draws.
+    """
+    scene.configure_environment_map(None)
+    scene.configure_default_lights(enabled=False)
+    scene.add_light_ambient("/light/everywhere", intensity=AMBIENT)
+    scene.add_light_directional("/light/lamp", intensity=LAMP, position=LAMP_PLACE)
