@@ -1,4 +1,4 @@
-"""Controls of devices on the page, without a browser, and a rig beside it."""
+"""Controls of devices on the page, without a rig."""
 
 from contextlib import redirect_stdout
 from functools import partial
@@ -20,8 +20,9 @@ from tests.abs_service.capture.fake_device import adjustable, working  # noqa: E
 class Bench:
     """The tab of a page, and the controls of its rig's devices."""
 
-    def __init__(self, gui, monkeypatch):
+    def __init__(self, server, monkeypatch):
         self.bus, self.headers, self.added = LoopbackBus(), HeaderFactory("demo", WallClock()), {}
+        self.url, gui = f"http://127.0.0.1:{server.get_port()}", server.gui
         for name in ("add_text", "add_checkbox", "add_dropdown", "add_markdown", "add_button"):
             monkeypatch.setattr(gui, name, partial(self.spy, getattr(gui, name)))
         self.gui, self.tab, self.monkeypatch = gui, gui.add_tab_group().add_tab("Devices"), monkeypatch
@@ -51,7 +52,7 @@ def bench(monkeypatch):
     """A page that nobody opens."""
     with redirect_stdout(StringIO()):
         server = viser.ViserServer("127.0.0.1", 0, verbose=False)
-        yield Bench(server.gui, monkeypatch)
+        yield Bench(server, monkeypatch)
         server.stop()
 
 
@@ -122,3 +123,17 @@ def test_a_device_that_has_other_controls_now_gets_new_inputs(bench):
     bench.capture("cam", adjustable())
     page.read()
     assert bench.added["exposure_s"] is not before
+
+
+@pytest.mark.slow
+@pytest.mark.realtime
+@pytest.mark.timeout(120)
+def test_a_change_on_the_page_in_a_browser_reaches_the_device(bench, browser):
+    controls, _ = bench.capture("cam", adjustable()), bench.page("cam")
+    page = browser.new_page()
+    page.goto(bench.url)
+    page.get_by_role("button", name="Read the controls").click()
+    page.locator("input:visible").first.fill("0.02")
+    page.get_by_role("button", name="Set", exact=True).click()
+    page.get_by_text("To keep this choice").wait_for()
+    assert controls.get("exposure_s") == 0.02
