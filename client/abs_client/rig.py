@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from types import TracebackType
 from typing import Self
 
-from absmsg.v1.command_pb2 import CommandAnswer, Record, Reinitialize
+from absmsg.v1.command_pb2 import CommandAnswer, Record, Reinitialize, SetControls
 from absmsg.v1.common_pb2 import Header
 from absmsg.v1.sensor_model_pb2 import SensorModel
 
@@ -20,6 +20,9 @@ from abs_client.tls import Tls
 
 #: Estimates that are older are left out [s].
 LARGEST_AGE_S = 0.5
+
+#: Fields of a control's value by its type.
+_FIELDS = {bool: "on", int: "whole", float: "number", str: "choice"}
 
 
 class RefusedError(ClientError):
@@ -134,6 +137,24 @@ class Rig:
         """Has the rig record, or wait; needs `record.when` in its file. Raises as `reinitialize`."""
         self._command("record", Record(header=self._header(), recording=recording))
 
+    def controls(
+        self, device: str, values: Mapping[str, bool | int | float | str] | None = None
+    ) -> dict[str, bool | int | float | str]:
+        """Sets controls of a device, such as exposure times, until `capture` starts again.
+
+        Args:
+            device: its name.
+            values: by control; None: nothing is set.
+
+        Returns:
+            All controls of the device, as they are then. Raises as `reinitialize`.
+        """
+        command = SetControls(header=self._header(), device=checked(device))
+        for name, value in (values or {}).items():
+            command.controls.add(name=name, **{_FIELDS[type(value)]: value})
+        answer = self._command(f"{device}/controls", command)
+        return {one.name: getattr(one, field) for one in answer.controls if (field := one.WhichOneof("value"))}
+
     def close(self) -> None:
         """Ends the connection and all streams on it; may be called again."""
         self._link.close()
@@ -149,7 +170,7 @@ class Rig:
     def _header(self) -> Header:
         return Header(rig=self._link.rig)
 
-    def _command(self, topic: str, command: Reinitialize | Record) -> CommandAnswer:
+    def _command(self, topic: str, command: Reinitialize | Record | SetControls) -> CommandAnswer:
         for one in self._link.query(topic, command.SerializeToString(), command.DESCRIPTOR.full_name):
             answer = decoded(CommandAnswer, one)
             if not answer.accepted:

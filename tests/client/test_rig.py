@@ -1,6 +1,7 @@
 """Images, calibrations and commands of a rig, by what its own processes publish and answer."""
 
 import threading
+from functools import partial
 
 import numpy as np
 import pytest
@@ -16,9 +17,11 @@ from abs_service.bus.contract import IMAGES
 from abs_service.bus.health import Health
 from abs_service.bus.session import Role
 from abs_service.bus.stamps import HeaderFactory, WallClock
-from abs_service.wire import commands
+from abs_service.capture.asked_controls import AskedControls
+from abs_service.wire import commands, control_commands
 from drivers.encoding import codec
 from drivers.simulated.address import parse
+from tests.abs_service.capture.fake_device import adjustable
 from tests.client.publishing import PERIOD_S
 from tests.conftest import encrypted
 from tests.waiting import repeating
@@ -112,6 +115,17 @@ def test_the_recorder_records_and_waits(bus, rig, headers):
     rig.record(True)
     rig.record(False)
     assert asked == [True, False]
+
+
+def test_controls_of_a_device_are_told_and_set(bus, rig, headers):
+    act = partial(AskedControls().set, device=adjustable())
+    control_commands.answer_controls(bus, "cam", headers, Health(bus, "capture", headers), act)
+    before = {"exposure_s": 0.01, "auto_exposure": True, "infrared_gain": 12, "sync_role": "free"}
+    assert rig.controls("cam") == before
+    changed = {"exposure_s": 0.02, "auto_exposure": False, "infrared_gain": 7, "sync_role": "master"}
+    assert rig.controls("cam", changed) == changed
+    with pytest.raises(RefusedError, match=r"exposure_s = 2\.0: must be a number from 0\.001 to 0\.033 s"):
+        rig.controls("cam", {"exposure_s": 2.0})
 
 
 def test_a_command_that_nobody_answers_is_told(rig):

@@ -64,6 +64,8 @@ def run(arguments: argparse.Namespace) -> int:
         file.write_text(rig_text.write(answers, str(file)), encoding="utf-8")
     except OSError as error:
         raise NewFileError(f"{file}: cannot be written: {error.strerror}") from None
+    if answers.device.note:
+        print(answers.device.note)
     print(f"wrote {file}; next:", *rig_text.commands(answers.device, str(file)), sep="\n  ")
     return Exit.OK
 

@@ -36,6 +36,8 @@ def device(path: Path) -> Device:
     colors = sorted((sensor, stream) for sensor, stream in recording.counts if stream in _COLORS)
     period_s = recording.duration_s / max(1, recording.counts[head, "depth"] - 1)
     shown = printable(shlex.quote(str(path)))
+    others = ", ".join(printable(other) for other in sorted(set(heads)) if other != head)
+    note = f"Depth images of {printable(head)}; the recording has those of {others} as well." if others else ""
     return Device(
         f"recording {printable(path.name)}",
         f"replay://{quote(str(path.resolve()))}",
@@ -44,7 +46,8 @@ def device(path: Path) -> Device:
         Color(colors[0][0], _COLORS[colors[0][1]]) if colors else None,
         round(500.0 * period_s, 1) or 17.0,
         min(2.0, max(0.5, round(recording.duration_s / 2, 1))),
-        address=f"The recording; `abs-service info {shown}` describes it.",
+        address="\n# ".join(filter(None, (f"The recording; `abs-service info {shown}` describes it.", note))),
+        note=note,
         commands=(
             "abs-service check {file} --picture first.png",
             f"abs-service replay {shown} --images --config " + "{file}",

@@ -27,6 +27,7 @@ class Device:
         motion_s: time within which an object shows itself by its motion [s].
         controls: table of controls.
         address: comment on the address.
+        note: for people, on what was chosen among several.
         commands: to use a rig file with, in this order; `{file}` is its path.
     """
 
@@ -39,6 +40,7 @@ class Device:
     motion_s: float = 2.0
     controls: str = ""
     address: str = "`abs-service devices` lists the addresses of the cameras that are attached."
+    note: str = ""
     commands: tuple[str, ...] = ("abs-service check {file}", "abs-service run {file}")
 
 

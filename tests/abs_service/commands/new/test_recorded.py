@@ -36,6 +36,15 @@ def test_sensors_noise_and_tolerance_follow_from_the_images(tmp_path, capsys):
     assert cli.main(["check", str(rig), "--replay", str(recording)]) == Exit.OK
 
 
+def test_of_several_depth_sensors_the_first_is_taken_and_the_others_are_told(tmp_path, capsys):
+    simulation, rig = parse("simulated://sheet?sensors=tof,structured_light&tof=32x24").build(), tmp_path / "rig.toml"
+    recording = write_take(tmp_path / "x.mcap", simulation, range(3), {"tof": "right", "structured_light": "left"})
+    assert cli.main(["new", str(rig), "--recording", str(recording), *ANSWERS]) == Exit.OK
+    note = "Depth images of left; the recording has those of right as well."
+    assert note in capsys.readouterr().out
+    assert f"describes it.\n# {note}\n[devices.camera]" in rig.read_text()
+
+
 def test_motion_is_looked_for_in_half_of_a_short_recording(tmp_path):
     rig, recording = tmp_path / "rig.toml", write_take(tmp_path / "x.mcap", SIMULATION, range(21), {"tof": "tof"})
     answers = ["--object", "body", "--behind", "things"]
