@@ -33,7 +33,7 @@ inside 'cd /src && docker/steps.sh requirements package libraries && { id abs-se
 echo "== sizes"
 du -shx --exclude=opt --exclude=src --exclude=var/cache --exclude=var/lib/abs-service "$root" | sed "s#$root#the base#"
 du -sh "$root/opt/abs-service" | sed "s#$root##"
-(cd "$root"/opt/abs-service/lib/python3*/site-packages && du -shc depthai* ifm3dpy* pyrealsense2* libusb_package* pyusb* usb av av.libs* rosbags* |
+(cd "$root"/opt/abs-service/lib/python3*/site-packages && du -shc depthai* genicam* harvesters* ifm3dpy* pyrealsense2* libusb_package* pyusb* usb av av.libs* rosbags* |
   sed 's/total/all of the SDKs and readers/')
 
 echo "== as abs-service, without root"
@@ -42,7 +42,7 @@ inside 'exec su abs-service -s /bin/bash -c "
   export PATH=/opt/abs-service/bin:\$PATH NUMBA_CACHE_DIR=/var/cache/abs-service MPLCONFIGDIR=/tmp
   cd /var/lib/abs-service
   id
-  python -c \"import av, depthai, ifm3dpy, libusb_package, prometheus_client, pyrealsense2, rosbags, trimesh, usb; print(\\\"every SDK is imported\\\")\"
+  python -c \"import av, depthai, harvesters.core, ifm3dpy, libusb_package, prometheus_client, pyrealsense2, rosbags, trimesh, usb; print(\\\"every SDK is imported\\\")\"
   abs-service devices || true
   abs-service run --duration 90 > run.log 2>&1 & service=\$!
   for second in {1..60}; do abs-service status > /dev/null 2>&1 && break; done

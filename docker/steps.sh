@@ -17,7 +17,7 @@ for step; do
       $pip --require-hashes --only-binary :all: -r /tmp/uv.txt
       $venv/bin/uv pip install --quiet --no-cache --python $venv/bin/python --only-binary :all: \
         --constraints constraints-all.txt --requirements pyproject.toml --group build \
-        --extra oak --extra kinect --extra realsense --extra ifm --extra import --extra mesh --extra metrics
+        --extra oak --extra kinect --extra realsense --extra ifm --extra genicam --extra import --extra mesh --extra metrics
       $venv/bin/uv pip uninstall --quiet --python $venv/bin/python uv
       ;;
     package)
