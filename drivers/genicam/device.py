@@ -8,6 +8,7 @@ from calib.camera import Camera
 from drivers.contract.capabilities import HOST_CLOCK, Capabilities, ClockInfo, StreamInfo
 from drivers.contract.clock import DeviceClock, Stamp, stream_gauges
 from drivers.contract.device import DeviceError, DeviceInfo, DeviceState, Sink
+from drivers.contract.frame import Frame, Kind
 from drivers.contract.frame_gate import FrameGate
 from drivers.genicam import controls, features, pixels
 from drivers.genicam.features import Distances
@@ -57,12 +58,8 @@ class GenicamDevice:
         self._clock = clock
         self._ticks = HOST_CLOCK if first.shot.time_ns is None else ClockInfo("genicam", 1e9)
         self._calib_id = first.camera.calib_id
-        streams = tuple(
-            StreamInfo(
-                *one.key, one.kind, one.encoding, one.data.shape[1], one.data.shape[0], first.rate_hz, self._ticks
-            )
-            for one in pixels.frames(first.shot, first.distances, self._calib_id, float("nan"))
-        )
+        frames = pixels.frames(first.shot, first.distances, self._calib_id, float("nan"))
+        streams = tuple(_info(frame, first.rate_hz, self._ticks) for frame in frames)
         self.capabilities = Capabilities(streams, self.controls.infos)
         self._gate = FrameGate(streams, causes=["missing", "undecodable"])
         self._lock = threading.Lock()
@@ -171,3 +168,9 @@ class _Run:
         self._latest = number
         self.seq += step
         return step - 1
+
+
+def _info(frame: Frame, rate_hz: float, clock: ClockInfo) -> StreamInfo:
+    height, width = frame.data.shape[:2]
+    noisy = frame.kind != Kind.CONFIDENCE  # which may have few values
+    return StreamInfo(*frame.key, frame.kind, frame.encoding, width, height, rate_hz, clock, noisy)

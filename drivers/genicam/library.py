@@ -1,5 +1,6 @@
 """Lazy import of harvesters, and the GenTL producers of this process."""
 
+import logging
 import os
 import threading
 from functools import cache
@@ -12,7 +13,7 @@ from drivers.contract.discovery import Availability, Found, choose
 #: Environment variable of the GenTL standard with the folders of producers; manufacturers' installers set it.
 VARIABLE = "GENICAM_GENTL64_PATH"
 #: GenTL's access status of a camera that can be opened: unknown, or read and write.
-_FREE = frozenset({0, 1})
+_FREE = frozenset({"", "0", "1"})
 _LINKS = {"GEV": "GigE Vision", "U3V": "USB3 Vision"}
 
 
@@ -26,6 +27,9 @@ def load() -> Any:
         from harvesters import core  # noqa: PLC0415  an extra
     except ImportError as error:
         raise SdkMissingError("harvesters", "genicam") from error
+    logging.getLogger(core.__name__).setLevel(
+        logging.CRITICAL
+    )  # what it says to the terminal is raised or counted, too
     return core
 
 
@@ -102,16 +106,16 @@ def files() -> list[str]:
 
 
 def _found(info: Any) -> Found:
-    serial = _text(info, "serial_number") or _text(info, "id_")
-    model = " ".join(filter(None, (_text(info, "vendor"), _text(info, "model")))) or "GenICam"
-    link = _text(info, "tl_type")
+    serial = _told(info, "serial_number") or _told(info, "id_")
+    model = " ".join(filter(None, (_told(info, "vendor"), _told(info, "model")))) or "GenICam"
+    link = _told(info, "tl_type")
     identity = DeviceInfo(f"genicam://{serial}", model, serial, link=_LINKS.get(link, link))
-    if info.access_status in _FREE:
+    if _told(info, "access_status") in _FREE:
         return Found(identity)
     return Found(identity, Availability.BUSY, "another program uses it", "close that one")
 
 
-def _text(info: Any, name: str) -> str:
+def _told(info: Any, name: str) -> str:
     try:
         return str(getattr(info, name) or "")
     except Exception:  # the producer's, for what it does not know

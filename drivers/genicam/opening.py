@@ -7,6 +7,7 @@ from urllib.parse import urlsplit
 
 from drivers.contract.device import DeviceError, DeviceInfo, SdkMissingError
 from drivers.contract.discovery import Availability, Found
+from drivers.contract.errors import translated_sdk_errors
 from drivers.genicam import features, library
 from drivers.genicam.address import Address, parse
 from drivers.genicam.device import First, GenicamDevice
@@ -45,7 +46,8 @@ def open_device(uri: str, clock: Callable[[], int]) -> GenicamDevice:
         raise DeviceError(
             f"{uri}: {library.VARIABLE} names no folder with a GenTL producer (*.cti); the camera's maker has one"
         )
-    acquirer, info = producers.open(address.serial, _SEARCH_S)
+    with translated_sdk_errors(uri, "another program may use the camera"):
+        acquirer, info = producers.open(address.serial, _SEARCH_S)
     link = CameraLink(core, acquirer, uri)
     try:
         return of_link(link, info, address, clock)

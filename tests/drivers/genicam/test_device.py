@@ -1,17 +1,21 @@
 """The committee's simulated producer through the real harvesters, addresses, and the message without a producer."""
 
 import time
+from contextlib import AbstractContextManager
 
 import numpy as np
 import pytest
 
-from drivers.contract.device import AddressError, DeviceError
-from drivers.contract.frame import Kind
+from drivers.contract.device import AddressError, DeviceError, DeviceInfo
+from drivers.contract.errors import translated_sdk_errors
+from drivers.contract.frame import Kind, Reference
 from drivers.genicam import library, opening
 from drivers.genicam.address import parse
 from drivers.genicam.device import _Run
+from drivers.genicam.link import Part, Shot
 from tests.drivers.conformance.bench import streaming
 from tests.drivers.conformance.benches.genicam import QUERY, viky
+from tests.drivers.genicam.node_map import BLAZE, node_map
 
 
 @pytest.mark.parametrize(
@@ -51,6 +55,51 @@ def test_the_ball_of_a_simulated_camera_has_a_height_where_it_has_a_colour(monke
     heights_m = [np.nanmax(frame.si()) for frame in sink.frames if frame.kind == Kind.DEPTH]
     assert 0.03 < heights_m[0] < 0.1
     assert len(set(heights_m)) == len(heights_m)  # it bounces, and later images have not overwritten earlier ones
+
+
+class Stamped:
+    """A link to a camera that stamps, and whose images are composed here; every third one gets lost."""
+
+    uri = "genicam://1"
+
+    def __init__(self) -> None:
+        self.nodes = node_map(BLAZE)
+        self._number = 0
+
+    def translated_errors(self) -> AbstractContextManager[None]:
+        return translated_sdk_errors(self.uri, "")
+
+    def start(self) -> None: ...
+
+    def stop(self) -> None: ...
+
+    def close(self) -> None: ...
+
+    def take(self) -> Shot:
+        self._number += 2 if self._number % 3 == 1 else 1
+        part = Part("Coord3D_C16", 4, 3, memoryview(np.full((3, 4), self._number, np.uint16).tobytes()))
+        return Shot(self._number, self.now_ns(), (part,))
+
+    def now_ns(self) -> int:
+        return self._number * 33_000_000
+
+
+def test_stamps_of_the_camera_are_mapped_and_its_exposure_is_told() -> None:
+    link = Stamped()
+    info = DeviceInfo(link.uri, "model", "1")
+    delay_ns = 5_000_000_000
+    device = opening.of_link(link, info, parse(link.uri), lambda: link.now_ns() + delay_ns)  # pyright: ignore[reportArgumentType]
+    assert device.capabilities.streams[0].clock.tick_hz == 1e9
+    assert device.cameras["depth"].fx == 510
+    with streaming(device) as sink:
+        assert sink.receives(4)
+    for frame in sink.frames:
+        assert frame.t_host_ns == pytest.approx(frame.t_device_ticks + delay_ns, abs=10e6)
+        assert (frame.t_reference, frame.exposure_s) == (Reference.START, pytest.approx(1e-3))
+        expected_m = 0.25e-3 * (frame.t_device_ticks // 33_000_000)
+        assert frame.si() == pytest.approx(expected_m, rel=1e-6) or expected_m == 7 * 0.25e-3  # 7 is no measurement
+    assert device.counters["missing"] > 0
+    assert "clock.depth/depth.drift_ppm" in device.gauges
 
 
 def test_numbers_of_16_bits_begin_anew_without_a_gap() -> None:
