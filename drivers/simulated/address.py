@@ -38,7 +38,7 @@ KEYS: Mapping[str, Callable[[str], Any]] = {
     "leave": values.interval(0, 3600),
     "stiffness": values.number(float, 0.0005, 10),
     "weight": values.number(float, 0.001, 2),
-    "texture": values.one_of("smooth", "fine"),
+    "texture": values.one_of("smooth", "fine", "paper"),
     "lens": values.numbers(len(COEFFICIENTS), -1, 1),
     "distance": values.number(float, 0.1, 10),
     "reflectivity": values.number(float, 0.01, 1),
@@ -110,7 +110,8 @@ class Address:
         board: pattern of the calibration board, one of `printed.TARGETS`.
         hold: duration of each of its poses [s].
         reach: lateral range of its poses; 1 is the field of view of the time-of-flight head.
-        texture: of a sheet: `smooth`, or `fine`, a print with details of 1 to 3 px in a colour head of 640x480.
+        texture: of a sheet: `smooth`; `fine`, a print with details of 1 to 3 px in a colour head of 640x480; `paper`,
+            white with dots in four inks.
         lens: distortion coefficients of all heads; `lens=-0.2,0.05` is k1 and k2 of a barrel distortion.
         lens_model: distortion model of `lens`: `brown_conrady`, or `fisheye` with up to four coefficients.
         order: filter pattern of the Bayer head, one of `ORDERS`.
@@ -156,14 +157,13 @@ class Address:
         Raises:
             AddressError: invalid lens, or its distortion is not invertible in the image.
         """
-        fine = self.texture == "fine"
         settings = SceneSettings(
             seed=self.seed,
             bend=math.radians(self.bend),
             speed=self.speed,
             excursion=Excursion(self.turn, self.leave),
             hand=self.occluder == "hand",
-            fine=fine,
+            texture=self.texture,
             stiffness=self.stiffness,
             weight=self.weight,
             distance=self.distance,
@@ -183,7 +183,7 @@ class Address:
             pattern=self.pattern,
             lens=self._lens(),
             mosaic=Mosaic(self.order, self.crosstalk),
-            samples=2 if fine or self.scene in SHARP else 1,
+            samples=2 if self.texture == "fine" or self.scene in SHARP else 1,
             blur_px=self.blur,
         )
         scene = SCENES[self.scene](settings)

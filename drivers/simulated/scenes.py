@@ -11,7 +11,7 @@ from drivers.simulated.scene.body import Surface
 from drivers.simulated.scene.excursion import Excursion
 from drivers.simulated.scene.motion import Motion
 from drivers.simulated.scene.scene import REST_Z, Scene
-from drivers.simulated.scene.texture import Texture, checkerboard, fine_pattern, smooth_pattern
+from drivers.simulated.scene.texture import Texture, checkerboard, fine_pattern, printed_paper, smooth_pattern
 from drivers.simulated.shapes.hand import Hand
 from drivers.simulated.shapes.printed import TARGETS, paper_size, print_texture
 from drivers.simulated.shapes.rectangle import Rectangle
@@ -31,7 +31,7 @@ class SceneSettings:
         speed: factor on the speed of all motion.
         excursion: displacement of the surfaces in addition to their motion.
         hand: True if a hand crosses the view.
-        fine: True for a print with details of the size of a colour camera's pixels.
+        texture: print of a sheet: `smooth`, `fine` or `paper`.
         stiffness: bending stiffness of the strip per width [N·m].
         weight: mass of the strip per area [kg/m²].
         distance, reflectivity, tilt: of the bare wall [m], [rad].
@@ -45,7 +45,7 @@ class SceneSettings:
     speed: float = 1.0
     excursion: Excursion = field(default_factory=Excursion)
     hand: bool = False
-    fine: bool = False
+    texture: str = "smooth"
     stiffness: float = 0.01
     weight: float = 0.3
     distance: float = 1.0
@@ -151,16 +151,20 @@ SCENES: Mapping[str, Callable[[SceneSettings], Scene]] = {
 
 def _scene(settings: SceneSettings, *surfaces: Surface) -> Scene:
     hands = (Hand(settings.seed, surfaces, settings.speed),) if settings.hand else ()
-    return Scene(surfaces, _wall(settings.seed), hands)
+    return Scene(surfaces, _wall(settings), hands)
 
 
 def _print(settings: SceneSettings, seed: int, width: float, height: float) -> Texture:
     color, infrared = (0.1, 0.95), (0.35, 0.9)
-    if settings.fine:
-        return fine_pattern(seed, width, height, color, infrared)
+    match settings.texture:
+        case "fine":
+            return fine_pattern(seed, width, height, color, infrared)
+        case "paper":
+            return printed_paper(seed, width, height)
     return smooth_pattern(seed, width, height, (0.025, 0.01, 0.004), 800.0, color, infrared)
 
 
-def _wall(seed: int) -> Texture:
+def _wall(settings: SceneSettings) -> Texture:
     """Wall texture with less contrast than the sheet, in places too dark for a time-of-flight return."""
-    return smooth_pattern(seed + 1, *_WALL, (0.2, 0.05), 100.0, color=(0.3, 0.6), infrared=(0.12, 0.7))
+    color = (0.44, 0.5) if settings.texture == "paper" else (0.3, 0.6)
+    return smooth_pattern(settings.seed + 1, *_WALL, (0.2, 0.05), 100.0, color=color, infrared=(0.12, 0.7))

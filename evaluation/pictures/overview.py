@@ -23,7 +23,7 @@ from drivers.simulated import address
 from drivers.simulated.simulation import Simulation
 
 #: The demo rig's world, as a depth and a colour camera of today see it.
-URI = "simulated://sheet?seed=1&tof=640x480&color=640x480"
+URI = "simulated://sheet?seed=1&tof=640x480&color=640x480&texture=paper"
 
 #: Exposure that is shown: the sheet is bent most in the first ten seconds.
 SHOWN = 121

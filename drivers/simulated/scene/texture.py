@@ -94,6 +94,32 @@ def fine_pattern(
     return Texture(np.ascontiguousarray(texels), density)
 
 
+#: Paper, and the inks of `printed_paper`: red, green, blue and infra-red reflectivity, in which most inks are bright.
+_PAPER = (0.88, 0.86, 0.81, 0.85)
+_INKS = ((0.12, 0.16, 0.30, 0.40), (0.72, 0.20, 0.16, 0.75), (0.10, 0.45, 0.42, 0.55), (0.90, 0.62, 0.15, 0.80))
+
+
+@lru_cache(maxsize=4)  # of 2 MB
+def printed_paper(seed: int, width: float, height: float, density: float = 1600.0) -> Texture:
+    """White paper with fibres, printed with dots of 6 to 22 mm in four inks, as wrapping paper or a cloth may be.
+
+    Args:
+        seed: random seed.
+        width, height: of the rectangle [m].
+        density: texels per metre.
+    """
+    shape = (round(height * density) + 1, round(width * density) + 1)
+    generator = np.random.default_rng([seed, 4])
+    fibres = gaussian_filter(generator.standard_normal(shape, np.float32), 0.0006 * density, mode="wrap")
+    texels = np.array(_PAPER, np.float32) * (1 + 0.04 * fibres / fibres.std())[..., None]
+    b, a = np.indices(shape) / density
+    for number in range(90):
+        (u, v), radius = generator.random(2) * (width, height), generator.uniform(0.003, 0.011)
+        texels[np.hypot(a - u, b - v) < radius] = _INKS[number % len(_INKS)]
+    blurred = gaussian_filter(texels, (0.001 * density, 0.001 * density, 0), mode="nearest")
+    return Texture(np.ascontiguousarray(blurred.clip(0.02, 1)), density)
+
+
 def checkerboard(width: float, height: float, square: float, density: float = 1600.0) -> Texture:
     """Checkerboard of squares of edge `square` [m] with reflectivities 0.25 and 0.85, blurred by 1 mm."""
     shape = (round(height * density) + 1, round(width * density) + 1)

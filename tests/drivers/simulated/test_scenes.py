@@ -26,6 +26,16 @@ def test_the_sheets_of_a_pair_stay_apart_and_in_view(seed: int, bend: int) -> No
             assert right[..., 0].max() < head.camera.width - 1
 
 
+def test_paper_is_white_with_dots_of_ink_before_a_grey_wall() -> None:
+    (frame,) = build("sheet", "texture=paper&sensors=color&noise=0&color=640x480").frames(0)
+    middle = frame.data[200:280, 230:350].reshape(-1, 3).astype(int)
+    white = (middle.min(axis=1) > 180).mean()
+    colored = (np.ptp(middle, axis=1) > 60).mean()
+    assert white > 0.5
+    assert 0.1 < colored < 0.4
+    assert np.ptp(frame.data[:100].astype(int), axis=-1).max() < 30
+
+
 def test_each_sheet_of_a_pair_has_its_own_motion_and_texture() -> None:
     simulation = build("pair", "sensors=color&noise=0&color=640x480")
     moved = [[truth.points_r for truth in simulation.truths(k)] for k in (0, 150)]
