@@ -1,18 +1,16 @@
 """One sentence on images of which none shows the board: their number, and the reasons by frequency."""
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import suppress
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from abs_service.calibration.shots.corner_extraction import BoardObservations
 from abs_service.calibration.shots.shots import Shot
 from calib.board.april_grid import AprilGrid
 from calib.board.corners import description, errors
-from calib.board.corners.search import find
+from calib.board.corners.search import chessboard_size, find
 from calib.board.corners.to_8bit import grey
-from calib.board.target import Charuco, Chessboard, Circles, Target
-from calib.board.target_checks import TargetError
+from calib.board.target import AsymmetricCircles, Charuco, Chessboard, Circles, Target
 
 _WORDS = {
     errors.NothingFoundError: "nothing found",
@@ -73,19 +71,13 @@ def _instead(target: Target, shown: Sequence[Shot]) -> str:
     for image, levels in images:
         if said := description.mismatch(target, levels):
             return f"{image} {said}"
-    for image, levels in images[-1:]:  # the search takes seconds
-        if similar := next((other for other in _similar(target) if len(find(other, levels)[0])), None):
-            return f"{image} shows a {_name(similar)}"
-    return ""
-
-
-def _similar(target: Target) -> Iterator[Target]:
-    """Boards that are easily described as this one: squares were counted, not their corners, or the other way round."""
-    if isinstance(target, Charuco):
-        yield Chessboard(target.columns - 1, target.rows - 1, target.square)
-    if isinstance(target, Circles):
-        yield replace(target, columns=target.rows, rows=target.columns)
-    if isinstance(target, Chessboard):
-        for dx, dy in ((-1, -1), (1, 1), (-1, 0), (0, -1), (1, 0), (0, 1)):
-            with suppress(TargetError):
-                yield replace(target, columns=target.columns + dx, rows=target.rows + dy)
+    for image, levels in images[-1:] if isinstance(target, Circles) else ():
+        if len(find(replace(target, columns=target.rows, rows=target.columns), levels)[0]):
+            return f"{image} shows a grid of {target.rows} × {target.columns} discs"
+    if isinstance(target, Circles | AsymmetricCircles):
+        return ""
+    # Of some images only a part of the board is found, so that two have to agree.
+    sizes = Counter(chessboard_size(levels) for _, levels in images)
+    ((columns, rows), count), *_ = sizes.most_common(1) or [((0, 0), 0)]
+    is_other = columns > 0 and not (isinstance(target, Chessboard) and {columns, rows} == {*target.grid})
+    return f"{count} images show a board of {columns} × {rows} inner corners" if count > 1 and is_other else ""

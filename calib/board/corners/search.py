@@ -26,6 +26,9 @@ _MAX_BLOBS = 3
 #: A board goes on beyond the border if its last point is nearer to it than this many distances between points.
 _CUT = 1.1
 
+#: A chessboard, for what depends on the kind of board alone.
+_ANY = Chessboard(4, 3, 0.01)
+
 _NOTHING: Found = (np.zeros(0, np.intp), np.zeros((0, 2)))
 
 
@@ -102,13 +105,29 @@ def _alternates(lattice: NDArray[np.float64], levels: Grey) -> bool:
     return bool((rises > 0).all() or (rises < 0).all())
 
 
+def chessboard_size(levels: Grey) -> tuple[int, int]:
+    """Numbers of inner corners of the chessboard in an image, the larger first; (0, 0) if there is none.
+
+    Some images show only a part of their board to this search.
+    """
+    longer, shorter = sorted(_part_of_chessboard(_scaled(levels, next(_scales(_ANY, levels)))).shape[:2], reverse=True)
+    return longer, shorter
+
+
+def _part_of_chessboard(levels: Grey) -> NDArray[np.float64]:
+    """Corners (n, m, 2) of a chessboard of any size, or of a part of it; (0, 0, 2) without one."""
+    flags = cv2.CALIB_CB_LARGER | cv2.CALIB_CB_NORMALIZE_IMAGE
+    found, corners, meta = cv2.findChessboardCornersSBWithMeta(levels, (3, 3), flags)
+    return np.asarray(corners, np.float64).reshape(*meta.shape, 2) if found else np.zeros((0, 0, 2))
+
+
 def is_cut_off(target: Target, levels: Grey) -> bool:
     """True if an image without a detection shows part of a board that continues beyond the border."""
     match target:
         case Chessboard():
-            flags = cv2.CALIB_CB_LARGER | cv2.CALIB_CB_NORMALIZE_IMAGE
-            found, corners, meta = cv2.findChessboardCornersSBWithMeta(levels, (3, 3), flags)
-            if not found or max(meta.shape) > max(target.grid) or min(meta.shape) > min(target.grid):
+            corners = _part_of_chessboard(levels)
+            columns, rows = corners.shape[:2]
+            if not corners.size or max(columns, rows) > max(target.grid) or min(columns, rows) > min(target.grid):
                 return False  # of another board there is nothing to say
             part = corners.reshape(-1, 2)
         case Charuco() | AprilGrid():

@@ -34,7 +34,20 @@ def test_a_board_that_is_in_no_image_is_said_with_what_is_there(said, data_set: 
     images = f"left={data_set('calib_opencv_stereo')}/left0[1-4].jpg"
     error = said(Chessboard(10, 7, 0.025), "--images", images)
     assert "no board of 10 × 7 inner corners in any of 4 images: nothing found in 3" in error
-    assert "shows a board of 9 × 6 inner corners: correct the description" in error
+    assert "2 images show a board of 9 × 6 inner corners: correct the description" in error
+
+
+@pytest.mark.parametrize(("hidden", "told"), [(1, False), (0, True)])
+def test_a_board_of_which_only_a_part_is_found_is_not_suggested(said, tmp_path: Path, hidden: int, told: bool) -> None:
+    board = Chessboard(9, 5, 0.025)
+    for number in range(2):
+        image = as_bytes(photograph(board, VGA, centered(board, (0.2, 0.1, 0.3 * number), 0.4)))
+        if number < hidden:
+            image = as_bytes(photograph(Chessboard(8, 4, 0.025), VGA, centered(board, (0.2, 0.1, 0.3), 0.4)))
+        cv2.imwrite(str(tmp_path / f"c_{number}.png"), image)
+    error = said(Chessboard(9, 6, 0.025), "--images", f"color={tmp_path}/c_*.png")
+    assert ("2 images show a board of 9 × 5 inner corners" in error) == told
+    assert told or "inner corners: correct" not in error
 
 
 PRINT = Charuco(7, 5, 0.03, 0.022, "5x5_50")
