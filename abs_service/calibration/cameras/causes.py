@@ -11,6 +11,7 @@ from calib.calibration_check.comparison import Comparison, Explanation
 from calib.calibration_check.hypotheses import TERMS, Kind
 from calib.calibration_check.mistakes import Mistake
 from calib.calibration_check.stored import Views
+from calib.solve.validation.board_shape import ShapeError
 from calib.solve.validation.contradictions import Contradiction
 
 #: Distance bias that is as good as any depth camera's, and that is unacceptable [m].
@@ -105,6 +106,12 @@ def of_material(size: float, found: Sequence[Mistake]) -> list[Verdict]:
         found: mistakes of which each would explain the images.
     """
     return [_of_size(size)] if size != 1 else [_of_mistakes(found)] if found else []
+
+
+def of_stretch(found: ShapeError) -> Verdict:
+    """Verdict on a board that is longer along one axis than described."""
+    text = f"{str(found)[0].upper()}{str(found)[1:].partition(':')[0]}. Nothing else can be said of the calibration."
+    return Verdict(Level.BAD, text, "Measure rows and columns with a ruler, and print the board without scaling.")
 
 
 def _of_mistakes(found: Sequence[Mistake]) -> Verdict:

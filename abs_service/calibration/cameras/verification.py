@@ -18,6 +18,7 @@ from calib.calibration_check.board_size import gross_size
 from calib.calibration_check.changes import PairChange, contradicting, pair_changes
 from calib.calibration_check.comparison import NOT_COMPARED, Comparison, compare
 from calib.calibration_check.hypotheses import TERMS, Kind
+from calib.calibration_check.misprint import misprint
 from calib.calibration_check.stored import Stored, Views, usable
 
 #: Expected reprojection error if the calibration does not contain its own [px].
@@ -90,7 +91,11 @@ def verify(known: RigCalibration, seen: BoardObservations, provenance: Provenanc
     ]
     sections += [tables.fields(known, found.fits), *tables.refusals(seen)]
     values = tables.values(found.fits, found.biases, found.changes, found.comparison)
-    return Report(title, provenance, tuple(verdicts(found)), tuple(sections), values)
+    said = verdicts(found)
+    # A good board and good cameras need no solve of their own.
+    if said[0].level > Level.GOOD and (stretch := misprint(stored, new_views.thinned(used), SPOILT_PX)):
+        said = [causes.of_stretch(stretch), *new_views.verdicts(stored, seen, used)]
+    return Report(title, provenance, tuple(said), tuple(sections), values)
 
 
 def verdicts(found: Verification) -> list[Verdict]:

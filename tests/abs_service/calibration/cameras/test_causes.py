@@ -34,6 +34,19 @@ def verified(
     return verification.verify(known, BoardObservations(tuple(seen.corners), tuple(seen.planes)), ORIGIN)
 
 
+def test_a_print_that_is_longer_along_one_axis_is_named_and_no_other_size_of_its_squares() -> None:
+    random = np.random.default_rng(4)
+    heads = {name: replace(three_heads()[name], depth_sigma=0.0) for name in ("light", "color")}
+    seen = look(heads, random_boards(12, random), random)
+    described = [replace(view, points_b=view.points_b / (1.01, 1, 1)) for view in seen.corners]
+    sensors = {name: rig_file.SensorCalibration(head.camera) for name, head in heads.items()}
+    known = rig_file.RigCalibration("lab", sensors, ORIGIN, "good")
+    (only,) = verification.verify(known, BoardObservations(tuple(described), tuple(seen.planes)), ORIGIN).verdicts
+    assert only.level == Level.BAD
+    assert only.text.startswith("The board's rows are ")
+    assert "% longer than described, compared with its columns" in only.text
+
+
 def aligned() -> dict[str, Head]:
     color = three_heads()["color"]
     return {"color": color, "depth": Head(color.camera, depth_sigma=0.004)}
