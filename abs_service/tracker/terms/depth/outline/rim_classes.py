@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.models.base import Surface
-from abs_service.tracker.terms.depth.outline.rim import Rim
+from abs_service.tracker.terms.depth.outline.rim import Rim, read
 from calib.camera import Camera
 
 #: The object continues beyond the outermost vertices by no more than so many times their distance from the next ones.
@@ -23,6 +23,16 @@ _HIDING_STEPS = (0.5, 1.0, 1.5, LARGEST_GAP_STEPS)
 #: wanders over a body as it turns, not the end of a sheet.
 MIN_COSINE = 0.25
 
+#: The surface ends before the outline if, most of the way to it, the measurement is so far off the extrapolated mesh at
+#: most of so many neighbouring edges: at the edge of a table top, its side goes on [m].
+LEAVES_M = 0.015
+_NEIGHBOURS = 7
+_ALMOST = 0.75
+
+#: Fewer free edges are not used: the status could not tell that they lie off the outline, as beside specks that relief
+#: and quantised distances make.
+LEAST_FREE = 8
+
 #: Vertices within so many pixels of the image's border may continue beyond it.
 BORDER_PX = 2.0
 
@@ -31,7 +41,7 @@ class RimClass(IntEnum):
     """Reason why the mesh ends at a vertex."""
 
     FREE = 0  # the object ends: beside it there is a background, or no return
-    CONTACT = 1  # measured surface goes on: another object, a mask cuts this one, or its mesh ends far inside it
+    CONTACT = 1  # measured surface goes on: another object or side, a mask cuts this one, or its mesh ends far inside
     SILHOUETTE = 2  # the surface turns away from the sensor
     OCCLUDED = 3  # an occluder lies before it, or the measurement has a hole
     BORDER = 4  # the image ends
@@ -44,6 +54,7 @@ def classify_rim(
     inside: NDArray[np.float64],
     gradients: NDArray[np.float64],
     inside_at: Callable[[NDArray[np.float64]], NDArray[np.float64]],
+    distance: NDArray[np.float32],
 ) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
     """`RimClass` (k,) of the outer vertices, and the gap (k,) between them and the end of the object.
 
@@ -57,6 +68,7 @@ def classify_rim(
         inside: distances (k,) of the outermost vertices inside the outline [px], huge where unknown.
         gradients: image gradients of these distances (k, 2).
         inside_at: distances (k,) of points (k, 3) inside it, −∞ far outside, NaN where unknown.
+        distance: measured radial distances (height, width) [m], NaN without return.
     """
     outer, inner = (surface.vertices[0].T[which].astype(np.float64) for which in (rim.outer, rim.inner))
     # Extrapolated to the end of the surface, which lies about as far outside the outer vertex as the inner one inside.
@@ -72,13 +84,33 @@ def classify_rim(
     # If the mesh ends far inside the object, or the outline bends, it is nearest elsewhere than where the edge points.
     missed = np.abs(inside_at(outer + gap[:, None] * step)) > LARGEST_MISS_PX
     goes_on = ~(beyond <= LARGEST_GAP_STEPS) | (missed & (gap > 0))
+    far = ~goes_on & (inside > LARGEST_MISS_PX) & (not rim.is_end)
+    goes_on[far] = _leaves(camera, (outer + _ALMOST * gap[:, None] * step)[far], distance)
     classes[goes_on] = np.where(hidden, RimClass.OCCLUDED, RimClass.CONTACT)[goes_on]
     classes[end_cosine < MIN_COSINE] = RimClass.SILHOUETTE
     classes[inside > camera.width + camera.height] = RimClass.OCCLUDED
     last = np.array([camera.width, camera.height]) - 1
     classes[~np.all((place >= BORDER_PX) & (place <= last - BORDER_PX), axis=1)] = RimClass.BORDER
+    free = classes == RimClass.FREE
+    if np.count_nonzero(free) < LEAST_FREE:
+        classes[free] = RimClass.CONTACT
     gap[(classes != RimClass.FREE) | rim.is_end] = 0.0
     return classes, gap.astype(np.float32)
+
+
+def _leaves(camera: Camera, points: NDArray[np.float64], distance: NDArray[np.float32]) -> NDArray[np.bool_]:
+    """True for points (k, 3) around most of which measured distances (height, width) are off theirs; unknown ones not.
+
+    The median of neighbours is not moved by the noise of the single edges, which extrapolation makes larger.
+    """
+    measured, last = np.empty(len(points)), np.array(distance.shape[::-1], np.float64) - 1
+    places = camera.project(points)
+    read(distance, np.zeros(2, np.float32), places, last, measured)
+    off = measured - np.linalg.norm(points - camera.center, axis=1)
+    known = np.isfinite(off)
+    apart = np.linalg.norm(places[:, None] - places[known], axis=2)
+    near = np.argsort(apart, axis=1, kind="stable")[:, :_NEIGHBOURS]
+    return np.abs(np.median(off[known][near], axis=1)) > LEAVES_M if known.any() else np.zeros(len(points), np.bool_)
 
 
 def _cosine(camera: Camera, surface: Surface, which: NDArray[np.intp]) -> NDArray[np.float64]:

@@ -147,7 +147,7 @@ class RimOutline:
         self._corner = np.add(corner(window), corner(part))[::-1].astype(np.float32)
         if not self._begun:
             _, values, gradients = self._locate(predicted)
-            measured = values, gradients, self._inside_at
+            measured = values, gradients, self._inside_at, distance
             self.classes, self._beyond = classify_rim(self._camera, self._rim, predicted, *measured)
             self._begun = True
         free = np.flatnonzero(self.classes == RimClass.FREE)

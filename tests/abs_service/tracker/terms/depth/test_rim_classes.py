@@ -12,7 +12,7 @@ from abs_service.tracker.terms.depth.outline.rim_classes import RimClass
 from abs_service.tracker.terms.depth.outline.rim_cost import FARTHEST
 from abs_service.tracker.terms.depth.outline.rim_motion import displacement
 from tests.abs_service.tracker.scenes import flat, sheet, sparse
-from tests.abs_service.tracker.terms.depth.outline_scene import CAMERA, MESH, look, moved, outline, picture
+from tests.abs_service.tracker.terms.depth.outline_scene import BESIDE_M, CAMERA, MESH, look, moved, outline, picture
 
 
 def classes(distance: np.ndarray, mesh: Mesh = MESH) -> dict[RimClass, int]:
@@ -55,6 +55,31 @@ def test_an_edge_beside_a_notch_of_a_larger_object_is_no_free_edge():
     assert np.all(found.classes[right & (np.abs(outer[:, 1] - 0.025) < 0.03)] == RimClass.CONTACT)
     here = found.fit(moved(coarse, 0.0))
     assert (here.outside, here.inside) == (0, 0)
+
+
+def test_a_few_free_edges_are_not_used():
+    """The object goes on beyond the mesh on all sides; before a notch, four edges would be free."""
+    larger = picture(Mesh(MESH.vertices * (1.8, 1.8, 1), MESH.faces, MESH.colors, MESH.chart))
+    assert classes(larger)[RimClass.FREE] == 0
+    larger[40:53, 90:] = BESIDE_M
+    assert classes(larger)[RimClass.FREE] == 0
+    larger[24:66, 90:] = BESIDE_M
+    assert classes(larger)[RimClass.FREE] >= 8
+
+
+@pytest.mark.parametrize(("slope", "expected"), [(0.0, RimClass.FREE), (1.0, RimClass.CONTACT)])
+def test_the_outline_of_a_side_is_not_that_of_the_top(slope: float, expected: RimClass):
+    """Right of the mesh, the object goes on for another 70 mm, as a flat sheet or as a side that recedes."""
+    coarse = sheet(5, 7, flat)
+    rays = CAMERA.unproject(np.ones((CAMERA.height, CAMERA.width)))
+    x, y = rays[..., 0] / rays[..., 2], rays[..., 1] / rays[..., 2]
+    z = (1 - 0.16 * slope) / (1 - slope * x)  # on the side, which begins at 0.16 m
+    goes_on = (x > 0) & (z * x < 0.22) & (np.abs(y * z) < 0.1)
+    found = outline(np.where(goes_on, np.maximum(z, 1.0) / rays[..., 2], picture(coarse)).astype(np.float32), coarse)
+    outer = coarse.vertices[Rim.of(coarse).outer]
+    middle = np.abs(outer[:, 1]) < 0.03
+    assert np.all(found.classes[(outer[:, 0] > 0.14) & middle] == expected)
+    assert np.all(found.classes[(outer[:, 0] < -0.14) & middle] == RimClass.FREE)
 
 
 @pytest.mark.parametrize("beyond", [0.002, 0.012, 0.025])
