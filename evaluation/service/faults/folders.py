@@ -52,7 +52,8 @@ def read_only(rig: RunningRig) -> Made:
 
 def deleted(rig: RunningRig) -> Made:
     """The open file is deleted; what it held is read through a descriptor that was open before."""
-    (active,) = rig.takes.glob("*.active")
+    # One that a killed recorder left may be there for a moment, until it is recovered.
+    active = max(rig.takes.glob("*.active"), key=lambda path: path.stat().st_mtime_ns)
     kept = rig.path.parent / "deleted"
     kept.mkdir(exist_ok=True)
     held = active.open("rb")
