@@ -105,9 +105,12 @@ class ReplayDevice:
         try:
             while self._play(stop) and self._loop:
                 pass
-        except (RecordingError, OSError) as error:
+        except RecordingError as error:
             # Final: opened again, it would play from the beginning up to here, for ever.
             self._gate.report_state(DeviceState.BROKEN, str(error))
+            return
+        except OSError as error:  # a disk that is taken away may come back
+            self._gate.report_state(DeviceState.FAILED, str(error))
             return
         if not stop.is_set():
             self._gate.end("the recording ended")

@@ -1,8 +1,10 @@
-"""Recordings as devices, with faults in the file."""
+"""Recordings as devices, with faults in the file, or of its disk."""
 
+import errno
+import os
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -12,6 +14,7 @@ import numpy as np
 from drivers.contract.device import Device, Truth
 from drivers.contract.frame import Frame
 from drivers.opening import open_device
+from drivers.replay import Recording, ReplayDevice
 from tests.drivers.conformance.bench import BEFORE, Fault
 from tests.drivers.replay import recordings
 
@@ -28,11 +31,10 @@ class ReplayBench:
         recordings.write(self.folder / "second.mcap", items, sensors=("tof",))
 
     def open(self, fault: Fault = Fault.NONE) -> Device:
-        loop = int(fault == Fault.NONE)
-        device = open_device(f"replay://{self._path(fault)}?loop={loop}", time.monotonic_ns)
+        uri = f"replay://{self._path(fault)}?loop={int(fault == Fault.NONE)}"
         if fault == Fault.UNPLUG:
-            recordings.damage(self._path(fault))
-        return device
+            return ReplayDevice(uri, _Unplugged(self._path(fault)), 1.0, False, time.monotonic_ns)
+        return open_device(uri, time.monotonic_ns)
 
     def open_second(self) -> Device:
         return open_device(f"replay://{self.folder}/second.mcap?loop=1", time.monotonic_ns)
@@ -41,6 +43,16 @@ class ReplayBench:
         # One name, by which a recording is known, in a folder for each fault.
         (self.folder / fault).mkdir(exist_ok=True)
         return self.folder / fault / "first.mcap"
+
+
+class _Unplugged(Recording):
+    """A recording on a disk that is taken away while it plays."""
+
+    def frames(self, streams: Collection[tuple[str, str]] = ()) -> Iterator[Frame | Truth]:
+        for count, item in enumerate(super().frames(streams)):
+            if count > 2 * BEFORE:
+                raise OSError(errno.EIO, os.strerror(errno.EIO), str(self.path))
+            yield item
 
 
 def _spoilt(item: Frame | Truth, fault: Fault) -> Frame | Truth:
