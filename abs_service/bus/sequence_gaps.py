@@ -38,12 +38,11 @@ class SequenceGaps:
         self._lost[topic] += gap
         return gap
 
-    def add_image(self, sample: Sample) -> int:
-        """As `add`, for an image, whose number is in its attachment; 0 for a malformed one."""
-        with suppress(DecodeError):
+    def add_image(self, sample: Sample) -> None:
+        """As `add`, for an image, whose number is in its attachment."""
+        with suppress(DecodeError):  # reported when it is decoded
             header = FrameInfo.FromString(sample.attachment).header
-            return self.add(sample.topic, header.boot_id, header.seq)
-        return 0
+            self.add(sample.topic, header.boot_id, header.seq)
 
     def forget(self) -> None:
         """Takes the next message of each topic as the first."""

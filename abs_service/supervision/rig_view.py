@@ -1,6 +1,6 @@
 """Content of all displays, derived from the health of the components."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol, Self
@@ -98,7 +98,7 @@ class RigView:
             rate=self.live.received["record"].rate("file_bytes"),
             files=counters["files"],
             recorded=counters["recorded"],
-            dropped=sum(number for name, number in counters.items() if name.startswith(("dropped.", "lost."))),
+            dropped=dropped(counters),
             forecast=health.labels.get("forecast", ""),
         )
 
@@ -185,6 +185,11 @@ class Display(Protocol):
     def close(self, view: RigView) -> int:
         """Shows the summary; returns the number of lines that a program was to read and that are lost."""
         ...
+
+
+def dropped(counters: Mapping[str, int]) -> int:
+    """Messages that a component could not take, and those that never came to it, by the counters of its health."""
+    return sum(number for name, number in counters.items() if name.startswith(("dropped.", "lost.")))
 
 
 def size(number: float) -> str:

@@ -12,11 +12,8 @@ from annotated_types import Gt, Interval
 
 from abs_service.tracker.estimate import Status
 from abs_service.tracker.shape_quality import ShapeQuality
-from abs_service.tracker.terms.base import RimFit, SensorFit, inlier_share, occluded_share
+from abs_service.tracker.terms.base import MIN_RIM, RimFit, SensorFit, inlier_share, occluded_share
 from abs_service.tracker.terms.vertex_counts import VertexCounts
-
-#: With fewer visible vertices on the free edges, their shares say nothing.
-MIN_RIM = 8
 
 #: With fewer vertices that agree or disagree with a sensor, their share says nothing.
 MIN_JUDGED = 20

@@ -6,6 +6,18 @@ from urllib.parse import parse_qsl, urlsplit
 from drivers.contract.errors import AddressError
 
 
+def serial(uri: str) -> str:
+    """The serial number of an address, "" for the only device.
+
+    Raises:
+        AddressError: something else before the '?'.
+    """
+    parts = urlsplit(uri)
+    if parts.path.strip("/"):
+        raise AddressError(f"{uri}: a serial number is all that may stand before the '?'")
+    return parts.netloc
+
+
 def query(uri: str, defaults: Mapping[str, str]) -> dict[str, str]:
     """Values of all keys of an address: those behind its '?', and defaults.
 

@@ -1,9 +1,8 @@
 """Addresses of GenICam cameras: `genicam://`, `genicam://24551234?components=Range,Intensity&format=Coord3D_C16`."""
 
 from dataclasses import dataclass
-from urllib.parse import urlsplit
 
-from drivers.contract.address import query
+from drivers.contract.address import query, serial
 from drivers.contract.device import AddressError
 
 _DEFAULTS = {"components": "Range,Intensity,Confidence", "format": "", "focal": ""}
@@ -34,14 +33,11 @@ def parse(uri: str) -> Address:
     Raises:
         AddressError: unknown key or invalid value; names both and the allowed values.
     """
-    parts = urlsplit(uri)
-    values = query(uri, _DEFAULTS)
-    if parts.path.strip("/"):
-        raise AddressError(f"{uri}: a serial number is all that may stand before the '?'")
+    values, number = query(uri, _DEFAULTS), serial(uri)
     components = tuple(values["components"].split(","))
     if "Range" not in components:
         raise AddressError(f"{uri}: components = {values['components']!r} must contain Range")
-    return Address(uri, parts.netloc, components, values["format"], _focal(uri, values["focal"]))
+    return Address(uri, number, components, values["format"], _focal(uri, values["focal"]))
 
 
 def _focal(uri: str, text: str) -> float | None:

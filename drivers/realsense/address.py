@@ -3,9 +3,8 @@
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from urllib.parse import urlsplit
 
-from drivers.contract.address import query
+from drivers.contract.address import query, serial
 from drivers.contract.device import AddressError
 
 _DEFAULTS = {"depth": "640x480", "color": "640x480", "fps": "30", "ir": "1", "confidence": "1", "recording": ""}
@@ -43,17 +42,14 @@ def parse(uri: str) -> Address:
     Raises:
         AddressError: unknown key or invalid value; names both and the allowed values.
     """
-    parts = urlsplit(uri)
-    values = query(uri, _DEFAULTS)
-    if parts.path.strip("/"):
-        raise AddressError(f"{uri}: a serial number is all that may stand before the '?'")
+    values, number = query(uri, _DEFAULTS), serial(uri)
     if not re.fullmatch(_RATE, values["fps"]):
         raise AddressError(f"{uri}: fps = {values['fps']!r} must be a whole number from 1 to 999")
     fps = int(values["fps"])
     depth = _mode(uri, "depth", values["depth"], fps)
     return Address(
         uri=uri,
-        serial=parts.netloc,
+        serial=number,
         depth=depth,
         color=None if values["color"] == "0" else _mode(uri, "color", values["color"], fps),
         ir=_beside(uri, "ir", values["ir"], depth),

@@ -110,7 +110,7 @@ def of_material(size: float, found: Sequence[Mistake]) -> list[Verdict]:
 
 def of_stretch(found: ShapeError) -> Verdict:
     """Verdict on a board that is longer along one axis than described."""
-    text = f"{str(found)[0].upper()}{str(found)[1:].partition(':')[0]}. Nothing else can be said of the calibration."
+    text = f"{found.finding[0].upper()}{found.finding[1:]}. Nothing else can be said of the calibration."
     return Verdict(Level.BAD, text, "Measure rows and columns with a ruler, and print the board without scaling.")
 
 

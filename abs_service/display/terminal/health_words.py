@@ -2,7 +2,7 @@
 
 from absmsg.v1.health_pb2 import Health
 
-from abs_service.supervision.rig_view import size
+from abs_service.supervision.rig_view import dropped, size
 
 
 def words(component: str, health: Health) -> str:
@@ -18,8 +18,8 @@ def _capture(health: Health) -> list[str]:
         for name, rate in health.gauges.items()
         if name.startswith("rate_hz.")
     ]
-    dropped = sum(number for name, number in health.counters.items() if name.startswith("dropped."))
-    return [*(f"{stream} {rate:.1f} Hz" for stream, rate in sorted(rates)), f"{dropped} dropped" if dropped else ""]
+    missed = dropped(health.counters)
+    return [*(f"{stream} {rate:.1f} Hz" for stream, rate in sorted(rates)), f"{missed} dropped" if missed else ""]
 
 
 def _track(health: Health) -> list[str]:
@@ -35,12 +35,12 @@ def _track(health: Health) -> list[str]:
 
 def _record(health: Health) -> list[str]:
     file = health.labels.get("file", "").removesuffix(".active")
-    dropped = sum(number for name, number in health.counters.items() if name.startswith(("dropped.", "lost.")))
+    missed = dropped(health.counters)
     return [
         file,
         size(health.gauges["file_bytes"]) if file and "file_bytes" in health.gauges else "",
         f"{size(health.gauges['free_bytes'])} free" if "free_bytes" in health.gauges else "",
-        f"{dropped} dropped" if dropped else "",
+        f"{missed} dropped" if missed else "",
         health.labels.get("tracking", ""),
         health.labels.get("trigger", ""),
     ]

@@ -36,6 +36,10 @@ class Bounds:
     no_return: NoReturn = CAUTIOUS
 
 
+#: With fewer vertices on the free edges, their shares say nothing.
+MIN_RIM = 8
+
+
 @dataclass(frozen=True, slots=True)
 class RimFit:
     """Numbers of rim vertices of a mesh by class, from the depth image beside them.

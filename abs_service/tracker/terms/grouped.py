@@ -20,7 +20,7 @@ class GroupedLinearization:
         parameters: indices (groups, k) of the parameters of every group.
         start: first residual of every group, and the number of residuals, (groups + 1,).
         positions: of the points that they belong to (m, 3) [m]; empty (0, 3) if they belong to none.
-        shared: see `Linearization`; (0, dim) if they share none.
+        shared: see `Linearization`; (0, 0) if they share none.
     """
 
     residual: NDArray[np.float64]

@@ -128,7 +128,9 @@ class PointLinearization:
         apply_chain_rule(
             self.residual, self.rows, self.points, *of_points, start[:-1].copy(), residual, jacobian, points
         )
-        shared = self.transposed_times(self.shared, sparse_jacobian.dimension).T
+        shared = (
+            self.transposed_times(self.shared, sparse_jacobian.dimension).T if self.shared.shape[1] else self.shared
+        )
         positions = self.positions[points]
         return [GroupedLinearization(residual, jacobian, sparse_jacobian.parameters, start, positions, shared)]
 

@@ -47,19 +47,24 @@ class ShapeError:
     sigma: float
     effect_px: float
 
-    def __str__(self) -> str:
+    @property
+    def finding(self) -> str:
         """One clause for people."""
         if self.stretch:
             longer, other = ("rows", "columns") if self.size > 0 else ("columns", "rows")
             return (
                 f"the board's {longer} are {abs(self.size):.2f} ± {self.sigma:.2f} % longer than described, compared "
-                f"with its {other}, which changes projections by {self.effect_px:.2g} px: measure both with a ruler, "
-                "and print without scaling"
+                f"with its {other}, which changes projections by {self.effect_px:.2g} px"
             )
         return (
             f"a board that is bent by {abs(self.size):.2g} ± {self.sigma:.1g} mm would explain what the corners miss "
-            f"by, and change projections by {self.effect_px:.2g} px: glue it onto a flat plate"
+            f"by, and change projections by {self.effect_px:.2g} px"
         )
+
+    def __str__(self) -> str:
+        """The finding, and what to do."""
+        remedy = "measure both with a ruler, and print without scaling" if self.stretch else "glue it onto a flat plate"
+        return f"{self.finding}: {remedy}"
 
 
 def shape_errors(solution: Solution, distance: float, needed_px: float) -> list[ShapeError]:

@@ -62,7 +62,7 @@ class ChannelTerm:
         self._view = synthesizer.view(sensor, appearance)
         self._illumination = illumination
         self._shadow = Shadow(self._view.camera)
-        self._bias = RegistrationBias(self._view.camera)
+        self._bias = RegistrationBias(self._view)
         self._noise = noise
         self._bounds = bounds
         self._registration_noise = registration_noise
@@ -88,7 +88,7 @@ class ChannelTerm:
         self._texture = texture.reshape(-1, 4)
         self._view.look(predicted)
         if not self._is_mosaic:
-            self._bias.observe(self._image[..., VALUE, None], self._view.spread(predicted, predicted.vertices[0].T))
+            self._bias.observe(self._image[..., VALUE, None], predicted)
         seen = self._view.synthesize(predicted)
         self._illumination.adapt(self._by_channel(seen), seen.attributes[0].T)
         self._widening = NO_WIDENING

@@ -43,7 +43,7 @@ class ColorTerm:
         self._synthesizer = synthesizer
         self._view = synthesizer.view(sensor, colors)
         self._shadow = Shadow(self._view.camera)
-        self._bias = RegistrationBias(self._view.camera)
+        self._bias = RegistrationBias(self._view)
         self._bounds = bounds
         self._sigma = np.array([[noise.sigma]], np.float32)
         self._constant = bounds.inlier + 3 * (np.log(noise.sigma) + LOG_SQRT_2PI)
@@ -66,7 +66,7 @@ class ColorTerm:
         self._bordered.inside[:] = self._image[window]
         self._texture = texture.reshape(-1, 3)
         self._view.look(predicted)
-        self._bias.observe(self._image, self._view.spread(predicted, predicted.vertices[0].T))
+        self._bias.observe(self._image, predicted)
         seen = self._view.synthesize(predicted)
         self._illumination.adapt(self._texture[seen.pixel[0]], seen.attributes[0].T)
         widening = self._registration_noise.widening(self._view, predicted, self._sigma)

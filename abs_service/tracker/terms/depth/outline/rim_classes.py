@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.models.base import Surface
+from abs_service.tracker.terms.base import MIN_RIM
 from abs_service.tracker.terms.depth.outline.rim import Rim, read
 from calib.camera import Camera
 
@@ -28,10 +29,6 @@ MIN_COSINE = 0.25
 LEAVES_M = 0.015
 _NEIGHBOURS = 7
 _ALMOST = 0.75
-
-#: Fewer free edges are not used: the status could not tell that they lie off the outline, as beside specks that relief
-#: and quantised distances make.
-LEAST_FREE = 8
 
 #: Vertices within so many pixels of the image's border may continue beyond it.
 BORDER_PX = 2.0
@@ -92,7 +89,8 @@ def classify_rim(
     last = np.array([camera.width, camera.height]) - 1
     classes[~np.all((place >= BORDER_PX) & (place <= last - BORDER_PX), axis=1)] = RimClass.BORDER
     free = classes == RimClass.FREE
-    if np.count_nonzero(free) < LEAST_FREE:
+    # That fewer lie off the outline the status could not tell, as beside specks of relief and quantised distances.
+    if np.count_nonzero(free) < MIN_RIM:
         classes[free] = RimClass.CONTACT
     gap[(classes != RimClass.FREE) | rim.is_end] = 0.0
     return classes, gap.astype(np.float32)
