@@ -38,6 +38,7 @@ class Child:
         exit_code: of its last end.
         worst_code: the highest with which it ended by itself or because it was told; 128 + N for signal N that ended it
             after it was told. A crash counts as a restart only.
+        overdue_ns, deadline_ns: without health until then it is said, and it is killed [ns].
     """
 
     component: str
@@ -49,6 +50,7 @@ class Child:
     exit_code: int = 0
     worst_code: int = 0
     process: Process = field(default=NO_PROCESS, repr=False)
+    overdue_ns: int = 0
     deadline_ns: int = 0
     started_ns: int = 0
     backoff_ns: int = FIRST_BACKOFF_NS // 2

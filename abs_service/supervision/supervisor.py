@@ -19,6 +19,8 @@ _log = logging.getLogger(__name__)
 LONGEST_BACKOFF_NS = 3_000_000_000
 #: After a run that was longer than this the next backoff is the first one again [ns].
 WORKED_NS = 10_000_000_000
+#: A process says nothing for this long: its health, which comes once a second, is overdue [ns].
+OVERDUE_NS = 1_800_000_000
 #: If `poll` was not called for longer than this, the supervisor itself was suspended, and heard no child [ns].
 PAUSE_NS = 1_000_000_000
 
@@ -79,6 +81,7 @@ class Supervisor:
         if child is not None and child.state is State.RUNNING:
             child.heard_ns = self._clock()
             child.deadline_ns = child.heard_ns + (self._limits.startup_ns if busy else self._limits.stall_ns)
+            child.overdue_ns = child.deadline_ns if busy else child.heard_ns + OVERDUE_NS
             child.threads, child.reason = child.process.threads(), ""
 
     def renew(self, component: str) -> None:
@@ -138,6 +141,7 @@ class Supervisor:
         if paused_ns > PAUSE_NS:
             for child in self.children.values():
                 child.deadline_ns += paused_ns
+                child.overdue_ns += paused_ns
 
     def _is_starved(self, child: Child, now_ns: int) -> bool:
         """True if a child that is late has waited for a processor in the meantime, instead of hanging."""
@@ -159,13 +163,15 @@ class Supervisor:
         _log.info("%s is started", child.component, extra={"fields": started})
         child.state, child.reason = State.RUNNING, ""
         child.started_ns, child.heard_ns, child.threads = now_ns, now_ns, {}
-        child.deadline_ns = now_ns + self._limits.startup_ns
+        child.deadline_ns = child.overdue_ns = now_ns + self._limits.startup_ns
 
     def _check(self, child: Child, now_ns: int) -> None:
         code = child.process.poll()
         if code is None:
             if now_ns >= child.deadline_ns:
                 self._treat_silence(child, now_ns)
+            elif now_ns >= child.overdue_ns:
+                child.reason = f"no health for {(now_ns - child.heard_ns) / 1e9:.0f} s"
             return
         child.exit_code, child.worst_code = code, max(child.worst_code, code)
         if code == Exit.ENDED:

@@ -125,5 +125,5 @@ FAULTS = (
     Fault(f"SIGSTOP of `run` for {STOP_S:g} s", "nobody is killed", partial(stopped, "run"), 2.5, 2.5, _UNSAID),
     Fault(f"`capture` {_HANGS}", _BACK, partial(hangs, "capture"), STALL_S + 4, STALL_S + 4, restarted=_CAPTURE),
     Fault(f"`track` {_HANGS}", _BACK, partial(hangs, "track"), STALL_S + 4, restarted=_TRACK),
-    Fault(f"`record` {_HANGS}", _BACK, partial(hangs, "record"), 0.5, STALL_S + 2.5, STALL_S + 1, restarted=_RECORD),
+    Fault(f"`record` {_HANGS}", _BACK, partial(hangs, "record"), 0.5, STALL_S + 2.5, restarted=_RECORD),
 )

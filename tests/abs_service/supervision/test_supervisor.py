@@ -121,12 +121,24 @@ def test_a_silent_child_is_killed_and_started_again(world):
     assert supervisor.children["capture"].restarts == 1
 
 
+def test_silence_is_said_within_two_seconds_long_before_the_child_is_killed(world):
+    supervisor = world.supervisor("record")
+    child = supervisor.children["record"]
+    supervisor.heartbeat("record")
+    passes(world, supervisor, 1)
+    assert child.reason == ""
+    passes(world, supervisor, 1)
+    assert (child.state, child.reason) == (State.RUNNING, "no health for 2 s")
+    supervisor.heartbeat("record")
+    assert child.reason == ""
+
+
 def test_a_child_that_starts_or_compiles_may_be_silent_for_longer(world):
     supervisor = world.supervisor("track/a")
     passes(world, supervisor, 170)
     supervisor.heartbeat("track/a", busy=True)
     passes(world, supervisor, 170)
-    assert world.events == []
+    assert (world.events, supervisor.children["track/a"].reason) == ([], "")
 
 
 def test_a_child_that_was_not_heard_because_the_supervisor_stood_still_is_not_killed(world):
