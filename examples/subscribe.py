@@ -21,7 +21,12 @@ parser.add_argument("--topic", default="abs/demo/sheet/state", help="abs/RIG/TRA
 parser.add_argument("--count", type=int, help="end after so many estimates (default: with Ctrl-C)")
 arguments = parser.parse_args()
 
-config = zenoh.Config.from_json5(json.dumps({"mode": "client", "connect": {"endpoints": [arguments.endpoint]}}))
+settings = {
+    "mode": "client",
+    "connect": {"endpoints": [arguments.endpoint]},
+    "transport": {"shared_memory": {"enabled": False}},  # which zenoh has to lock: more than `ulimit -l` may allow
+}
+config = zenoh.Config.from_json5(json.dumps(settings))
 try:
     session = zenoh.open(config)
 except zenoh.ZError as error:

@@ -9,6 +9,7 @@ from enum import StrEnum
 
 import zenoh
 
+from abs_service.bus.pools import own_size
 from abs_service.bus.security.mutual_tls import NO_SECURITY, MutualTls, NoSecurity
 from drivers.encoding import connection
 from drivers.encoding.message_check import LARGEST_IMAGE
@@ -20,7 +21,7 @@ DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 #: Timeout of a client's connection to its router [ms].
 CONNECT_TIMEOUT_MS = 3000
 #: Largest pool of a process; what it has no room for goes through sockets.
-SHARED_MEMORY_POOL_BYTES = 30 << 20
+SHARED_MEMORY_POOL_BYTES = 32 << 20
 #: Pools that have to fit into what is free, so that those of a rig do into the 64 MB that a container has by default.
 SHARED_MEMORY_POOLS = 8
 #: Free shared memory without which none is used: what zenoh needs beside the pools is 1.3 MB a process.
@@ -120,13 +121,16 @@ def _explain(error: str, role: Role, connect_timeout_ms: int) -> str:
 def pool_bytes() -> int:
     """Size of the pool for images in shared memory [bytes]; 0 if there is no room for those of all processes.
 
-    zenoh makes it when it is needed first, and may lose a connection for ever if it cannot.
+    zenoh makes it when it is needed first, and may lose a connection for ever if it, or a reader, cannot.
     """
+    if not connection.may_lock_memory():
+        _log.info("locked memory is limited (ulimit -l): images are copied through sockets")
+        return 0
     free = connection.free_shared_memory()
     if free < LEAST_SHARED_MEMORY_BYTES:
         _log.warning("%s has %.0f MB free: images are copied through sockets", connection.SHARED_MEMORY, free * 1e-6)
         return 0
-    return min(SHARED_MEMORY_POOL_BYTES, free // SHARED_MEMORY_POOLS)
+    return own_size(min(SHARED_MEMORY_POOL_BYTES, free // SHARED_MEMORY_POOLS))
 
 
 def _settings(

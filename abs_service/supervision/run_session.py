@@ -10,6 +10,7 @@ from queue import SimpleQueue
 from abs_service.bus import keys
 from abs_service.bus.contract import Sample
 from abs_service.bus.health import Health, Level
+from abs_service.bus.pools import EndedPools
 from abs_service.bus.queues import LatestQueue
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.supervision import rig_state
@@ -82,6 +83,7 @@ class RunSession:
         self._headers = HeaderFactory(rig, clock)
         self._health = Health(bus, "run", self._headers)
         bus.declare_liveliness("run")
+        self._pools = EndedPools(clock.monotonic)
         self._publishers = SolePublishers(bus, SOLE, clock.monotonic)
         self._inbox: LatestQueue[Sample] = LatestQueue(DEPTH)
         for pattern in rig_state.PATTERNS:
@@ -116,6 +118,7 @@ class RunSession:
             while not self._renewals.empty():
                 self._renew(*self._renewals.get())
             self._supervisor.poll()
+            self._pools.update(self._supervisor.processes())
             self._report()
             self._report_silence()
             self._listen(PERIOD_S)

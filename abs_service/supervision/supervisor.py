@@ -75,6 +75,10 @@ class Supervisor:
             if child.state in (State.BACKOFF, State.STALLED, State.RENEWED) and now_ns >= child.start_at_ns:
                 self._start(child, now_ns)
 
+    def processes(self) -> frozenset[int]:
+        """Numbers of the processes that run."""
+        return frozenset(child.process.pid for child in self.children.values()) - {NO_PROCESS.pid}
+
     def heartbeat(self, component: str, busy: bool = False) -> None:
         """Extends a component's deadline; further for a busy one, which compiles kernels."""
         child = self.children.get(component)

@@ -1,9 +1,7 @@
 """The connection to a rig: a zenoh session of a client, and the threads that receive on it."""
 
 import json
-import os
 import re
-import sys
 import threading
 import weakref
 from collections import Counter
@@ -15,6 +13,7 @@ from typing import Any, Self
 
 import zenoh
 
+from abs_client import shared_memory
 from abs_client.errors import MalformedError, UnknownNameError, UnreachableError
 from abs_client.received import Received
 from abs_client.tls import Tls
@@ -30,8 +29,6 @@ RETRY_MS, TRY_MS = (250, 1000), 2000
 WAITING = 4
 #: By when receiving threads have ended after their session has [s].
 END_S = 2.0
-#: Free shared memory without which messages come through sockets [bytes].
-LEAST_SHARED_BYTES = 1 << 20
 
 _ENDPOINT = re.compile(r"(tcp|tls|quic|udp|ws)/.+:\d{1,5}([?#]\S*)?")
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
@@ -186,19 +183,12 @@ def client_settings(endpoint: str, tls: Tls | None = None) -> dict[str, object]:
             "retry": {"period_init_ms": RETRY_MS[0], "period_max_ms": RETRY_MS[1]},
         },
         "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}, "delay": 0},
-        "transport": {"unicast": {"open_timeout": TRY_MS}, "link": link, "shared_memory": {"enabled": _shared()}},
+        "transport": {
+            "unicast": {"open_timeout": TRY_MS},
+            "link": link,
+            "shared_memory": {"enabled": shared_memory.is_usable()},
+        },
     }
-
-
-def _shared() -> bool:
-    """False where shared memory is missing, read-only or full: zenoh would not connect with it."""
-    if sys.platform != "linux":
-        return True
-    try:
-        status = os.statvfs("/dev/shm")
-    except OSError:
-        return False
-    return not status.f_flag & os.ST_RDONLY and status.f_bavail * status.f_frsize > LEAST_SHARED_BYTES
 
 
 def _undeclare(subscriber: Any) -> None:

@@ -105,7 +105,9 @@ def open_link(address: Address, timeout_s: float = ANSWER_S) -> Link:
             "unicast": {**connection.UNICAST},
             "link": {"tx": {"lease": connection.LEASE_MS}},
             "shared_memory": {
-                "enabled": address.shared_memory and connection.free_shared_memory() >= LEAST_SHARED_BYTES
+                "enabled": address.shared_memory
+                and connection.free_shared_memory() >= LEAST_SHARED_BYTES
+                and connection.may_lock_memory()
             },
         },
     }

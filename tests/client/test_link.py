@@ -2,12 +2,15 @@
 
 import json
 import os
+import resource
 import threading
 import time
+from pathlib import Path
 from types import SimpleNamespace
 from typing import ClassVar
 
 import pytest
+from abs_client import shared_memory
 from abs_client.errors import UnreachableError
 from abs_client.link import Link, client_settings
 
@@ -86,7 +89,17 @@ def test_what_begins_as_the_connection_ends_is_told_in_words_of_this_package(bus
         act(link)
 
 
-@pytest.mark.parametrize(("free", "flags", "used"), [(9 << 20, 0, True), (0, 0, False), (9 << 20, os.ST_RDONLY, False)])
-def test_shared_memory_is_used_where_there_is_some(monkeypatch, free, flags, used):
+@pytest.mark.parametrize(
+    ("free", "flags", "highest", "used"),
+    [
+        (9 << 20, 0, resource.RLIM_INFINITY, True),
+        (9 << 20, 0, 64 << 20, False),  # the third pool that is mapped would be too much, and its messages lost
+        (0, 0, resource.RLIM_INFINITY, False),
+        (9 << 20, os.ST_RDONLY, resource.RLIM_INFINITY, False),
+    ],
+)
+def test_shared_memory_is_used_where_there_is_some_and_it_may_be_locked(monkeypatch, free, flags, highest, used):
+    monkeypatch.setattr(shared_memory, "PROCESS", Path("/nowhere"))  # without the capability to lock any amount
+    monkeypatch.setattr(resource, "getrlimit", lambda kind: (highest, highest))
     monkeypatch.setattr(os, "statvfs", lambda path: SimpleNamespace(f_flag=flags, f_bavail=free, f_frsize=1))
     assert f'"shared_memory": {{"enabled": {str(used).lower()}}}' in json.dumps(client_settings("tcp/host:1"))

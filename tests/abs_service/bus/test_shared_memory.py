@@ -2,6 +2,7 @@
 
 import json
 import os
+import resource
 from types import SimpleNamespace
 
 import pytest
@@ -9,17 +10,27 @@ import zenoh
 
 from abs_service.bus import session
 from drivers.encoding import connection
+from drivers.encoding.connection import may_lock_memory
 from drivers.remote.address import Address
 from drivers.remote.link import open_link
 
 MB = 1 << 20
 
 
+@pytest.fixture(autouse=True)
+def unlimited(monkeypatch):
+    monkeypatch.setattr(connection, "may_lock_memory", lambda: True)
+
+
 @pytest.mark.parametrize(
     ("free", "flags", "pool"),
     [
-        (20_000 * MB, 0, 30 * MB),
-        (64 * MB, 0, 8 * MB),  # a container's default: four processes and what zenoh needs beside the pools
+        (20_000 * MB, 0, 32 * MB + os.getpid()),
+        (
+            64 * MB,
+            0,
+            8 * MB + os.getpid(),
+        ),  # a container's default: four processes and what zenoh needs beside the pools
         (31 * MB, 0, 0),
         (64 * MB, os.ST_RDONLY, 0),
     ],
@@ -28,6 +39,34 @@ def test_the_pool_of_a_process_leaves_room_for_the_others(monkeypatch, free, fla
     status = SimpleNamespace(f_flag=flags, f_bavail=free >> 12, f_frsize=1 << 12)
     monkeypatch.setattr(os, "statvfs", lambda path: status)
     assert session.pool_bytes() == pool
+
+
+@pytest.mark.parametrize(
+    ("highest", "capabilities", "users", "allowed"),
+    [
+        (resource.RLIM_INFINITY, 0, "1000 1000 1", True),
+        (64 * MB, 1 << 14, "0 0 4294967295", True),
+        (64 * MB, 1 << 13, "0 0 4294967295", False),  # a reader could map two pools, and would lose the third's images
+        (64 * MB, 1 << 14, "0 1000 1", False),  # "root" of a container that a user runs
+        (64 * MB, 1 << 14, "", False),
+    ],
+)
+def test_shared_memory_is_used_only_where_any_amount_may_be_locked(
+    monkeypatch, tmp_path, highest, capabilities, users, allowed
+):
+    monkeypatch.setattr(resource, "getrlimit", lambda kind: (8 * MB, highest))
+    limits = []
+    monkeypatch.setattr(resource, "setrlimit", lambda kind, limit: limits.append(limit))
+    (tmp_path / "status").write_text(f"Name:\tpython\nCapEff:\t{capabilities:016x}\n")
+    (tmp_path / "uid_map").write_text(f"    {users}\n")
+    monkeypatch.setattr(connection, "PROCESS", tmp_path)
+    assert may_lock_memory() is allowed
+    assert limits == [(highest, highest)]
+
+
+def test_where_memory_may_not_be_locked_there_is_no_pool(monkeypatch):
+    monkeypatch.setattr(connection, "may_lock_memory", lambda: False)
+    assert session.pool_bytes() == 0
 
 
 def test_without_shared_memory_there_is_no_pool(monkeypatch):

@@ -1,0 +1,69 @@
+"""Pools in shared memory, and the memory of those whose process has ended.
+
+zenoh keeps every pool that it has mapped for the life of a process, with its file (eclipse-zenoh/zenoh #2787). Without
+help, each restart of a process that publishes images would cost a rig that goes on 32 MB.
+"""
+
+import mmap
+import os
+from collections.abc import Callable, Set
+from contextlib import suppress
+from pathlib import Path
+
+#: A pool's size is a multiple of this plus the number of its process, which is less on Linux: so it tells whose it is.
+UNIT_BYTES = 1 << 22
+#: Time after the end of a process in which its last images are still read [ns].
+READ_NS = 10_000_000_000
+
+FILES = Path("/proc/self/fd")
+
+
+def own_size(size: int) -> int:
+    """Size of this process's pool [bytes], about as asked for; 0 if that is less than `UNIT_BYTES`."""
+    return size - size % UNIT_BYTES + os.getpid() if size >= UNIT_BYTES else 0
+
+
+def free_pool(process: int) -> None:
+    """Gives back the memory of the pool of an ended process, as far as this process has mapped it; its file stays.
+
+    Whoever still read in it would read zeros.
+    """
+    for file in FILES.iterdir():
+        with suppress(OSError):  # closed in the meantime
+            size = file.stat().st_size
+            is_pool = size > UNIT_BYTES and str(file.readlink()).startswith("/dev/shm/")
+            if is_pool and size % UNIT_BYTES == process:
+                _punch(file, size)
+
+
+def _punch(file: Path, size: int) -> None:
+    descriptor = os.open(file, os.O_RDWR)
+    try:
+        with mmap.mmap(descriptor, size) as pool:
+            pool.madvise(mmap.MADV_REMOVE)
+    finally:
+        os.close(descriptor)
+
+
+class EndedPools:
+    """Frees the pools of processes some time after they ended.
+
+    Args:
+        clock: monotonic time [ns].
+        free: gives back the memory of a process's pool.
+    """
+
+    def __init__(self, clock: Callable[[], int], free: Callable[[int], None] = free_pool) -> None:
+        self._clock, self._free = clock, free
+        self._running: frozenset[int] = frozenset()
+        self._due_ns: dict[int, int] = {}
+
+    def update(self, running: Set[int]) -> None:
+        """Takes the numbers of the processes that run now."""
+        now_ns = self._clock()
+        self._due_ns.update(dict.fromkeys(self._running - running, now_ns + READ_NS))
+        self._running = frozenset(running)
+        for process in [process for process, due_ns in self._due_ns.items() if due_ns <= now_ns]:
+            del self._due_ns[process]
+            if process not in running:  # the system gives numbers again
+                self._free(process)

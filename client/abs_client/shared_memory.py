@@ -1,0 +1,46 @@
+"""Shared memory, through which messages of processes of the same host come."""
+
+import os
+import sys
+from pathlib import Path
+
+#: Free shared memory without which messages come through sockets [bytes].
+LEAST_BYTES = 1 << 20
+PROCESS = Path("/proc/self")
+#: Bit of the capability that lifts the limit of locked memory (capabilities(7)).
+CAP_IPC_LOCK = 14
+
+
+def is_usable() -> bool:
+    """False where shared memory is missing, read-only or full, or may not be locked; see `may_lock_memory`."""
+    if sys.platform != "linux":
+        return True
+    try:
+        status = os.statvfs("/dev/shm")
+    except OSError:
+        return False
+    free = 0 if status.f_flag & os.ST_RDONLY else status.f_bavail * status.f_frsize
+    return free > LEAST_BYTES and may_lock_memory()
+
+
+def may_lock_memory() -> bool:
+    """True if this process may lock memory without limit.
+
+    zenoh locks all shared memory that it maps, that of ended processes included, for the life of a process
+    (eclipse-zenoh/zenoh #2787). At its limit it cannot read the next one, and loses its messages without a word.
+    """
+    if sys.platform == "linux":
+        import resource  # noqa: PLC0415  of Unix only
+
+        return resource.getrlimit(resource.RLIMIT_MEMLOCK)[0] == resource.RLIM_INFINITY or _is_capable()
+    return True
+
+
+def _is_capable() -> bool:
+    """True with CAP_IPC_LOCK, unless only within a user namespace, where it does not lift the limit."""
+    try:
+        capabilities = (PROCESS / "status").read_text().partition("CapEff:")[2].split()[0]
+        users = (PROCESS / "uid_map").read_text().split()
+    except (OSError, IndexError):
+        return False
+    return bool(int(capabilities, 16) >> CAP_IPC_LOCK & 1) and users == ["0", "0", "4294967295"]
