@@ -11,7 +11,7 @@ import zenoh
 
 from abs_service.bus.pools import own_size
 from abs_service.bus.security.mutual_tls import NO_SECURITY, MutualTls, NoSecurity
-from drivers.encoding import connection
+from drivers.encoding import connection, shared_memory
 from drivers.encoding.message_check import LARGEST_IMAGE
 
 _log = logging.getLogger(__name__)
@@ -123,12 +123,12 @@ def pool_bytes() -> int:
 
     zenoh makes it when it is needed first, and may lose a connection for ever if it, or a reader, cannot.
     """
-    if not connection.may_lock_memory():
-        _log.info("locked memory is limited (ulimit -l): images are copied through sockets")
+    if not shared_memory.may_be_locked():
+        _log.info("locked memory is limited (ulimit -l) to too little: images are copied through sockets")
         return 0
-    free = connection.free_shared_memory()
+    free = shared_memory.free_bytes()
     if free < LEAST_SHARED_MEMORY_BYTES:
-        _log.warning("%s has %.0f MB free: images are copied through sockets", connection.SHARED_MEMORY, free * 1e-6)
+        _log.warning("%s has %.0f MB free: images are copied through sockets", shared_memory.FOLDER, free * 1e-6)
         return 0
     return own_size(min(SHARED_MEMORY_POOL_BYTES, free // SHARED_MEMORY_POOLS))
 

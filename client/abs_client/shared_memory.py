@@ -2,29 +2,33 @@
 
 import os
 import sys
+from contextlib import suppress
 from pathlib import Path
 
+FOLDER = Path("/dev/shm")
+PROCESS = Path("/proc/self")
 #: Free shared memory without which messages come through sockets [bytes].
 LEAST_BYTES = 1 << 20
-PROCESS = Path("/proc/self")
+#: Eight pools of a large rig [bytes].
+LOCKED_BYTES = 8 * (36 << 20)
 #: Bit of the capability that lifts the limit of locked memory (capabilities(7)).
 CAP_IPC_LOCK = 14
 
 
 def is_usable() -> bool:
-    """False where shared memory is missing, read-only or full, or may not be locked; see `may_lock_memory`."""
+    """False where shared memory is missing, read-only or full, or may not be locked; see `may_be_locked`."""
     if sys.platform != "linux":
         return True
     try:
-        status = os.statvfs("/dev/shm")
+        status = os.statvfs(FOLDER)
     except OSError:
         return False
     free = 0 if status.f_flag & os.ST_RDONLY else status.f_bavail * status.f_frsize
-    return free > LEAST_BYTES and may_lock_memory()
+    return free > LEAST_BYTES and may_be_locked()
 
 
-def may_lock_memory() -> bool:
-    """True if this process may lock memory without limit.
+def may_be_locked() -> bool:
+    """True if this process may lock the pools of a rig beside all that are there.
 
     zenoh locks all shared memory that it maps, that of ended processes included, for the life of a process
     (eclipse-zenoh/zenoh #2787). At its limit it cannot read the next one, and loses its messages without a word.
@@ -32,8 +36,18 @@ def may_lock_memory() -> bool:
     if sys.platform == "linux":
         import resource  # noqa: PLC0415  of Unix only
 
-        return resource.getrlimit(resource.RLIMIT_MEMLOCK)[0] == resource.RLIM_INFINITY or _is_capable()
+        limit = resource.getrlimit(resource.RLIMIT_MEMLOCK)[0]
+        return limit == resource.RLIM_INFINITY or limit >= _segments_bytes() + LOCKED_BYTES or _is_capable()
     return True
+
+
+def _segments_bytes() -> int:
+    """Size of all that zenoh has in shared memory: the most that a process has mapped, since mapped files stay."""
+    total = 0
+    for path in FOLDER.glob("*.zenoh"):
+        with suppress(OSError):  # removed in the meantime
+            total += path.stat().st_size
+    return total
 
 
 def _is_capable() -> bool:

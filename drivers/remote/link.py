@@ -12,7 +12,7 @@ import zenoh
 
 from drivers.contract.callbacks import from_non_daemon_thread
 from drivers.contract.device import DeviceError
-from drivers.encoding import connection
+from drivers.encoding import connection, shared_memory
 from drivers.remote.address import Address
 
 #: Timeout of queries [s].
@@ -106,8 +106,8 @@ def open_link(address: Address, timeout_s: float = ANSWER_S) -> Link:
             "link": {"tx": {"lease": connection.LEASE_MS}},
             "shared_memory": {
                 "enabled": address.shared_memory
-                and connection.free_shared_memory() >= LEAST_SHARED_BYTES
-                and connection.may_lock_memory()
+                and shared_memory.free_bytes() >= LEAST_SHARED_BYTES
+                and shared_memory.may_be_locked()
             },
         },
     }

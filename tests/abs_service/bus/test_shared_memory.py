@@ -3,14 +3,15 @@
 import json
 import os
 import resource
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 import zenoh
 
 from abs_service.bus import session
-from drivers.encoding import connection
-from drivers.encoding.connection import may_lock_memory
+from drivers.encoding import shared_memory
+from drivers.encoding.shared_memory import may_be_locked
 from drivers.remote.address import Address
 from drivers.remote.link import open_link
 
@@ -19,7 +20,7 @@ MB = 1 << 20
 
 @pytest.fixture(autouse=True)
 def unlimited(monkeypatch):
-    monkeypatch.setattr(connection, "may_lock_memory", lambda: True)
+    monkeypatch.setattr(shared_memory, "may_be_locked", lambda: True)
 
 
 @pytest.mark.parametrize(
@@ -49,9 +50,11 @@ def test_the_pool_of_a_process_leaves_room_for_the_others(monkeypatch, free, fla
         (64 * MB, 1 << 13, "0 0 4294967295", False),  # a reader could map two pools, and would lose the third's images
         (64 * MB, 1 << 14, "0 1000 1", False),  # "root" of a container that a user runs
         (64 * MB, 1 << 14, "", False),
+        (800 * MB, 0, "0 1000 1", True),
+        (780 * MB, 0, "0 1000 1", False),
     ],
 )
-def test_shared_memory_is_used_only_where_any_amount_may_be_locked(
+def test_shared_memory_is_used_only_where_it_may_be_locked_again_and_again(
     monkeypatch, tmp_path, highest, capabilities, users, allowed
 ):
     monkeypatch.setattr(resource, "getrlimit", lambda kind: (8 * MB, highest))
@@ -59,23 +62,26 @@ def test_shared_memory_is_used_only_where_any_amount_may_be_locked(
     monkeypatch.setattr(resource, "setrlimit", lambda kind, limit: limits.append(limit))
     (tmp_path / "status").write_text(f"Name:\tpython\nCapEff:\t{capabilities:016x}\n")
     (tmp_path / "uid_map").write_text(f"    {users}\n")
-    monkeypatch.setattr(connection, "PROCESS", tmp_path)
-    assert may_lock_memory() is allowed
+    monkeypatch.setattr(shared_memory, "PROCESS", tmp_path)
+    monkeypatch.setattr(shared_memory, "FOLDER", tmp_path)
+    with (tmp_path / "7.zenoh").open("wb") as segment:
+        segment.truncate(500 * MB)  # which a restarted process may have left
+    assert may_be_locked() is allowed
     assert limits == [(highest, highest)]
 
 
 def test_where_memory_may_not_be_locked_there_is_no_pool(monkeypatch):
-    monkeypatch.setattr(connection, "may_lock_memory", lambda: False)
+    monkeypatch.setattr(shared_memory, "may_be_locked", lambda: False)
     assert session.pool_bytes() == 0
 
 
 def test_without_shared_memory_there_is_no_pool(monkeypatch):
-    monkeypatch.setattr(connection, "SHARED_MEMORY", "/nowhere")
+    monkeypatch.setattr(shared_memory, "FOLDER", Path("/nowhere"))
     assert session.pool_bytes() == 0
 
 
 def test_a_rig_elsewhere_is_connected_to_without_shared_memory(monkeypatch):
-    monkeypatch.setattr(connection, "SHARED_MEMORY", "/nowhere")
+    monkeypatch.setattr(shared_memory, "FOLDER", Path("/nowhere"))
     configured = []
     monkeypatch.setattr(zenoh, "open", lambda config: configured.append(json.loads(str(config))))
     open_link(Address())
