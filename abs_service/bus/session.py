@@ -157,7 +157,7 @@ def _settings(
         "transport": {
             "unicast": {**connection.UNICAST},
             "link": {
-                "tx": {"lease": connection.LEASE_MS},
+                "tx": {"lease": connection.LEASE_MS, "queue": connection.QUEUE},
                 "rx": {"max_message_size": LARGEST_MESSAGE_BYTES},
                 **security.link,
             },
