@@ -7,6 +7,8 @@ from enum import Enum, auto
 from typing import NamedTuple
 
 from abs_service.pairing.observation import Observation
+from abs_service.tracker.appearance import with_appearance
+from abs_service.tracker.detection.grid_mesh import grid_mesh
 from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection, UndecidedError
 from abs_service.tracker.detection.plausibility import ExtentError, mesh_warnings, warnings
 from abs_service.tracker.detection.regions.base import Region
@@ -179,30 +181,29 @@ class TrackingSession:
 
     def _detect(self, due: _Due, observation: Observation) -> None:
         """Detects the object for a cause; DetectionError or ModelError if that fails."""
-        if self._tracker is not None and due.cause == _Cause.LOSS:
-            self._recover(self._tracker, observation)
-        elif self._tracker is not None and due.cause == _Cause.APPEARANCE:
-            self._renew(self._tracker.model.mesh, observation)
-        elif self._tracker is not None and due.cause == _Cause.GROWTH:
-            self._grow(self._tracker.model.mesh, observation)
-        else:
+        tracker, mesh = self._tracker, self.mesh
+        if tracker is None or mesh is None or due.cause in (_Cause.START, _Cause.REQUEST):
             self._adopt(self._build(observation, due.region), observation)
             self._region = due.region
+        elif due.cause == _Cause.GROWTH:
+            self._grow(mesh, observation)
+        elif due.cause == _Cause.LOSS and self._loss_monitor.keeps_mesh(observation.t_host_ns):
+            self._relocate(tracker, mesh, observation)
+        else:
+            self._renew(mesh, observation)
 
-    def _recover(self, tracker: Tracker, observation: Observation) -> None:
-        """Relocates the mesh of a lost object, or makes a new one if it was lost for too long."""
-        if self._loss_monitor.keeps_mesh(observation.t_host_ns):
-            points = self._detection(observation, self._region).points
-            self._loss_monitor.check_spread(points, tracker.model.mesh)
-            tracker.relocate(points)
-            return
-        self._renew(tracker.model.mesh, observation)
+    def _relocate(self, tracker: Tracker, lost: Mesh, observation: Observation) -> None:
+        """Lays the mesh of a lost object over what is found in its place."""
+        detection = self._detection(observation, self._region)
+        self._loss_monitor.check_likeness(with_appearance(grid_mesh(detection), observation.images, self._rig), lost)
+        tracker.relocate(detection.points)
 
     def _renew(self, old: Mesh, observation: Observation) -> None:
-        """Replaces the mesh by a new one of about the same size."""
+        """Replaces the mesh by a new one of about the same size and colours."""
         built = self._build(observation, self._region)
-        self._loss_monitor.check_size(built.mesh, old)
+        self._loss_monitor.check_likeness(built.mesh, old)
         self._adopt(built, observation)
+        self._loss_monitor.restart("a new mesh was made")
 
     def _grow(self, old: Mesh, observation: Observation) -> None:
         """Replaces the mesh if much more of the object is in sight."""

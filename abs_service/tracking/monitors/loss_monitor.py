@@ -11,6 +11,7 @@ from abs_service.tracker import status
 from abs_service.tracker.detection.initial_detection import DetectionError
 from abs_service.tracker.estimate import Estimate, Status
 from abs_service.tracker.mesh import Mesh
+from abs_service.tracking.monitors.common_colors import common_share
 
 
 @dataclass(frozen=True)
@@ -26,6 +27,7 @@ class Settings:
         confirm: number of consecutive good estimates from which on the status is TRACKING; before, it is DEGRADED.
         size_ratio: largest ratio between the areas of the detected and the lost object, and between the mean squared
             distances of their points from their centres; others are rejected, because an empty scene has surfaces, too.
+            So are those that share less than one part in `size_ratio` of their colours with the lost one.
         grow_s: time for which the object must be seen to continue beyond edges of the mesh that something hid at first
             before a new, larger mesh is made [s].
         misfit_s: time for which the free edges must lie off the object's outline (`status.degraded_rim`,
@@ -96,25 +98,32 @@ class LossMonitor:
 
     def restart(self, event: str) -> None:
         """Makes the next estimates DEGRADED as after a loss, because of an event such as "a larger mesh was made"."""
-        self._good, self._event = 0, event
+        self._good, self._event = 0, f"found again, {event}" if self.is_lost else event
 
-    def check_size(self, found: Mesh, lost: Mesh) -> None:
-        """DetectionError if the areas or spreads of the detected and the lost object differ by `size_ratio`."""
+    def check_likeness(self, found: Mesh, lost: Mesh) -> None:
+        """DetectionError if the detected object has another area, spread or appearance than the lost one."""
         if self._differ(found.area, lost.area):
             raise DetectionError(f"what is in sight has {found.area * 1e4:.0f} cm², not {lost.area * 1e4:.0f} cm²")
-        self.check_spread(found.vertices, lost)
+        self._check_spread(found.vertices, lost.vertices)
+        self._check_appearance(found, lost)
 
-    def check_spread(self, found: NDArray[np.float64], lost: Mesh) -> None:
-        """DetectionError if points (k, 3) [m] of the detected object spread otherwise than the lost one.
-
-        A strip may have the area of a sheet, and so have the bits of a room that make a mesh.
-        """
-        reach, expected = _spread(found), _spread(lost.vertices)
+    def _check_spread(self, found: NDArray[np.float64], lost: NDArray[np.float64]) -> None:
+        """A strip may have the area of a sheet, and so have the bits of a room that make a mesh."""
+        reach, expected = _spread(found), _spread(lost)
         if self._differ(reach**2, expected**2):
             raise DetectionError(
                 f"what is in sight spreads by {reach * 1e2:.0f} cm about its centre (root mean square), "
                 f"not by {expected * 1e2:.0f} cm"
             )
+
+    def _check_appearance(self, found: Mesh, lost: Mesh) -> None:
+        """A part of the object may be in sight, as small as its size allows, and that may be the part of one colour."""
+        for sensor, appearance in lost.appearance.items():
+            shared = common_share(found.appearance_of(sensor), appearance)
+            if shared < 1 / self._settings.size_ratio:
+                raise DetectionError(
+                    f"what is in sight shares {shared:.0%} of its colours in {sensor} with the lost object"
+                )
 
     def _differ(self, found: float, lost: float) -> bool:
         return not 1 / self._settings.size_ratio < found / lost < self._settings.size_ratio

@@ -16,7 +16,8 @@ def test_a_color_camera_that_starts_late_is_not_ignored_for_ever():
     """Its first image shows what the vertices look like; until then only depth says where they are."""
     tracker = TrackingSession(RIG, default_plan())
     steps = list(drive(tracker, SHEET, range(27, 50), lambda k, f: without_color(f) if k < 30 else f))
-    assert [step.estimate.status for step in steps] == [Status.DEGRADED] * 3 + [Status.TRACKING] * 20
+    assert [step.estimate.status for step in steps] == [Status.DEGRADED] * 5 + [Status.TRACKING] * 18
+    assert steps[3].estimate.reasons == ("a new mesh was made 1 of 3 estimates ago",)
     assert (tracker.mesh_version, tracker.made_ns) == (2, SHEET.time_ns(30))
     assert mean_errors(steps[3:])[0] < 2
 

@@ -87,12 +87,12 @@ def test_after_a_loss_the_first_good_estimates_are_degraded():
 )
 def test_objects_of_another_size_are_rejected(found: Mesh):
     with pytest.raises(DetectionError, match="what is in sight"):
-        LossMonitor(Settings(), LIMITS).check_size(found, LOST)
+        LossMonitor(Settings(), LIMITS).check_likeness(found, LOST)
 
 
 @pytest.mark.parametrize("found", [sheet(size=(0.25, 0.2)), sheet(height=flat)], ids=["cut", "unbent"])
 def test_the_same_object_is_accepted(found: Mesh):
-    LossMonitor(Settings(), LIMITS).check_size(found, LOST)
+    LossMonitor(Settings(), LIMITS).check_likeness(found, LOST)
 
 
 def test_far_bits_of_a_room_with_the_area_of_the_object_are_rejected():
@@ -102,7 +102,23 @@ def test_far_bits_of_a_room_with_the_area_of_the_object_are_rejected():
     bits = dataclasses.replace(halves[0], vertices=apart, faces=faces)
     assert bits.area == pytest.approx(LOST.area, rel=0.1)
     with pytest.raises(DetectionError, match=r"spreads by 5\d cm about its centre \(root mean square\), not by 11 cm"):
-        LossMonitor(Settings(), LIMITS).check_size(bits, LOST)
+        LossMonitor(Settings(), LIMITS).check_likeness(bits, LOST)
+
+
+def test_what_has_other_colors_is_rejected_and_a_part_of_the_object_in_other_light_is_not():
+    red, grey = np.full((len(LOST.vertices), 3), (180.0, 60.0, 40.0)), np.full((len(LOST.vertices), 3), 120.0)
+    grey[::5] = red[::5]
+
+    def seen(colors: np.ndarray) -> Mesh:
+        return dataclasses.replace(LOST, appearance={"color": colors.astype(np.float32)})
+
+    monitor = LossMonitor(Settings(), LIMITS)
+    monitor.check_likeness(seen(grey / 2), seen(grey))
+    monitor.check_likeness(seen(np.where(np.arange(len(red))[:, None] % 5, grey, np.nan)), seen(grey))
+    with pytest.raises(
+        DetectionError, match=r"what is in sight shares \d+% of its colours in color with the lost object"
+    ):
+        monitor.check_likeness(seen(red), seen(grey))
 
 
 def without_object(k: int, frames: list[Frame]) -> list[Frame]:
