@@ -9,8 +9,8 @@ from abs_service.pairing.synchroniser import Synchroniser
 from abs_service.tracker.detection.templates import first_image
 from abs_service.tracker.detection.templates.base import BindsToMesh
 from abs_service.tracker.measurements import measurement
+from abs_service.tracking.observer import streams
 from abs_service.tracking.plan import Plan
-from abs_service.tracking.session import streams
 from calib.camera import Camera
 from calib.no_return import CAUTIOUS, NoReturn
 from calib.noise.base import DepthNoise, ImageNoise, Mapped

@@ -10,7 +10,7 @@ from abs_service.api import checks
 from abs_service.api.checks import ArgumentError
 from abs_service.pairing.images import BAYER_ORDERS
 from abs_service.tracker.measurements import measurement
-from abs_service.tracking.session import streams
+from abs_service.tracking.observer import streams
 from calib.camera import Camera
 from calib.noise.base import DepthNoise
 from calib.noise.images.grey import GaussianGrey

@@ -19,7 +19,8 @@ from abs_service.api.region_or_mask import RegionOrMask
 from abs_service.api.replayable import Replayable
 from abs_service.pairing.observation import ObservationError
 from abs_service.tracker.detection.initial_detection import DetectionError
-from abs_service.tracking.session import TrackingSession, missing_streams
+from abs_service.tracking.observer import missing_streams
+from abs_service.tracking.session import TrackingSession
 from abs_service.tracking.tracked_sets import track_sets
 from abs_service.tracking.warmup.board import warm_up
 from calib.camera import Camera

@@ -1,9 +1,11 @@
 """Observations from frame sets: every sensor's frames are decoded as its kind of measurement says."""
 
+from collections.abc import Collection, Iterable
+
 from abs_service.pairing.images import Image
 from abs_service.pairing.observation import Observation, Source, check_size
 from abs_service.tracker.measurements import measurement
-from calib.rig import Rig
+from calib.rig import Rig, Sensor
 from drivers.contract.frame import Frame, FrameSet
 
 
@@ -38,3 +40,14 @@ class Observer:
 
 def _source(frame: Frame) -> Source:
     return Source(frame.seq, frame.t_host_ns, frame.t_sigma_ns)
+
+
+def streams(sensors: Iterable[Sensor]) -> list[tuple[str, str]]:
+    """The (head, stream) of every image that the sensors' noise models require; streams are named after their kind."""
+    needed = ((sensor.head, kind.value) for sensor in sensors for kind in measurement(sensor.noise).frames)
+    return list(dict.fromkeys(needed))
+
+
+def missing_streams(sensors: Iterable[Sensor], there: Collection[str]) -> list[str]:
+    """Streams of the sensors that a recording lacks, as "sensor/stream"."""
+    return [name for head, stream in streams(sensors) if (name := f"{head}/{stream}") not in there]

@@ -1,10 +1,13 @@
 """A tracker over time: initial detection, tracking, loss and renewed detection."""
 
 from collections import deque
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from enum import Enum, auto
 from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from abs_service.pairing.observation import Observation
 from abs_service.tracker.appearance import with_appearance
@@ -14,18 +17,18 @@ from abs_service.tracker.detection.plausibility import ExtentError, mesh_warning
 from abs_service.tracker.detection.regions.base import Region
 from abs_service.tracker.detection.segmentation import detect_object
 from abs_service.tracker.estimate import Estimate, Status, initializing
-from abs_service.tracker.measurements import measurement
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import DeformationModel, ModelError
 from abs_service.tracker.tracker import Tracker
 from abs_service.tracking.monitors import loss_monitor
 from abs_service.tracking.monitors.appearance_monitor import AppearanceMonitor
+from abs_service.tracking.monitors.first_view import FirstView
 from abs_service.tracking.monitors.growth_monitor import LEAST_GROWTH, GrowthMonitor
 from abs_service.tracking.observer import Observer
 from abs_service.tracking.offsets.vertex_offsets import FixedOffsets, VertexOffsets
 from abs_service.tracking.plan import Plan, build_template, derived, make_tracker
 from calib.noise.base import ImageNoise
-from calib.rig import Rig, Sensor
+from calib.rig import Rig
 from drivers.contract.frame import FrameSet
 
 
@@ -54,10 +57,11 @@ class _Failure(NamedTuple):
 
 
 class _Built(NamedTuple):
-    """A tracker of a detected object, its mesh, and doubts about the object."""
+    """A tracker of a detected object, its mesh, the image that both are of, and doubts about the object."""
 
     tracker: Tracker
     mesh: Mesh
+    view: FirstView
     warnings: tuple[str, ...]
 
 
@@ -81,6 +85,8 @@ class TrackingSession:
         self._template = build_template(plan.template, plan.vertices)
         self._observer = Observer(rig)
         self._tracker: Tracker | None = None
+        self._view: FirstView | None = None
+        self._vertices: NDArray[np.floating] = np.zeros((0, 3))
         self._vertex_offsets: VertexOffsets = FixedOffsets()
         self._loss_monitor = loss_monitor.LossMonitor(plan.reinitialization, plan.status)
         self._growth_monitor = GrowthMonitor(plan.reinitialization.grow_s)
@@ -121,6 +127,7 @@ class TrackingSession:
         if self._tracker is None:
             return initializing(observation, failure.reasons, failure.warnings)
         estimate = self._loss_monitor.with_hysteresis(self._tracker.track(observation, in_time))
+        self._vertices = estimate.vertices
         warned = (*self._warnings, *self._appearance_monitor.warnings)
         if estimate.status == Status.TRACKING:
             self._learn(self._tracker, estimate, observation)
@@ -199,9 +206,11 @@ class TrackingSession:
         tracker.relocate(detection.points)
 
     def _renew(self, old: Mesh, observation: Observation) -> None:
-        """Replaces the mesh by a new one of about the same size and colours."""
+        """Replaces the mesh by a new one of about the same size and colours, or with sides that the first image hid."""
         built = self._build(observation, self._region)
-        self._loss_monitor.check_likeness(built.mesh, old)
+        grown = built.mesh.area > LEAST_GROWTH * old.area and not self._loss_monitor.is_lost
+        if not (grown and self._view is not None and self._view.hid(built.mesh, self._vertices)):
+            self._loss_monitor.check_likeness(built.mesh, old)
         self._adopt(built, observation)
         self._loss_monitor.restart("a new mesh was made")
 
@@ -220,7 +229,8 @@ class TrackingSession:
         self._vertex_offsets.update(observation.images.get(self._plan.reference), surface, observation.t_host_ns)
 
     def _adopt(self, built: _Built, observation: Observation) -> None:
-        self._tracker, self.mesh, self._warnings = built
+        self._tracker, self.mesh, self._view, self._warnings = built
+        self._vertices = built.mesh.vertices
         self.made_ns = observation.t_host_ns
         self._vertex_offsets = self._plan.vertex_offsets.build(
             built.tracker.model, self._rig.sensors[self._plan.reference]
@@ -236,15 +246,4 @@ class TrackingSession:
     def _build(self, observation: Observation, region: Region) -> _Built:
         detection = self._detection(observation, region)
         tracker, mesh = make_tracker(self._plan, self._template, self._rig, detection, observation)
-        return _Built(tracker, mesh, warnings(detection) + mesh_warnings(mesh))
-
-
-def streams(sensors: Iterable[Sensor]) -> list[tuple[str, str]]:
-    """The (head, stream) of every image that the sensors' noise models require; streams are named after their kind."""
-    needed = ((sensor.head, kind.value) for sensor in sensors for kind in measurement(sensor.noise).frames)
-    return list(dict.fromkeys(needed))
-
-
-def missing_streams(sensors: Iterable[Sensor], there: Collection[str]) -> list[str]:
-    """Streams of the sensors that a recording lacks, as "sensor/stream"."""
-    return [name for head, stream in streams(sensors) if (name := f"{head}/{stream}") not in there]
+        return _Built(tracker, mesh, FirstView(detection, mesh), warnings(detection) + mesh_warnings(mesh))

@@ -17,7 +17,8 @@ from abs_service import config, wiring
 from abs_service.pairing.synchroniser import Synchroniser
 from abs_service.tracker.estimate import Estimate
 from abs_service.tracking.log.truth import closest_points
-from abs_service.tracking.session import TrackingSession, streams
+from abs_service.tracking.observer import streams
+from abs_service.tracking.session import TrackingSession
 from calib.rig import Rig
 from drivers.simulated import address
 from drivers.simulated.simulation import Simulation

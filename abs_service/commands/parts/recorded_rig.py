@@ -5,7 +5,7 @@ from pathlib import Path
 from abs_service import config, wiring
 from abs_service.commands.parts import preview_option
 from abs_service.pairing.synchroniser import Synchroniser
-from abs_service.tracking.session import missing_streams
+from abs_service.tracking.observer import missing_streams
 from calib.rig import Rig
 from drivers.contract.frame import Frame
 from drivers.replay import Recording

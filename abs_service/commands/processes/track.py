@@ -33,8 +33,9 @@ from abs_service.tracking.live.estimate_publisher import EstimatePublisher
 from abs_service.tracking.live.live_tracker import LiveTracker
 from abs_service.tracking.live.tracker_health import TrackerHealth
 from abs_service.tracking.monitors.calibration_monitor import CalibrationMonitor
+from abs_service.tracking.observer import streams
 from abs_service.tracking.plan import Plan
-from abs_service.tracking.session import TrackingSession, streams
+from abs_service.tracking.session import TrackingSession
 from abs_service.tracking.warmup.board import is_undistorted, load_cached, warm_up
 from abs_service.wire import commands
 from abs_service.wire.checked_bus import CheckedBus

@@ -7,8 +7,9 @@ import numpy as np
 
 from abs_service.tracker.detection.regions import nearest
 from abs_service.tracker.detection.templates import first_image
+from abs_service.tracking.observer import streams
 from abs_service.tracking.plan import Plan
-from abs_service.tracking.session import TrackingSession, streams
+from abs_service.tracking.session import TrackingSession
 from abs_service.tracking.warmup.ahead import NotCachedError, Progress, cached_only, compiled_ahead, ignore
 from calib.camera import Camera
 from calib.noise.base import DepthNoise

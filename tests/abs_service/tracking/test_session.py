@@ -9,7 +9,8 @@ from abs_service.tracker.estimate import Status
 from abs_service.tracker.models import rigid
 from abs_service.tracker.objectives import euclidean
 from abs_service.tracker.optimizers import cma, cma_es, hybrid
-from abs_service.tracking.session import TrackingSession, streams
+from abs_service.tracking.observer import streams
+from abs_service.tracking.session import TrackingSession
 from abs_service.tracking.warmup.board import warm_up
 from drivers.contract.frame import Frame, Kind
 from drivers.simulated.sensors.view import View

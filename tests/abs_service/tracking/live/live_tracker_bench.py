@@ -19,7 +19,8 @@ from abs_service.tracker.optimizers import cma
 from abs_service.tracking.live.estimate_publisher import EstimatePublisher
 from abs_service.tracking.live.live_tracker import LiveTracker
 from abs_service.tracking.live.tracker_health import TrackerHealth
-from abs_service.tracking.session import TrackingSession, streams
+from abs_service.tracking.observer import streams
+from abs_service.tracking.session import TrackingSession
 from drivers.contract.frame import Kind
 from drivers.encoding import codec
 from tests.abs_service.bus.loopback import LoopbackBus

@@ -25,7 +25,8 @@ from numba.core.dispatcher import Dispatcher
 from pathlib import Path
 from abs_service import config, wiring
 from abs_service.config import plugins
-from abs_service.tracking.session import TrackingSession, streams
+from abs_service.tracking.observer import streams
+from abs_service.tracking.session import TrackingSession
 from abs_service.pairing.synchroniser import Synchroniser
 from abs_service.tracking.warmup.board import warm_up
 from drivers.simulated import address
