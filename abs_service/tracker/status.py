@@ -15,7 +15,7 @@ from abs_service.tracker.shape_quality import ShapeQuality
 from abs_service.tracker.terms.base import MIN_RIM, RimFit, SensorFit, inlier_share, occluded_share
 from abs_service.tracker.terms.vertex_counts import VertexCounts
 
-#: With fewer vertices that agree or disagree with a sensor, their share says nothing.
+#: With fewer vertices that agree or disagree with a sensor, or should, their share says nothing.
 MIN_JUDGED = 20
 
 
@@ -28,7 +28,7 @@ class Settings:
         lost_below: inlier share below which the object is LOST.
         degraded_agreeing: share that agrees with a measurement, of the vertices that should be in sight, below which an
             estimate is DEGRADED, in the sensor in which most do. Vertices without return, behind an occluder or outside
-            the image count against it.
+            the image count against it. As large a share has to be inside the image of a depth sensor.
         degraded_occluded: occluded share above which an estimate is DEGRADED, in the sensor that sees most.
         degraded_rim: share of the visible free edges that lie off the outline above which an estimate is DEGRADED.
         degraded_rim_m: distance of the visible free edges from the outline, mean of all or of those across a slide,
@@ -99,11 +99,16 @@ def _seen(fits: Sequence[SensorFit], lost: bool, limits: Settings) -> Iterator[s
             f"only {counts.agreeing / counts.expected:.0%} of the vertices that should be in sight agree with a "
             f"measurement, {counts.share(cause):.0%} of all {_ABSENT[cause]}"
         )
+    elif (outside := outside_share(fits)) > 1 - limits.degraded_agreeing:
+        yield (
+            f"{outside:.0%} of the vertices that should be in sight are outside the depth image, where nothing says "
+            "how far they are – bring the object back into it"
+        )
 
 
 def _contradicted(fits: Sequence[SensorFit]) -> Iterator[str]:
     """Reasons by sensors of distances most of which contradict the others: colours that agree do not outvote them."""
-    for fit in (fit for fit in fits if fit.is_surprised or np.isfinite(fit.remainder.at_first)):
+    for fit in _of_distances(fits):
         judged = fit.counts.agreeing + fit.counts.disagreeing
         if judged >= MIN_JUDGED and fit.counts.agreeing < judged / 2:
             yield f"only {fit.counts.agreeing / judged:.0%} of the distances of {fit.sensor} agree – {_FOLLOW}"
@@ -180,6 +185,20 @@ def most_agreeing(fits: Sequence[SensorFit]) -> VertexCounts:
     """Counts of the sensor in which the largest share of what should be in sight agrees; zeros without any."""
     counts = (fit.counts for fit in fits if fit.counts.expected)
     return max(counts, key=lambda one: one.agreeing / one.expected, default=VertexCounts())
+
+
+def outside_share(fits: Sequence[SensorFit]) -> float:
+    """Share outside the depth image of what should be in sight; the smallest of the sensors of distances, 0 without.
+
+    Within a hole of an image the surface around it holds a vertex, and its colour. Beyond the border nothing is around
+    it, and a colour says where it is across the line of sight at best; on a plain surface not even that.
+    """
+    counts = (fit.counts for fit in _of_distances(fits) if fit.counts.expected >= MIN_JUDGED)
+    return min((one.outside / one.expected for one in counts), default=0.0)
+
+
+def _of_distances(fits: Sequence[SensorFit]) -> list[SensorFit]:
+    return [fit for fit in fits if fit.is_surprised or np.isfinite(fit.remainder.at_first)]
 
 
 def unexplained_share(fits: Sequence[SensorFit]) -> float:

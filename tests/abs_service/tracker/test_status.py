@@ -90,6 +90,19 @@ def test_of_the_vertices_that_should_be_in_sight_half_have_to_agree_in_one_senso
     assert judge(both, (), SHAPE, 0.0, SETTINGS) == (Status.TRACKING, ())
 
 
+def test_colors_of_an_object_that_left_the_depth_image_do_not_make_up_for_its_distances():
+    """Those of a white table agree wherever it is."""
+    colors = seen(agreeing=65, outside=35)
+    near, far = (replace(seen(agreeing=k, outside=100 - k), remainder=Remainder(0.1, 0.1)) for k in (55, 45))
+    assert judge([near, colors], (), SHAPE, 0.0, SETTINGS)[0] == Status.TRACKING
+    assert judge([far, near, colors], (), SHAPE, 0.0, SETTINGS)[0] == Status.TRACKING
+    status, reasons = judge([far, colors], (), SHAPE, 0.0, SETTINGS)
+    assert status == Status.DEGRADED
+    assert facts(reasons)[0].startswith("55% of the vertices that should be in sight are outside the depth image")
+    hole = replace(seen(agreeing=45, missing=55), remainder=Remainder(0.1, 0.1))
+    assert judge([hole, colors], (), SHAPE, 0.0, SETTINGS)[0] == Status.TRACKING
+
+
 def test_measured_surface_beyond_the_mesh_degrades_an_estimate_unless_it_was_hidden_at_first():
     def beyond(share: float, **rim: int) -> SensorFit:
         return replace(on_the_rim(visible=60, **rim), remainder=Remainder(share, at_first=0.1))
