@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from abs_service.pairing.images import DepthImage
 from abs_service.pairing.observation import Observation
 from abs_service.tracker.detection.initial_detection import DetectionError
-from abs_service.tracker.detection.plausibility import ExtentError, mesh_warnings, warnings
+from abs_service.tracker.detection.plausibility import ExtentError, doubts
 from abs_service.tracker.detection.regions.base import Region
 from abs_service.tracker.detection.segmentation import detect_object
 from abs_service.tracker.detection.templates.base import Template
@@ -120,15 +120,12 @@ def _look(
         selected = np.isfinite(detection.distance)
         tracker, _ = make_tracker(plan, template, rig, detection, observation)
     except (DetectionError, ModelError) as error:
-        doubts = (str(error),) if isinstance(error, ExtentError) else ()
-        return Preview(number, camera, image.distance, selected, None, str(error), doubts)
+        warned = (str(error),) if isinstance(error, ExtentError) else ()
+        return Preview(number, camera, image.distance, selected, None, str(error), warned)
     model, first = tracker.model, tracker.track(observation, lambda: True)
     surface = model.deform(model.rest[None])
     rim, classes = classified_rim(camera, model.mesh, surface, detection.surroundings)
     found = FoundMesh(model.mesh, surface.vertices[0].T.astype(np.float64), rim.outer, classes)
-    doubts = (
-        warnings(detection)
-        + mesh_warnings(model.mesh)
-        + tuple(f"it would begin {first.status}: {reason}" for reason in first.reasons)
-    )
-    return Preview(number, camera, image.distance, selected, found, "", doubts, derived(plan, model))
+    early = tuple(f"it would begin {first.status}: {reason}" for reason in first.reasons)
+    warned = doubts(detection, model.mesh, observation.images, rig) + early
+    return Preview(number, camera, image.distance, selected, found, "", warned, derived(plan, model))

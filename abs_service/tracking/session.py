@@ -13,7 +13,7 @@ from abs_service.pairing.observation import Observation
 from abs_service.tracker.appearance import with_appearance
 from abs_service.tracker.detection.grid_mesh import grid_mesh
 from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection, UndecidedError
-from abs_service.tracker.detection.plausibility import ExtentError, mesh_warnings, warnings
+from abs_service.tracker.detection.plausibility import ExtentError, doubts
 from abs_service.tracker.detection.regions.base import Region
 from abs_service.tracker.detection.segmentation import detect_object
 from abs_service.tracker.estimate import Estimate, Status, initializing
@@ -246,4 +246,5 @@ class TrackingSession:
     def _build(self, observation: Observation, region: Region) -> _Built:
         detection = self._detection(observation, region)
         tracker, mesh = make_tracker(self._plan, self._template, self._rig, detection, observation)
-        return _Built(tracker, mesh, FirstView(detection, mesh), warnings(detection) + mesh_warnings(mesh))
+        warned = doubts(detection, mesh, observation.images, self._rig)
+        return _Built(tracker, mesh, FirstView(detection, mesh), warned)

@@ -1,10 +1,15 @@
 """Plausibility of a detected object: refuses impossible sizes, warns of a region that looks like the scene."""
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
+from abs_service.pairing.images import Image
+from abs_service.tracker.detection.image_alignment import alignment_warnings
 from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection
 from abs_service.tracker.mesh import Mesh, pieces_of
+from calib.rig import Rig
 
 #: Range of the extent of an object [m]; outside, the distances have the wrong unit.
 SMALLEST_M, LARGEST_M = 0.005, 20.0
@@ -66,6 +71,18 @@ def is_scene(surface: NDArray[np.bool_], measured: NDArray[np.bool_]) -> bool:
         return False
     rows, columns = np.nonzero(surface)
     return _spans(columns, surface.shape[1]) or _spans(rows, surface.shape[0])
+
+
+def doubts(detection: InitialDetection, mesh: Mesh, images: Mapping[str, Image], rig: Rig) -> tuple[str, ...]:
+    """All doubts about an object that was found, the mesh that was made of it, and the cameras that show it.
+
+    Args:
+        detection: the object.
+        mesh: made of it.
+        images: of the same moment, by sensor.
+        rig: the sensors.
+    """
+    return warnings(detection) + mesh_warnings(mesh) + alignment_warnings(detection, images, rig)
 
 
 def mesh_warnings(mesh: Mesh) -> tuple[str, ...]:
