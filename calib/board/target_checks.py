@@ -15,4 +15,6 @@ def check_counts(columns: int, rows: int, least: int) -> None:
 def check_length(name: str, length: float) -> None:
     """Checks a length [m]."""
     if not 1e-4 <= length <= 10:
-        raise TargetError(f"{name}: {length:g} m must be from 0.0001 to 10 m; lengths are in metres")
+        raise TargetError(
+            f"{name}: {length:g} m must be from 0.0001 to 10 m; {name}_mm is in millimetres, {name} in metres"
+        )

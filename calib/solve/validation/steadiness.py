@@ -65,7 +65,7 @@ class Change:
 def changes_of_optics(solution: Solution, needed_px: float) -> list[Change]:
     """Sensors whose focal length or principal point changed, by at least half of `needed_px` [px] in the image."""
     found = []
-    for name, directions in _optics(solution):
+    for name, directions in optics(solution):
         if split := _split(solution, directions):
             shot, values = split
             shift = _rms(values[0] * _from_middle(solution, name) + values[1:])
@@ -88,15 +88,15 @@ def changes_of_place(solution: Solution, needed_px: float) -> list[Change]:
 def focal_scatter(solution: Solution, needed_px: float) -> dict[str, float]:
     """Deviation of the focal length from shot to shot [1], of the sensors in which it is not steady."""
     found = {}
-    for name, directions in _optics(solution):
-        information, scores = _once(solution.adjustment.pose_information)
+    for name, directions in optics(solution):
+        information, scores = once(solution.adjustment.pose_information)
         if len(scores) < 2 * LEAST:
             continue
         taken = linalg.inv(information.sum(axis=0) + solution.adjustment.pose_information.prior)
         own = information - information @ taken @ information
         focal = directions[:, 0]
         weights = np.maximum(focal @ own @ focal, 1e-12)
-        ratio = float(np.mean((scores @ focal) ** 2 / weights)) / _disagreement(own, scores)
+        ratio = float(np.mean((scores @ focal) ** 2 / weights)) / disagreement(own, scores)
         estimates = scores @ focal / weights
         middle = np.average(estimates, weights=weights)
         excess = float(np.sum(weights * (estimates - middle) ** 2)) - (len(scores) - 1)
@@ -107,7 +107,7 @@ def focal_scatter(solution: Solution, needed_px: float) -> dict[str, float]:
     return found
 
 
-def _disagreement(information: Array, scores: Array) -> float:
+def disagreement(information: Array, scores: Array) -> float:
     """Mean squared score of the poses, in deviations that noise alone would have."""
     found = []
     for own, score in zip(information, scores, strict=True):
@@ -117,7 +117,7 @@ def _disagreement(information: Array, scores: Array) -> float:
     return max(float(np.mean(found)), 1.0)
 
 
-def _optics(solution: Solution) -> Iterator[tuple[str, Array]]:
+def optics(solution: Solution) -> Iterator[tuple[str, Array]]:
     """Sensors with a free focal length, and directions (k, 1 to 3) of it (relative) and of cx and cy."""
     layout = solution.adjustment.layout
     for name, free in layout.free_parameters.items():
@@ -130,7 +130,7 @@ def _optics(solution: Solution) -> Iterator[tuple[str, Array]]:
             yield name, directions
 
 
-def _once(poses: PoseInformation) -> tuple[Array, Array]:
+def once(poses: PoseInformation) -> tuple[Array, Array]:
     """Information (poses, k, k) and scores (poses, k), as if every distinct pose had been seen once."""
     return poses.information / poses.repeats[:, None, None], poses.scores / poses.repeats[:, None] / poses.efficiency
 
@@ -142,7 +142,7 @@ def _split(solution: Solution, directions: Array) -> tuple[int, Array] | None:
     if len(numbers) < 2 * LEAST:
         return None
     order = np.argsort(first)
-    information, scores = (part[order] for part in _once(adjustment.pose_information))
+    information, scores = (part[order] for part in once(adjustment.pose_information))
     lower = linalg.cholesky(information.sum(axis=0) + adjustment.pose_information.prior, lower=True)
     whole = linalg.solve_triangular(lower, np.eye(len(lower)), lower=True) @ information @ directions
     own, pulls = directions.T @ information @ directions, scores @ directions

@@ -1,0 +1,58 @@
+"""Images of two cameras, or turned, mirrored or cropped ones, among a camera's images are named; other sets are not."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from calib.board.views import CornerView
+from calib.solve.bundle.tasks import SensorTask, Task
+from calib.solve.calibrate import calibrate
+from calib.solve.solution import Solution
+from calib.solve.validation.groups import groups
+from calib.solve.validation.verdict import assess
+from tests.calib.solve import board_views
+from tests.calib.solve.test_steadiness import SIZE, views
+
+ODD = (2, 3, 7, 11, 12, 16, 20, 21)
+
+
+def turned(view: CornerView) -> CornerView:
+    return replace(view, pixels=(SIZE[0] - 1, SIZE[1] - 1) - view.pixels)
+
+
+def mirrored(view: CornerView) -> CornerView:
+    """As a detector numbers the corners of a chessboard that it sees in a mirror: along the rows, from the left."""
+    pixels = np.stack([SIZE[0] - 1 - view.pixels[:, 0], view.pixels[:, 1]], axis=1)
+    across = (board_views.COLUMNS - 1) * board_views.SQUARE - view.points_b[:, 0]
+    return replace(view, pixels=pixels, points_b=np.column_stack([across, view.points_b[:, 1:]]))
+
+
+def of_another_camera(view: CornerView) -> CornerView:
+    return replace(view, pixels=view.pixels - (-7, 5))
+
+
+@cache
+def solved(change: Callable[[CornerView], CornerView]) -> Solution:
+    seen = [change(view) if view.shot in ODD else view for view in views()]
+    inside = [view for view in seen if np.all((view.pixels > 0) & (view.pixels < np.array(SIZE) - 1))]
+    return calibrate(Task({"color": SensorTask(*SIZE)}, inside, (), "color"))
+
+
+def test_images_of_one_camera_are_one_group() -> None:
+    assert not groups(solved(replace), 1.0)
+
+
+@pytest.mark.parametrize("change", [turned, mirrored, of_another_camera])
+def test_images_that_are_unlike_the_others_are_named(change: Callable[[CornerView], CornerView]) -> None:
+    solution = solved(change)
+    (found,) = groups(solution, 1.0)
+    assert len(set(found.shots) ^ set(ODD)) <= 1
+
+
+def test_the_verdict_names_them_and_how_to_leave_them_out() -> None:
+    verdict = assess(solved(turned), 1.0, 1.0).verdict
+    assert verdict.startswith("Do not trust it yet: color: shots 2,3,7,")
+    assert verdict.endswith("leave one out: --skip 2,3,7,11,12,16,20,21")
