@@ -40,7 +40,9 @@ def check(content: bytes) -> tuple[int, int]:
                 width, height = image.size
     except Image.DecompressionBombError:
         raise ImageSizeError(f"more than the {MAX_PIXELS} pixels that are allowed") from None
-    except (UnidentifiedImageError, OSError, ValueError, SyntaxError, EOFError, ArithmeticError) as error:
+    except UnidentifiedImageError:
+        raise ImageSizeError("no image of a known format" if content else "it is empty") from None
+    except (OSError, ValueError, SyntaxError, EOFError, ArithmeticError) as error:
         raise ImageSizeError(f"no image with a known size: {type(error).__name__}") from error
     if width * height > MAX_PIXELS:
         raise ImageSizeError(f"{width} × {height} pixels, {MAX_PIXELS} are allowed")

@@ -1,4 +1,4 @@
-"""One sentence on images of which none shows the board: their number, and the reasons by frequency."""
+"""Clauses on images that do not show the board: their number, and the reasons by frequency."""
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
@@ -38,15 +38,33 @@ def reason(target: Target, seen: BoardObservations, shown: Sequence[Shot]) -> st
     count = len(seen.rejected)
     parts = reasons(seen.rejected.values())
     advice = f". {STILLS}" if mostly_moved(seen) else ""
-    found = _instead(target, shown)
-    found = f". {found}: correct the description of the board, or the images" if found else ""
-    return f"no {_name(target)} in any of {count} images: {parts}{found}{advice}"
+    other = f". {said}" if (said := instead(target, shown)) else ""
+    return f"no {_name(target)} in any of {count} images: {parts}{other}{advice}"
+
+
+def instead(target: Target, shown: Sequence[Shot]) -> str:
+    """Clause on what shots show in place of the described board, and what to do; "" if that is not clear."""
+    said = _instead(target, shown)
+    return f"{said}: correct the description of the board, or the images" if said else ""
 
 
 def mostly_moved(seen: BoardObservations) -> bool:
     """True if most rejected images seem to show a board that moves."""
     moved = sum(isinstance(error, errors.MovedError) for error in seen.rejected.values())
     return 2 * moved > len(seen.rejected)
+
+
+def found(new: BoardObservations) -> str:
+    """Sensors that see the board in a shot, and why others do not."""
+    parts = [view.sensor for view in new.corners]
+    parts += [f"not {sensor} ({_WORDS[type(error)]})" for (_, sensor), error in new.rejected.items()]
+    return ", ".join(parts) or "no board"
+
+
+def unused(sensor: str, seen: BoardObservations) -> str:
+    """End of a sentence on the images of a sensor that are used, with the reasons of the others; "" without any."""
+    errors_ = [error for (_, name), error in seen.rejected.items() if name == sensor]
+    return f"; not used: {reasons(errors_)}" if errors_ else ""
 
 
 def reasons(errors_: Iterable[Exception]) -> str:

@@ -77,7 +77,7 @@ def material(arguments: argparse.Namespace) -> Material:
             if is_live and not live.adds(new, seen):
                 continue
             seen += new
-            say(f"shot {shot.number}: {', '.join(view.sensor for view in new.corners) or 'no board'}")
+            say(f"shot {shot.number}: {unseen.found(new)}")
             if is_live and live.views(seen) >= arguments.shots:
                 break
     if shown and not seen.corners:
@@ -85,7 +85,8 @@ def material(arguments: argparse.Namespace) -> Material:
     corner_file.write(seen, corner_file.path_beside(arguments.out))
     if arguments.corners is not None:
         mrcal_corners.write(seen, target, arguments.corners)
-    return _checked(seen, known, data)
+    other = unseen.instead(target, shown) if len(seen.rejected) > len(seen.corners) else ""
+    return _checked(seen, known, data, other)
 
 
 def _saved(arguments: argparse.Namespace, target: Target, known: Mapping[str, SensorCalibration]) -> BoardObservations:
@@ -103,15 +104,21 @@ def _saved(arguments: argparse.Namespace, target: Target, known: Mapping[str, Se
     return mrcal_corners.read(arguments.source, target, patterns, sizes)
 
 
-def _checked(seen: BoardObservations, known: Mapping[str, SensorCalibration], data: tuple[Path, ...]) -> Material:
-    """Views that are enough for a calibration, with equal deviations."""
+def _checked(
+    seen: BoardObservations, known: Mapping[str, SensorCalibration], data: tuple[Path, ...], other: str = ""
+) -> Material:
+    """Views that are enough for a calibration, with equal deviations; `other` says what the images may show instead."""
     try:
         coverage.check(view for view in seen.corners)
     except coverage.TooFewViewsError as error:
-        raise UnusableImagesError(f"{error}. {unseen.STILLS}" if unseen.mostly_moved(seen) else str(error)) from error
+        unused = f"Not used: {unseen.reasons(seen.rejected.values())}" if seen.rejected else ""
+        advice = unseen.STILLS if unseen.mostly_moved(seen) else ""
+        raise UnusableImagesError(". ".join(filter(None, (str(error), unused, other, advice)))) from error
+    if other:
+        say(other)
     for sensor, count in counts_of(seen.corners, distinct_poses(seen.corners, seen.sizes)).items():
         images = sum(view.sensor == sensor for view in seen.corners)
-        say(f"{sensor}: {count} distinct poses of the board in {images} images")
+        say(f"{sensor}: {count} distinct poses of the board in {images} images{unseen.unused(sensor, seen)}")
     return Material(replace(seen, corners=tuple(shared(seen.corners))), known, data)
 
 

@@ -103,3 +103,31 @@ def test_a_truncated_image_is_named(said, tmp_path: Path, suffix: str) -> None:
     assert f"c_1.{suffix}: the image is truncated" in said(
         Chessboard(9, 6, 0.025), "--images", f"color={tmp_path}/c_*.{suffix}"
     )
+
+
+def test_images_that_are_not_used_are_said_with_the_reason(said, tmp_path: Path) -> None:
+    board = Chessboard(8, 5, 0.03)
+    for number in range(4):
+        image = as_bytes(photograph(board, VGA, centered(board, (0.3, 0.1 * number, 0.2 * number), 0.5)))
+        cv2.imwrite(str(tmp_path / f"c_{number}.png"), cv2.GaussianBlur(image, (0, 0), 4.0 if number else 0.5))
+    error = said(board, "--images", f"color={tmp_path}/c_*.png")
+    assert "shot 0: color\n  shot 1: not color (blurred)\n" in error
+    assert "to be reliable. Not used: blurred in 3" in error
+
+
+@pytest.mark.parametrize(("content", "why"), [(b"", "it is empty"), (b"<html>", "no image of a known format")])
+def test_a_file_that_is_no_image_is_said_in_plain_words(said, tmp_path: Path, content: bytes, why: str) -> None:
+    (tmp_path / "c_0.png").write_bytes(content)
+    error = said(Chessboard(8, 5, 0.03), "--images", f"color={tmp_path}/c_*.png")
+    assert f"c_0.png: cannot be read as an image, {why}; PNG" in error
+
+
+def test_a_board_of_which_too_few_images_show_a_part_is_named(said, tmp_path: Path) -> None:
+    board = Chessboard(9, 6, 0.025)
+    for number in range(3):
+        shown = Chessboard(9, 5, 0.025) if number == 1 else board
+        image = as_bytes(photograph(shown, VGA, centered(board, (0.2, 0.1, 0.3 * number), 0.4)))
+        cv2.imwrite(str(tmp_path / f"c_{number}.png"), image)
+    error = said(Chessboard(9, 5, 0.025), "--images", f"color={tmp_path}/c_*.png")
+    assert "Not used: " in error
+    assert "2 images show a board of 9 × 6 inner corners: correct the description" in error
