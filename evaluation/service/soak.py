@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
+from abs_service.recording.disk import disk_watch
 from abs_service.report.content import Column, Section, Table
 from evaluation.experiment import Context, Findings, Goal, UnavailableError, at_most
 from evaluation.service.faults import fault, folders, messages, processes
@@ -147,7 +148,8 @@ def _flat(name: str, slope: tuple[float, float]) -> tuple[Goal, Goal]:
 
 
 def _check_room(folder: Path, minutes: float) -> None:
-    needed, free = round(minutes * 60 * RECORDED_BYTES_S), shutil.disk_usage(folder).free
+    # With less than an hour's room, the recorder warns of a full disk, and no fault ends.
+    needed, free = round((minutes * 60 + disk_watch.WARN_S) * RECORDED_BYTES_S), shutil.disk_usage(folder).free
     if needed > free:
         raise UnavailableError(
             f"{folder.parent}: {free / 1e9:.1f} GB are free, the recordings need {needed / 1e9:.1f} GB; make room, or "
