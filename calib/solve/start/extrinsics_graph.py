@@ -73,7 +73,8 @@ def relative_pose(seen: PoseCandidates, a: str, b: str) -> Pose:
         raise ContradictionError(
             f"{a} and {b}: each fits its own corners, to {alone[0]:.2g} and {alone[1]:.2g} px, but only {agreeing} of "
             f"their {len(shots)} common shots agree on where they stand to each other ({agreed}): the images of a shot "
-            "were not taken at the same moment, one of the sensors was moved, or names are mixed up"
+            "were not taken at the same moment, one of the sensors was moved or mirrors its images, or names are mixed "
+            "up"
         )
     return candidates[best]
 

@@ -135,7 +135,7 @@ def _of_optics(one: Change, sensors: int) -> str:
 def _of_focus(sensor: str, deviation: float) -> str:
     return (
         f"{sensor}: its focal length differs by ± {deviation:.1%} from shot to shot: switch autofocus, zoom and image "
-        "stabilisation off"
+        "stabilisation off; if they are, make sure of a flat board, and even, sharp images"
     )
 
 
@@ -160,11 +160,12 @@ def _praise(
 
 
 def _disagreeing(agreements: Sequence[Agreement], needed_px: float) -> list[str]:
+    between = ", if only between the images of a shot" if any("→" in each.of for each in agreements) else ""
     bad = [each for each in agreements if each.ratio > MAX_RATIO and each.difference_px > HARMLESS * needed_px]
     return [
         f"{each.of}: the halves of the shots differ by {each.difference_px:.2g} px where {each.predicted_px:.2g} px "
-        "were predicted; the kind of lens does not fit, the board is not flat, or something moved: take more tilted "
-        "views, and try another kind of lens"
+        f"were predicted; the kind of lens does not fit, the board is not flat, or something moved{between}: "
+        "take more tilted views, and try another kind of lens"
         for each in sorted(bad, key=lambda each: -each.ratio)
     ]
 
