@@ -21,9 +21,10 @@ def checked(shots: Iterable[Shot]) -> Iterator[Shot]:
                 continue
             before, there = first.setdefault((sensor, bool(look.image.size)), (size, _source(shot, look)))
             if size != before:
+                turned = "Was it turned by 90°? Then turn it back, or leave" if size == before[::-1] else "Leave"
                 raise ShotsError(
                     f"{_source(shot, look)}: the image of {sensor} is {_text(size)}, but {_text(before)} in {there}; "
-                    f"all images of a sensor must have one size. Leave out those of the other size, "
+                    f"all images of a sensor must have one size. {turned} out those of the other size, "
                     f"such as by --skip {shot.number}"
                 )
         yield shot

@@ -62,3 +62,10 @@ def test_a_shot_without_an_image_is_no_other_size() -> None:
     assert list(image_sizes.checked(shots)) == shots
     with pytest.raises(ShotsError, match=r"shot 1: the image of tof is 6 × 6 pixels, but 8 × 8 pixels in shot 0"):
         list(image_sizes.checked([shots[0], Shot(1, {"tof": look(6, 4)})]))
+
+
+def test_an_image_that_was_turned_is_told_from_one_of_another_size() -> None:
+    images = [np.zeros(shape, np.uint8) for shape in ((6, 8), (8, 6))]
+    shots = [Shot(number, {"color": SensorShot(0, image, image)}) for number, image in enumerate(images)]
+    with pytest.raises(ShotsError, match=r"Was it turned by 90°\? Then turn it back, or leave out"):
+        list(image_sizes.checked(shots))
