@@ -86,6 +86,8 @@ class FolderShots:
 
     def _files(self, sensor: str, pattern: str) -> dict[int, ImageFile]:
         path = Path(pattern)
+        if path.is_dir():
+            raise ShotsError(f"images of {sensor}: {path} is a folder: name the images in it, such as '{path}/*.png'")
         try:
             files = by_number(path.parent, path.name, rate_hz=1.0, alone=len(self.patterns) == 1)
         except ImageFolderError as error:

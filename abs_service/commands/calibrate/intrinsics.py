@@ -52,7 +52,6 @@ def _sensor(wanted: str | None, found: Material) -> str:
     if wanted is None and len(there) == 1:
         return there[0]
     if wanted not in there:
-        raise SolveOptionError(
-            f"--sensor {wanted or ''}: boards were seen by several, {allowed_instead(wanted or '', there)}"
-        )
+        why = "boards were seen by several" if wanted is None else "no sensor that saw the board"
+        raise SolveOptionError(f"--sensor {wanted or 'NAME'}: {why}, {allowed_instead(wanted or '', there)}")
     return wanted

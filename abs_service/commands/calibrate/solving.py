@@ -7,7 +7,7 @@ import math
 import re
 import sys
 from collections.abc import Collection, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -61,10 +61,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--shots", metavar="N", type=int, default=30, help="different views to wait for, live (%(default)d)"
     )
     parser.add_argument(
-        "--distance", metavar="M", type=float, help="of what will be looked at (default: where the boards were)"
+        "--distance", metavar="M", type=_positive, help="of what will be looked at (default: where the boards were)"
     )
     parser.add_argument(
-        "--needed", metavar="PX", type=float, default=1.0, help="how well projections have to be known (%(default)g)"
+        "--needed",
+        metavar="PX",
+        type=_positive,
+        default=1.0,
+        help="how well projections have to be known (%(default)g)",
     )
     parser.add_argument("--json", action="store_true", help="print one JSON object")
 
@@ -92,6 +96,14 @@ def _add_sources(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--target", metavar="FILE", type=Path, required=True, help="description of the board, TOML")
 
 
+def _positive(text: str) -> float:
+    """A number above 0, of an option."""
+    with suppress(ValueError):
+        if 0 < float(text) < math.inf:
+            return float(text)
+    raise argparse.ArgumentTypeError(f"{text!r} must be a number above 0")
+
+
 def sensor_task(name: str, arguments: argparse.Namespace, found: Material, keeps: bool, **terms: object) -> SensorTask:
     """Task of one sensor, from its image size, previous calibration and options.
 
@@ -101,6 +113,10 @@ def sensor_task(name: str, arguments: argparse.Namespace, found: Material, keeps
     size = found.seen.sizes[name]
     factory = (replace(found.known[name].camera),) if name in found.known else ()
     lenses = named(arguments.lens, "--lens")
+    for other in lenses:
+        if other not in found.seen.sizes:
+            allowed = allowed_instead(other, found.seen.sizes)
+            raise SolveOptionError(f"--lens {other}={lenses[other]}: no sensor that saw the board, {allowed}")
     kind = lenses.get(name, kind_of(factory[0].lens).name if factory else "brown-conrady")
     if kind not in KINDS:
         raise SolveOptionError(f"--lens {name}={kind}: {allowed_instead(kind, KINDS)}")

@@ -1,16 +1,20 @@
 """`calibrate rig` and `calibrate intrinsics` from rendered images to calibration file, report and exit code."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from abs_service import cli
-from abs_service.calibration.files import target_file
+from abs_service.calibration.files import corner_file, target_file
+from abs_service.calibration.shots.corner_extraction import BoardObservations
 from abs_service.commands.calibrate import calibrations
 from calib import pose
+from calib.board.target import Chessboard
 from tests.abs_service.calibration.simulated import Filmed, record, scene
+from tests.calib.solve.board_views import COLUMNS, ROWS, SQUARE, look, random_boards, three_heads
 
 BOARD = scene(
     "chessboard",
@@ -73,3 +77,49 @@ def test_options_that_do_not_fit_are_answered_with_what_would(
     ):
         assert cli.main(arguments) == 2
         assert message in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--lens", "colour=fisheye"], '--lens colour=fisheye: no sensor that saw the board, did you mean "color"?'),
+        (["--sensor", "left"], "--sensor left: no sensor that saw the board, allowed: color"),
+    ],
+)
+def test_options_that_would_be_ignored_are_refused(
+    options: list[str], message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    generator = np.random.default_rng(0)
+    head = replace(three_heads()["color"], camera=replace(three_heads()["color"].camera, T_rs=np.eye(4)))
+    seen = look({"color": head}, random_boards(6, generator), generator).corners
+    target_file.write(Chessboard(COLUMNS, ROWS, SQUARE), tmp_path / "board.toml")
+    corner_file.write(BoardObservations(tuple(seen), sizes={"color": (1280, 720)}), tmp_path / "a.corners.npz")
+    common = ["--target", str(tmp_path / "board.toml"), "--out", str(tmp_path / "x.toml")]
+    assert cli.main(["calibrate", "intrinsics", str(tmp_path / "a.corners.npz"), *common, *options]) == 2
+    assert message in capsys.readouterr().err
+    assert not (tmp_path / "x.toml").exists()
+
+
+def test_a_folder_in_place_of_images_is_answered_with_a_pattern(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    target_file.write(Chessboard(COLUMNS, ROWS, SQUARE), tmp_path / "board.toml")
+    arguments = [
+        "--images",
+        f"color={tmp_path}",
+        "--target",
+        str(tmp_path / "board.toml"),
+        "--out",
+        str(tmp_path / "x"),
+    ]
+    assert cli.main(["calibrate", "intrinsics", *arguments]) == 2
+    assert f"{tmp_path} is a folder: name the images in it" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("option", "value"), [("--needed", "nan"), ("--needed", "0"), ("--distance", "-1")])
+def test_an_accuracy_or_distance_that_is_none_is_refused(
+    option: str, value: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        cli.main(["calibrate", "intrinsics", "a.mcap", "--target", "board.toml", "--out", "x.toml", option, value])
+    assert f"argument {option}: '{value}' must be a number above 0" in capsys.readouterr().err
