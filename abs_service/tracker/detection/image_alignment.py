@@ -32,8 +32,8 @@ LEAST = 4.0
 
 #: It has to stand out from all others that are looked for by so many standard deviations, and those of this share of so
 #: many random halves of the cells have to be so near to it [px, root mean square]. Of 2033 depth images, each beside an
-#: image of another scene, 22 reach the first limit, two the second, and none both.
-DEVIATIONS, SHARE, HALVES, AGREEMENT = 6.0, 0.9, 60, 2.0
+#: image of another scene, 22 reach the first limit, three the second, and none both.
+DEVIATIONS, SHARE, HALVES, AGREEMENT = 6.0, 0.9, 60, 3.0
 
 #: A jump is larger than this share of the distance, and than this [m]: steps and noise are not.
 JUMP, LEAST_JUMP_M = 0.03, 0.02
