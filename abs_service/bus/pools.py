@@ -1,7 +1,7 @@
 """Pools in shared memory, and the memory of those whose process has ended.
 
 zenoh keeps every pool that it has mapped for the life of a process, with its file (eclipse-zenoh/zenoh #2787). Without
-help, each restart of a process that publishes images would cost a rig that goes on 32 MB.
+help, each restart of a process that publishes images would cost a rig that goes on 32 MB. See decision 0034.
 """
 
 import mmap
