@@ -21,14 +21,10 @@ parser.add_argument("--topic", default="abs/demo/sheet/state", help="abs/RIG/TRA
 parser.add_argument("--count", type=int, help="end after so many estimates (default: with Ctrl-C)")
 arguments = parser.parse_args()
 
-settings = {
-    "mode": "client",
-    "connect": {"endpoints": [arguments.endpoint]},
-    "transport": {"shared_memory": {"enabled": False}},  # which zenoh has to lock: more than `ulimit -l` may allow
-}
-config = zenoh.Config.from_json5(json.dumps(settings))
+link = {"shared_memory": {"enabled": False}}  # which zenoh has to lock: more than `ulimit -l` may allow
+settings = {"mode": "client", "connect": {"endpoints": [arguments.endpoint]}, "transport": link}
 try:
-    session = zenoh.open(config)
+    session = zenoh.open(zenoh.Config.from_json5(json.dumps(settings)))
 except zenoh.ZError as error:
     raise SystemExit(f"nothing answers at {arguments.endpoint}: is abs-service running?") from error
 newest = zenoh.handlers.RingChannel(30)  # a reader slower than the tracker loses the oldest, and is never a second late

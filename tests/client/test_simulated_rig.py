@@ -1,5 +1,6 @@
 """Simulated rigs for tests of other programs: their settings, and how a start that fails is told."""
 
+import shlex
 import subprocess
 import sys
 
@@ -32,7 +33,7 @@ def test_a_service_that_refuses_the_settings_is_told_with_its_words():
 
 def test_a_rig_that_never_tracks_is_ended(monkeypatch):
     monkeypatch.setattr(simulated_rig, "START_S", 0.5)
-    idle = SimulatedRig(service="python -c 'import time; time.sleep(60)'")
+    idle = SimulatedRig(service=shlex.join([sys.executable, "-c", "import time; time.sleep(60)"]))
     with pytest.raises(RigFailedError, match=r"did not track within 0\.5 s"), run_rig(idle):
         pass
 
