@@ -81,6 +81,15 @@ def from_rotation(rotation: ArrayLike, translation: ArrayLike, tolerance: float 
     return T_ab
 
 
+def nearest_rotation(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rotation nearest to a matrix (3, 3) [1]; of points a.T @ b about their centres (n, 3), the one that maps b to a.
+
+    Source: W. Kabsch, A solution for the best rotation to relate two sets of vectors, 1976.
+    """
+    left, _, right = np.linalg.svd(matrix)
+    return left @ np.diag([1, 1, np.linalg.det(left @ right)]) @ right
+
+
 def look_at(eye: ArrayLike, target: ArrayLike, down: ArrayLike = (0.0, 1.0, 0.0)) -> Pose:
     """Pose `T_rs` of a camera at `eye` whose optical axis passes through `target`; image rows run along `down`."""
     eye_r = np.asarray(eye, float)

@@ -57,12 +57,11 @@ class _Failure(NamedTuple):
 
 
 class _Built(NamedTuple):
-    """A tracker of a detected object, its mesh, the image that both are of, and doubts about the object."""
+    """A tracker of a detected object, its mesh, and the detection that both are of."""
 
     tracker: Tracker
     mesh: Mesh
-    view: FirstView
-    warnings: tuple[str, ...]
+    detection: InitialDetection
 
 
 class TrackingSession:
@@ -229,8 +228,9 @@ class TrackingSession:
         self._vertex_offsets.update(observation.images.get(self._plan.reference), surface, observation.t_host_ns)
 
     def _adopt(self, built: _Built, observation: Observation) -> None:
-        self._tracker, self.mesh, self._view, self._warnings = built
-        self._vertices = built.mesh.vertices
+        self._tracker, self.mesh, detection = built
+        self._view, self._vertices = FirstView(detection, built.mesh), built.mesh.vertices
+        self._warnings = doubts(detection, built.mesh, observation.images, self._rig)
         self.made_ns = observation.t_host_ns
         self._vertex_offsets = self._plan.vertex_offsets.build(
             built.tracker.model, self._rig.sensors[self._plan.reference]
@@ -245,6 +245,4 @@ class TrackingSession:
 
     def _build(self, observation: Observation, region: Region) -> _Built:
         detection = self._detection(observation, region)
-        tracker, mesh = make_tracker(self._plan, self._template, self._rig, detection, observation)
-        warned = doubts(detection, mesh, observation.images, self._rig)
-        return _Built(tracker, mesh, FirstView(detection, mesh), warned)
+        return _Built(*make_tracker(self._plan, self._template, self._rig, detection, observation), detection)

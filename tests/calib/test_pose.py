@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import scipy
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -83,3 +84,19 @@ def test_turned_points_follow_the_rotation_vector_as_their_derivatives_say(rotat
     turned = pose.transform(pose.from_rotation_vector(rotation_vector, (0, 0, 0)), point[None])
     expected = (np.array(ahead) - behind).T / 2e-6
     np.testing.assert_allclose(pose.rotated_points_jacobian(rotation_vector, turned)[0], expected, rtol=0, atol=1e-8)
+
+
+@given(vectors)
+def test_the_rotation_between_points_is_that_which_turned_them(rotation_vector):
+    turn = pose.from_rotation_vector(rotation_vector, (0, 0, 0))[:3, :3]
+    points = np.random.default_rng(0).normal(size=(20, 3))
+    noisy = points @ turn.T + np.random.default_rng(1).normal(0, 0.01, (20, 3))
+    found = pose.nearest_rotation(noisy.T @ points)
+    expected = scipy.spatial.transform.Rotation.align_vectors(noisy, points)[0].as_matrix()
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(found, turn, rtol=0, atol=0.02)
+
+
+def test_flat_points_are_turned_and_not_mirrored():
+    flat = np.array([[1.0, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0]])
+    assert pose.is_pose(np.block([[pose.nearest_rotation(flat.T @ flat), np.zeros((3, 1))], [np.eye(4)[3]]]))

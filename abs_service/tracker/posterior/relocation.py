@@ -11,6 +11,7 @@ from abs_service.tracker.posterior.curvature import gauss_newton
 from abs_service.tracker.posterior.priors.shape_prior import ShapePrior
 from abs_service.tracker.posterior.priors.stretch_prior import StretchPrior
 from abs_service.tracker.terms.linearization import Linearization, Part
+from calib.pose import nearest_rotation
 
 #: Steps of the coarse fit, σ of the distances between vertices and points [m], and σ of the relative edge stretch.
 _STEPS, _APART_M, _STRETCH = 15, 0.01, 0.02
@@ -50,8 +51,7 @@ def _moved(rest: NDArray[np.float64], before: NDArray[np.float64], points: NDArr
     """Rest vertices (n, 3) rigidly aligned with points (k, 3), with the smallest rotation from `before`."""
     center, own = _axes(rest)
     place, seen = _axes(points)
-    left, _, right = np.linalg.svd((before - before.mean(axis=0)).T @ (rest - center))
-    turned = left @ np.diag([1, 1, np.linalg.det(left @ right)]) @ right
+    turned = nearest_rotation((before - before.mean(axis=0)).T @ (rest - center))
     turns = [seen @ np.diag([a, b, a * b]) @ own.T for a, b in product((1, -1), repeat=2)]
     turn = max(turns, key=lambda turn: float(np.trace(turn.T @ turned)))
     return (rest - center) @ turn.T + place

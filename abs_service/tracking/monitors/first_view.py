@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 from abs_service.tracker.detection.depth_view import at_points
 from abs_service.tracker.detection.initial_detection import InitialDetection
 from abs_service.tracker.mesh import Mesh
+from calib.pose import nearest_rotation
 
 #: Share of the vertices that may have been in sight beside the object: the region leaves out pixels at its rim.
 _MOST_BESIDE = 0.1
@@ -37,8 +38,7 @@ class FirstView:
         """
         around, camera = self._detection.surroundings, self._detection.camera
         center, place = vertices.mean(axis=0), self._vertices.mean(axis=0)
-        left, _, right = np.linalg.svd((self._vertices - place).T @ (vertices - center))
-        turn = left @ np.diag([1, 1, np.linalg.det(left @ right)]) @ right
+        turn = nearest_rotation((self._vertices - place).T @ (vertices - center))
         off = (vertices - center) @ turn.T + place - self._vertices
         if not around.size or np.sqrt((off**2).mean()) > _SAME_SHAPE * self._vertices.std(axis=0).max():
             return False

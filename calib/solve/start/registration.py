@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from calib.board.views import PlaneView
 from calib.camera import Camera
-from calib.pose import Pose
+from calib.pose import Pose, nearest_rotation
 from calib.solve.start.extrinsics_graph import NotConnectedError
 
 #: Normals span the space if their smallest singular value, relative to the largest, is above this.
@@ -43,14 +43,14 @@ def register(name: str, camera: Camera, views: Sequence[PlaneView], boards: Mapp
     found = [fit_plane(camera, view) for view in shared]
     normals_s = np.stack([normal for normal, _ in found])
     normals_r = np.stack([boards[view.shot][:3, 2] for view in shared])
-    left, strengths, right = np.linalg.svd(normals_r.T @ normals_s)
+    strengths = np.linalg.svd(normals_r.T @ normals_s, compute_uv=False)
     if strengths[2] < SPANNING**2 * strengths[0]:
         raise NotConnectedError(
             f"{name}: sees no corners, and the board was tilted too little for its plane alone to say where {name} is; "
             "tilt it up, down, left and right by 30 degrees"
         )
     T_rs = np.eye(4)
-    T_rs[:3, :3] = left @ np.diag([1, 1, np.linalg.det(left @ right)]) @ right
+    T_rs[:3, :3] = nearest_rotation(normals_r.T @ normals_s)
     heights_r = np.array([boards[view.shot][:3, 2] @ boards[view.shot][:3, 3] for view in shared])
     heights_s = np.array([height for _, height in found])
     T_rs[:3, 3] = np.linalg.lstsq(normals_r, heights_r - heights_s, rcond=None)[0]

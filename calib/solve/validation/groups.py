@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from calib.solve.solution import Solution
-from calib.solve.validation.steadiness import HARMLESS, disagreement, once, optics
+from calib.solve.validation.steadiness import HARMLESS, along, disagreement, once, optics
 
 #: Minimum number of distinct poses, as any few fall into two groups, and of those in the smaller group.
 POSES, LEAST = 12, 3
@@ -73,9 +73,8 @@ def _split(solution: Solution, directions: Array) -> tuple[Members, Array] | Non
     count = len(scores)
     if count < POSES:
         return None
-    lower = linalg.cholesky(information.sum(axis=0) + solution.adjustment.pose_information.prior, lower=True)
-    whole = linalg.solve_triangular(lower, np.eye(len(lower)), lower=True) @ information @ directions
-    own, pulls = directions.T @ information @ directions, scores @ directions
+    lower, own, whole = along(directions, information, solution.adjustment.pose_information.prior)
+    pulls = scores @ directions
     random = np.random.default_rng(0)
     first = [random.random(count) < share for share in np.resize((0.25, 0.5, 0.75), STARTS)]
     gain, members, change = max((_grown(guess, own, whole, pulls) for guess in first), key=lambda each: each[0])

@@ -135,6 +135,22 @@ def once(poses: PoseInformation) -> tuple[Array, Array]:
     return poses.information / poses.repeats[:, None, None], poses.scores / poses.repeats[:, None] / poses.efficiency
 
 
+def along(directions: Array, information: Array, prior: Array) -> tuple[Array, Array, Array]:
+    """Information of poses along directions.
+
+    Args:
+        directions: (k, m).
+        information: of poses (poses, k, k), to which a prior (k, k) adds.
+
+    Returns:
+        Root of all information, lower triangle (k, k); information of each pose along the directions (poses, m, m), and
+        what all poses know of it already, divided by the root (poses, k, m).
+    """
+    lower = linalg.cholesky(information.sum(axis=0) + prior, lower=True)
+    whole = linalg.solve_triangular(lower, np.eye(len(lower)), lower=True) @ information @ directions
+    return lower, directions.T @ information @ directions, whole
+
+
 def _split(solution: Solution, directions: Array) -> tuple[int, Array] | None:
     """First shot after a change along directions (k, m), and its size (m,); None if there is none."""
     adjustment = solution.adjustment
@@ -143,9 +159,8 @@ def _split(solution: Solution, directions: Array) -> tuple[int, Array] | None:
         return None
     order = np.argsort(first)
     information, scores = (part[order] for part in once(adjustment.pose_information))
-    lower = linalg.cholesky(information.sum(axis=0) + adjustment.pose_information.prior, lower=True)
-    whole = linalg.solve_triangular(lower, np.eye(len(lower)), lower=True) @ information @ directions
-    own, pulls = directions.T @ information @ directions, scores @ directions
+    _, own, whole = along(directions, information, adjustment.pose_information.prior)
+    pulls = scores @ directions
     best = _best(own, whole, pulls)
     noise = robust.covariance_inflation(adjustment.residuals)
     is_certain = np.any(np.abs(best.size) > DEVIATIONS * np.sqrt(noise) * best.sigma)
