@@ -1,9 +1,9 @@
-"""The moving picture of the live page in the README: a recording of the demo rig, played slowly and photographed.
+"""The moving picture of the page in the README: a recording of simulated cameras, photographed estimate by estimate.
 
 python -m evaluation.pictures.live_page docs/images/live.webp
 
-Needs Chromium. Without a graphics card it draws a few pictures a second, so the recording is played at a small part of
-its speed, which is what the page's rates show; the picture moves at the speed of the recording.
+Needs Chromium. Without a graphics card it draws a few pictures a second, so the page stands still for each of them; the
+moving picture has the speed of the recording.
 """
 
 import argparse
@@ -19,33 +19,45 @@ from pathlib import Path
 from PIL import Image
 from playwright.sync_api import Error, Page, sync_playwright
 
-#: Length of the recording [s], and the speed at which it is played.
-DURATION_S, SPEED = 14, 0.06
-#: Length of the picture [s] and its width [px].
-SHOWN_S, WIDTH = 6.0, 800
+#: Cameras of today, which see a printed sheet.
+RIG = Path(__file__).parents[2] / "examples" / "rigs" / "paper.toml"
+
+#: Length of the recording [s], the times that are shown [s], and estimates of the recording for each picture.
+DURATION_S, FROM_S, TO_S, STEP = 14, 1.0, 8.0, 2
+#: Width of the picture [px], and the time in which the page has drawn a step [s].
+WIDTH, DRAWN_S = 800, 0.5
 
 PORT = 8099
 CHROMIUM = "/usr/bin/chromium"
 OPTIONS = ["--headless", "--no-sandbox", "--enable-unsafe-swiftshader", "--use-angle=swiftshader"]
 
+#: Words about the missing graphics card, and those of buttons.
+HIDDEN = ".mantine-Notifications-root, .mantine-Tooltip-tooltip"
+
 SERVICE = [sys.executable, "-m", "abs_service"]
 
 
+def _record(folder: Path) -> Path:
+    """Records the rig and tracks every image of it; returns the recording with images and estimates."""
+    tracked = folder / "tracked.mcap"
+    subprocess.run([*SERVICE, "run", RIG, "--duration", str(DURATION_S), "--out", folder], check=True)
+    subprocess.run([*SERVICE, "replay", next(folder.glob("*.mcap")), "--images", "--out", tracked], check=True)
+    return tracked
+
+
 @contextmanager
-def _playing(recording: Path, folder: Path) -> Iterator[None]:
-    """The recording and its page, as processes of their own."""
-    replay = subprocess.Popen([*SERVICE, "replay", recording, "--speed", str(SPEED), "--out", folder / "replay"])
-    page = subprocess.Popen([*SERVICE, "view", "--port", str(PORT), "--view-only"])
+def _served(recording: Path) -> Iterator[None]:
+    """The page of a recording, as a process of its own."""
+    page = subprocess.Popen([*SERVICE, "view", recording, "--port", str(PORT), "--view-only"])
     try:
         yield
     finally:
-        for process in (page, replay):
-            process.terminate()
-            process.wait()
+        page.terminate()
+        page.wait()
 
 
 def _open(page: Page) -> None:
-    """Waits until the page says that it tracks, and turns to its images."""
+    """Waits for the page, stops it at the first time, and turns to its images."""
     deadline_s = time.monotonic() + 60
     while True:
         try:
@@ -55,38 +67,41 @@ def _open(page: Page) -> None:
             if time.monotonic() > deadline_s:
                 raise
             time.sleep(0.3)
-    page.get_by_text("Tracking").first.wait_for(timeout=120_000)
-    page.add_style_tag(
-        content=".mantine-Notifications-root { display: none !important }"
-    )  # of the missing graphics card
+    page.get_by_role("button", name="Pause").click(timeout=120_000)
+    page.get_by_role("button", name="Play").wait_for()
+    page.add_style_tag(content=f"{HIDDEN} {{ display: none !important }}")
     page.get_by_role("tab", name="Images").click()
-    time.sleep(4)
+    at = page.get_by_role("textbox").first
+    at.fill(str(FROM_S))
+    at.press("Enter")
 
 
 def _photographs(page: Page) -> list[Image.Image]:
-    """Pictures of the page until the time to show has been played."""
-    end_s, found = time.monotonic() + SHOWN_S / SPEED, []
-    while time.monotonic() < end_s:
+    """Pictures of the page from the first to the last time."""
+    found: list[Image.Image] = []
+    while float(page.get_by_role("textbox").first.input_value()) < TO_S:
+        for _ in range(STEP):
+            page.get_by_role("button", name="Forward").click()
+            time.sleep(DRAWN_S / STEP)
         image = Image.open(io.BytesIO(page.screenshot())).convert("RGB")
         found.append(image.resize((WIDTH, image.height * WIDTH // image.width), Image.Resampling.LANCZOS))
     return found
 
 
 def main() -> None:
-    """Records, plays and photographs the demo rig."""
+    """Records and photographs the rig."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("picture", type=Path)
     picture = parser.parse_args().picture
     with tempfile.TemporaryDirectory() as name, sync_playwright() as playwright:
-        folder = Path(name)
-        subprocess.run([*SERVICE, "run", "--duration", str(DURATION_S), "--out", folder], check=True)
+        recording = _record(Path(name))
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=OPTIONS)
-        with _playing(next(folder.glob("*.mcap")), folder):
+        with _served(recording):
             page = browser.new_page(viewport={"width": 1180, "height": 640})
             _open(page)
             images = _photographs(page)
         browser.close()
-    period_ms = round(1000 * SHOWN_S / len(images))
+    period_ms = round(1000 * (TO_S - FROM_S) / len(images))
     images[0].save(picture, save_all=True, append_images=images[1:], duration=period_ms, loop=0, quality=45, method=5)
 
 

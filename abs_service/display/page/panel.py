@@ -127,7 +127,7 @@ class Panel:
 
     def show_table(self, rows: Mapping[str, str]) -> None:
         """Shows numbers by name."""
-        cells = (" | ".join(escape(part).replace("|", "\\|") for part in row) for row in rows.items())
+        cells = ("&emsp;| ".join(escape(part).replace("|", "\\|") for part in row) for row in rows.items())
         content = "\n".join(["| | |", "|-|-|", *(f"| {row} |" for row in cells)])
         if self._table.content != content:
             self._table.content = content

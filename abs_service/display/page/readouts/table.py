@@ -27,7 +27,8 @@ def rows(feed: Feed, tracker: str) -> dict[str, str]:
     found = {"estimates": f"{rate_hz(numbers, feed.now_s):.1f} Hz, {skipped} skipped"}
     if numbers:
         last = numbers[-1]
-        found["latency"] = f"{last.age_ms:.0f} ms, search {last.solve_ms:.0f} ms, {last.generations} generations"
+        latency = f"{last.age_ms:.0f} ms, " if math.isfinite(last.age_ms) else ""  # unknown in a replay
+        found["latency"] = f"{latency}search {last.solve_ms:.0f} ms, {last.generations} generations"
     if (newest := feed.newest(keys.state(tracker), DeformationState)) is not None:
         state, since_s = newest
         on_the_way = [one for one in healths if one.component in ("capture", f"track/{tracker}")]

@@ -60,9 +60,9 @@ def slow(rate_hz: float, camera_hz: float, skipped: int) -> str:
     Args:
         rate_hz: of its estimates.
         camera_hz: of the images of its reference; 0 if unknown.
-        skipped: frame sets that it passed over in the last minute.
+        skipped: frame sets that it passed over in the last minute; without any, it waits for images.
     """
-    if camera_hz <= 0 or rate_hz >= SLOW_SHARE * camera_hz:
+    if not skipped or camera_hz <= 0 or rate_hz >= SLOW_SHARE * camera_hz:
         return ""
     return (
         f"Only {rate_hz:.0f} estimates a second of {camera_hz:.0f} images, {skipped} skipped in the last minute: "

@@ -7,10 +7,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-#: Values of the format: component types, kinds of buffer, and the marks of file and chunks.
+from abs_service.tracker.mesh import edges_of
+
+#: Values of the format: component types, kinds of buffer and primitive, and the marks of file and chunks.
 COMPONENTS = {"f4": 5126, "u4": 5125, "u1": 5121}
-VERTICES, INDICES = 34962, 34963
+VERTICES, INDICES, LINES = 34962, 34963, 1
 MAGIC, JSON, BINARY = 0x46546C67, 0x4E4F534A, 0x004E4942
+
+#: Brightness of an edge, as a share of the surface's in linear light.
+EDGE = 0.3
 
 #: Dull, and seen from both sides.
 MATERIAL = {"pbrMetallicRoughness": {"metallicFactor": 0.0, "roughnessFactor": 0.9}, "doubleSided": True}
@@ -56,7 +61,7 @@ class Buffer:
 
 
 def glb(vertices: NDArray[np.floating], faces: NDArray[np.integer], colors: NDArray[np.uint8]) -> bytes:
-    """A file with one mesh and a colour for each vertex.
+    """A file with one mesh, a colour for each vertex, and its edges, which are darker.
 
     Args:
         vertices: positions (n, 3) [m].
@@ -66,15 +71,11 @@ def glb(vertices: NDArray[np.floating], faces: NDArray[np.integer], colors: NDAr
     linear = np.full((len(colors), 4), 255, np.uint8)
     linear[:, :3] = np.round(255 * (colors / 255.0) ** 2.2)  # what glTF wants
     buffer = Buffer()
-    attributes = {
-        "POSITION": buffer.add(vertices.astype(np.float32), VERTICES),
-        "COLOR_0": buffer.add(linear, VERTICES, normalized=True),
-    }
-    indices = buffer.add(faces.ravel().astype(np.uint32), INDICES)
-    return buffer.file(
-        {
-            "scenes": [{"nodes": [0]}],
-            "nodes": [{"mesh": 0}],
-            "meshes": [{"primitives": [{"attributes": attributes, "indices": indices, "material": 0}]}],
-        }
-    )
+    position = buffer.add(vertices.astype(np.float32), VERTICES)
+    bright = {"POSITION": position, "COLOR_0": buffer.add(linear, VERTICES, normalized=True)}
+    linear[:, :3] = EDGE * linear[:, :3]
+    dark = {"POSITION": position, "COLOR_0": buffer.add(linear, VERTICES, normalized=True)}
+    triangles, edges = (buffer.add(one.ravel().astype(np.uint32), INDICES) for one in (faces, edges_of(faces)[0]))
+    surface = {"attributes": bright, "indices": triangles, "material": 0}
+    net = {"attributes": dark, "indices": edges, "material": 0, "mode": LINES}
+    return buffer.file({"scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}], "meshes": [{"primitives": [surface, net]}]})

@@ -89,7 +89,7 @@ def test_numbers_are_a_table_whose_cells_hold_any_text(server, added):
     panel = Panel(server, {})
     panel.show_table({"estimates": "30 Hz", "a|b": "<b>"})
     rows = [one.content for one in added if isinstance(one, viser.GuiMarkdownHandle) and one.content]
-    assert rows == ["| | |\n|-|-|\n| estimates | 30 Hz |\n| a\\|b | &lt;b&gt; |"]
+    assert rows == ["| | |\n|-|-|\n| estimates&emsp;| 30 Hz |\n| a\\|b&emsp;| &lt;b&gt; |"]
 
 
 def test_the_legend_has_the_colours_and_the_end_of_the_chosen_quantity(server, added):

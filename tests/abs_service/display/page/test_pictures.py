@@ -1,5 +1,7 @@
 """Points from depth frames of either geometry, and meshes drawn over pictures."""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -137,7 +139,18 @@ def test_a_mesh_file_can_be_read_by_others():
     colors = np.array([[255, 0, 0], [0, 255, 0], [0, 0, 255], [255, 255, 255]], np.uint8)
     data = glb(vertices, FACES, colors)
     scene = trimesh.load(trimesh.util.wrap_as_stream(data), file_type="glb")
-    (mesh,) = scene.geometry.values()
+    mesh, _ = scene.geometry.values()
     np.testing.assert_allclose(mesh.vertices, vertices)
     np.testing.assert_array_equal(mesh.faces, FACES)
     np.testing.assert_array_equal(mesh.visual.vertex_attributes["color"][:, :3], colors)
+
+
+def test_a_mesh_file_has_every_edge_as_a_line():
+    data = glb(np.eye(4, 3), FACES, np.zeros((4, 3), np.uint8))
+    text_size = int.from_bytes(data[12:16], "little")
+    document, binary = json.loads(data[20 : 20 + text_size]), data[28 + text_size :]
+    net = document["meshes"][0]["primitives"][1]
+    view = document["bufferViews"][document["accessors"][net["indices"]]["bufferView"]]
+    ends = np.frombuffer(binary[view["byteOffset"] :][: view["byteLength"]], "<u4").reshape(-1, 2)
+    assert net["mode"] == 1
+    assert ends.tolist() == [[0, 1], [0, 2], [1, 2], [1, 3], [2, 3]]

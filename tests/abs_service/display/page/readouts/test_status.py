@@ -22,8 +22,11 @@ class Rig:
     def send(self, topic, message):
         self.bus.publisher(topic, message.DESCRIPTOR.full_name, EVENTS).put(message.SerializeToString())
 
-    def state(self, tracker, name):
-        self.send(f"{tracker}/state", DeformationState(tracker=tracker, status=f"STATUS_{name}", deviation_m=math.nan))
+    def state(self, tracker, name, skipped=0):
+        status = f"STATUS_{name}"
+        self.send(
+            f"{tracker}/state", DeformationState(tracker=tracker, status=status, deviation_m=math.nan, skipped=skipped)
+        )
 
     def health(self, component, message, level=Health.LEVEL_WARNING, **more):
         self.send(f"health/{component}", Health(component=component, message=message, level=level, **more))
@@ -72,6 +75,8 @@ def test_a_slow_tracker_is_told_while_it_has_estimates(rig):
     rig.send("tof/depth/image", DeformationState())
     rig.health("capture", "", Health.LEVEL_OK, gauges={"rate_hz.tof/depth/image": 30.0})
     rig.state("left", "TRACKING")
+    assert rig.titles() == ["Tracking"]
+    rig.state("left", "TRACKING", skipped=2)
     assert rig.titles() == ["Tracking", "The tracker is slow"]
     rig.now_ns = 2_000_000_000
     assert rig.titles() == ["No estimate for 2.0 s"]
