@@ -1,16 +1,17 @@
 """Real-time simulated device: paces the exposures of a simulation by a clock."""
 
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 
 from calib.camera import Camera
-from drivers.contract.capabilities import Capabilities
-from drivers.contract.controls import Controls
+from drivers.contract.capabilities import Capabilities, StreamInfo
+from drivers.contract.controls import Control, ControlInfo, ControlKind, Controls, Value
 from drivers.contract.device import DeviceInfo, DeviceState, Sink, Truth
-from drivers.contract.frame import Frame
+from drivers.contract.frame import Frame, Kind
 from drivers.contract.frame_gate import FrameGate
 from drivers.simulated.faults import Fault, FaultSchedule, corrupted
+from drivers.simulated.sensors.exposure import NOMINAL_S
 from drivers.simulated.simulation import Simulation
 
 #: Waits until the event is set or the timeout [s] has passed; returns True if it is set.
@@ -18,6 +19,9 @@ Wait = Callable[[threading.Event, float], bool]
 
 #: Number of overdue exposures that are still delivered.
 BUFFERED = 3
+
+#: Exposure time of the colour heads; nothing is blurred by motion.
+EXPOSURE = ControlInfo("exposure_s", ControlKind.NUMBER, "s", 0.0005, 0.03)
 
 #: A device without a fault.
 NO_FAULT = FaultSchedule()
@@ -48,9 +52,11 @@ class SimulatedDevice:
     ) -> None:
         self.info = DeviceInfo(uri=uri, model="simulated", serial=f"seed {simulation.seed}")
         streams = (stream for head in simulation.heads.values() for stream in head.streams)
-        self.capabilities = Capabilities(tuple(replace(stream, noisy=simulation.noisy) for stream in streams))
+        shown = tuple(replace(stream, noisy=simulation.noisy) for stream in streams)
+        self._color_s = NOMINAL_S
+        self.controls = Controls(self._controls(shown))
+        self.capabilities = Capabilities(shown, self.controls.infos)
         self.cameras: Mapping[str, Camera] = {name: head.camera for name, head in simulation.heads.items()}
-        self.controls = Controls()
         self._simulation = simulation
         self._clock = clock
         self._wait = wait
@@ -94,6 +100,15 @@ class SimulatedDevice:
         self._gate.release()
         self.stop()
 
+    def _controls(self, streams: Iterable[StreamInfo]) -> Iterator[Control]:
+        """The exposure time of the colour heads, if there are some."""
+
+        def write(value: Value) -> None:
+            self._color_s = float(value)
+
+        if any(stream.kind in (Kind.COLOR, Kind.BAYER) for stream in streams):
+            yield Control(EXPOSURE, lambda: self._color_s, write)
+
     def _run(self, stop: threading.Event) -> None:
         try:
             self._simulation.frames(0)  # compiles the kernels, which would delay the first exposures
@@ -135,7 +150,7 @@ class SimulatedDevice:
         late_ns = self._simulation.time_ns(k) - self._simulation.time_ns(shown)
         return [
             replace(frame, seq=k, t_host_ns=frame.t_host_ns + late_ns, t_device_ticks=frame.t_device_ticks + late_ns)
-            for frame in self._simulation.frames(shown)
+            for frame in self._simulation.frames(shown, self._color_s)
         ]
 
     def _deliver(self, frames: list[Frame], truths: list[Truth], first_ns: int, epoch: int) -> None:

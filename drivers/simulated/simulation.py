@@ -9,7 +9,7 @@ import numpy as np
 from drivers.contract.device import Truth
 from drivers.contract.frame import Frame
 from drivers.simulated.scene.scene import Scene
-from drivers.simulated.sensors.exposure import Exposure, Head
+from drivers.simulated.sensors.exposure import NOMINAL_S, Exposure, Head
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,8 +42,8 @@ class Simulation:
         """Frames of all heads at exposure `k`, and ground truth of the first surface; see `frames` and `truths`."""
         return self.frames(k), self.truths(k)[0]
 
-    def frames(self, k: int) -> list[Frame]:
-        """Frames of all heads at exposure `k`; times are relative to exposure 0."""
+    def frames(self, k: int, color_s: float = NOMINAL_S) -> list[Frame]:
+        """Frames of all heads at exposure `k`, those of colour exposed for `color_s` [s]; times since exposure 0."""
         t_ns = self.time_ns(k)
         moment = self.scene.at(t_ns * 1e-9)
         frames: list[Frame] = []
@@ -51,7 +51,7 @@ class Simulation:
             seeds = np.random.SeedSequence([self.seed, k, zlib.crc32(name.encode())])
             generator = np.random.Generator(np.random.SFC64(seeds))
             jitter = round(self.jitter_ns * generator.standard_normal())
-            frames += head.expose(Exposure(k, moment, generator, t_ns, jitter, self.jitter_ns))
+            frames += head.expose(Exposure(k, moment, generator, t_ns, jitter, self.jitter_ns, color_s))
         return frames
 
     def truths(self, k: int) -> list[Truth]:

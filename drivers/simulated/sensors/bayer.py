@@ -54,5 +54,6 @@ class Bayer:
 
     def expose(self, exposure: Exposure) -> list[Frame]:
         """Takes the mosaic of one exposure."""
-        levels = self._mosaic.expose(self._picture.take(exposure.moment))
-        return [exposure.frame(self.streams[0], self.camera, digitize(levels, self._sigma, exposure.generator))]
+        levels = exposure.brightness * self._mosaic.expose(self._picture.take(exposure.moment))
+        data = digitize(levels, self._sigma, exposure.generator)
+        return [exposure.frame(self.streams[0], self.camera, data, exposure_s=exposure.color_s)]

@@ -67,8 +67,9 @@ class Color:
 
     def expose(self, exposure: Exposure) -> list[Frame]:
         """Takes the colour image of one exposure."""
-        levels = self._picture.take(exposure.moment)
-        return [exposure.frame(self.streams[0], self.camera, digitize(levels, self._sigma, exposure.generator))]
+        levels = exposure.brightness * self._picture.take(exposure.moment)
+        data = digitize(levels, self._sigma, exposure.generator)
+        return [exposure.frame(self.streams[0], self.camera, data, exposure_s=exposure.color_s)]
 
 
 def digitize(levels: NDArray[np.float32], sigma: float, generator: np.random.Generator) -> NDArray[np.uint8]:

@@ -1,5 +1,6 @@
 """Interface of heads, and the data of one exposure."""
 
+import math
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -10,6 +11,9 @@ from calib.camera import Camera
 from drivers.contract.capabilities import ClockInfo, StreamInfo
 from drivers.contract.frame import Frame, Geometry, Kind
 from drivers.simulated.scene.scene import Moment
+
+#: Exposure time of colour heads that shows colours as they are [s].
+NOMINAL_S = 0.01
 
 #: Clock of the simulated device; it counts from the first exposure.
 CLOCK = ClockInfo("simulated", 1e9)
@@ -26,6 +30,7 @@ class Exposure:
         t_ns: time since the first exposure [ns].
         jitter_ns: error of the timestamp [ns].
         t_sigma_ns: standard deviation of that error [ns].
+        color_s: exposure time of colour heads [s].
     """
 
     seq: int
@@ -34,6 +39,12 @@ class Exposure:
     t_ns: int
     jitter_ns: int = 0
     t_sigma_ns: int = 0
+    color_s: float = NOMINAL_S
+
+    @property
+    def brightness(self) -> float:
+        """Factor on the light that a colour head measures."""
+        return self.color_s / NOMINAL_S
 
     def frame(
         self,
@@ -43,6 +54,7 @@ class Exposure:
         scale: float = 1.0,
         geometry: Geometry = Geometry.NONE,
         invalid: float | None = None,
+        exposure_s: float = math.nan,
     ) -> Frame:
         """A frame of this exposure; times and ticks are relative to the first exposure."""
         return Frame(
@@ -62,6 +74,7 @@ class Exposure:
             clock_domain=CLOCK.domain,
             t_sigma_ns=self.t_sigma_ns,
             calib_id=camera.calib_id,
+            exposure_s=exposure_s,
         )
 
 

@@ -3,6 +3,7 @@
 import pytest
 
 from drivers.contract.device import DeviceError
+from drivers.contract.frame import Frame
 from drivers.opening import available, open_device
 from drivers.simulated.address import Address, parse
 from drivers.simulated.device import SimulatedDevice
@@ -142,3 +143,30 @@ def test_errors_name_key_value_and_what_is_allowed(uri: str, complaint: str) -> 
 def test_every_available_driver_has_an_open_device() -> None:
     assert "simulated" in available()
     assert not {"codec", "frame", "device", "opening"} & set(available())
+
+
+def first(exposure_s: float) -> dict[str, Frame]:
+    time = ManualTime(BEGIN_NS)
+    device = SimulatedDevice(
+        "simulated://sheet", parse(f"simulated://sheet?{SMALL}&noise=0").build(), time.clock, time.wait
+    )
+    device.controls.set("exposure_s", exposure_s)
+    sink = RecordingSink()
+    device.start(sink)
+    sink.wait(lambda: len(sink.frames) >= 3, 60)
+    device.stop()
+    return {frame.stream: frame for frame in sink.frames[:3]}
+
+
+def test_colours_follow_the_exposure_time_and_distances_do_not() -> None:
+    usual, short = first(0.01), first(0.005)
+    assert abs(short["color"].data.astype(float) - 0.5 * usual["color"].data.astype(float)).max() <= 1
+    assert (short["depth"].data == usual["depth"].data).all()
+    assert (usual["color"].exposure_s, short["color"].exposure_s) == (0.01, 0.005)
+
+
+@pytest.mark.parametrize(("sensors", "names"), [("tof,bayer", ["exposure_s"]), ("tof,structured_light", [])])
+def test_only_heads_with_colours_have_an_exposure_time(sensors: str, names: list[str]) -> None:
+    device = open_device(f"simulated://sheet?sensors={sensors}", lambda: 0)
+    assert [info.name for info in device.capabilities.controls] == names
+    device.close()
