@@ -73,9 +73,9 @@ def test_a_recording_that_exists_is_not_overwritten(files: list[str], tmp_path: 
 
 
 def test_controls_of_the_rig_file_are_set_as_for_tracking(files: list[str], tmp_path: Path, capsys) -> None:
-    """The simulated device has none, so the first is rejected, by the name of its table."""
+    """A value that the device does not take is rejected, by the name of its table."""
     with (tmp_path / "rig.toml").open("a", encoding="utf-8") as file:
-        file.write("[devices.sim.controls]\nexposure_s = 0.01\n")
+        file.write("[devices.sim.controls]\nexposure_s = 1.0\n")
     assert cli.main(["calibrate", "capture", *files]) == Exit.USER
     assert "rig.toml: devices.sim.controls.exposure_s" in capsys.readouterr().err
     assert not (tmp_path / "board.mcap").exists()
