@@ -36,7 +36,8 @@ class Settings:
         weights: weight of every control point, a table of as many rows and columns; a larger weight than that of the
             neighbours pulls the surface towards the point. Empty: all 1, a plain B-spline surface.
         smoothing: weight of the bending of the rest surface relative to the squared distances to the vertices in its
-            fit; it has an effect only where the object has no vertices.
+            fit; it has an effect only where the object has no vertices. Up to a hundred times as much is used for an
+            object with limbs or steps that the surface could not follow without bending too sharply.
     """
 
     #: The vertices of the model have offsets, which can be learnt (`vertex_offsets` of a tracker).
@@ -90,9 +91,7 @@ class Settings:
                 f"each direction needs at least {degree + 1}"
             )
         weights = np.array(self.weights) if self.weights else np.ones(shape)
-        u, w = binding.chart_parameters(mesh, self.margin)
-        control = binding.fit_control_points(mesh.vertices, u, w, weights, degree, self.smoothing)
-        u, w, offset = binding.bind(mesh.vertices, control, weights, degree, u, w)
+        control, u, w, offset = binding.fit_and_bind(mesh, weights, degree, self.margin, self.smoothing)
         return Nurbs(mesh, control, weights, degree, u, w, offset)
 
     def derived(self, mesh: Mesh) -> tuple[tuple[int, int], int]:

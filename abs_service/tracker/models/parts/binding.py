@@ -13,6 +13,10 @@ BINDING_TOLERANCE_M = 1e-2
 #: Largest share of a mesh's area, seen on its chart, that may lie behind the rest of it.
 LARGEST_FOLD = 0.02
 
+#: Factors of the rest surface's smoothing, tried in turn until every vertex has a normal. One that follows a limb or a
+#: step closely is bent so much there that its normals miss vertices; a smoother one leaves more to their offsets.
+_SMOOTHER = (1.0, 10.0, 100.0)
+
 
 def check_chart(mesh: Mesh) -> None:
     """Checks that a mesh can be flattened onto its chart.
@@ -69,6 +73,32 @@ def fit_control_points(
     target = np.concatenate([vertices, np.zeros((len(bending), 3))])
     solution = np.linalg.lstsq(system, target, rcond=None)[0]
     return np.asarray(solution, np.float64).reshape(rows, columns, 3)
+
+
+def fit_and_bind(
+    mesh: Mesh, weights: NDArray[np.float64], degree: int, margin: float, smoothing: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Control points (rows, columns, 3) of the rest surface, and u, w and offset, each (n,), of the vertices on it.
+
+    Args:
+        mesh: mesh with a chart.
+        weights: weights of the control points (rows, columns).
+        degree: degree of the surface.
+        margin: share of the mesh's size by which the surface extends beyond it on every side.
+        smoothing: weight of the bending of the rest surface, the least: it is smoother where that is needed to bind.
+
+    Raises:
+        ModelError: a vertex is far from every normal of even the smoothest surface; the message is of the first.
+    """
+    start = chart_parameters(mesh, margin)
+    refused: list[ModelError] = []
+    for factor in _SMOOTHER:
+        control = fit_control_points(mesh.vertices, *start, weights, degree, factor * smoothing)
+        try:
+            return control, *bind(mesh.vertices, control, weights, degree, *start)
+        except ModelError as error:
+            refused.append(error)
+    raise refused[0]
 
 
 def bind(
