@@ -1,10 +1,16 @@
 """A recording in place of a camera: its sensors are those that it has images of."""
 
 import shlex
+from itertools import islice
 from pathlib import Path
 from urllib.parse import quote
 
+import numpy as np
+
 from abs_service.commands.new.rig_text import STRUCTURED_LIGHT, TIME_OF_FLIGHT, Color, Device
+from calib.noise.fit.scatter import scatter
+from calib.noise.structured_light import StructuredLight
+from drivers.contract.frame import Frame
 from drivers.contract.text import printable
 from drivers.replay import Recording, RecordingError
 
@@ -17,6 +23,19 @@ noise = { type = "measured", factor = 1.0, floor = 0.003 }
     "amplitude": TIME_OF_FLIGHT,
     "ir": TIME_OF_FLIGHT,
 }
+#: Noise model of distances that scatter more than those of a PrimeSense camera.
+_SCATTERED = """\
+# A starting point: so much distances scatter where the first images are flat, more than those of a PrimeSense camera;
+# in inverse distance [1/m]. Measure yours with `abs-service calibrate noise`.
+noise = {{ type = "structured_light", noise = {:.1f}e-3, step = 0.0 }}
+"""
+_PRIMESENSE = StructuredLight()
+#: Less more than that says nothing: images differ.
+_MORE = 1.2
+
+#: The scatter is the median of so many images.
+_IMAGES = 5
+
 #: Noise models of colours by their stream.
 _COLORS = {"color": '{ type = "color", sigma = 20.0 }', "bayer": '{ type = "bayer", sigma = 25.0 }'}
 
@@ -42,7 +61,7 @@ def device(path: Path) -> Device:
         f"recording {printable(path.name)}",
         f"replay://{quote(str(path.resolve()))}",
         head,
-        next(noise, STRUCTURED_LIGHT),
+        next(noise, "") or _structured_light(recording, head),
         Color(colors[0][0], _COLORS[colors[0][1]]) if colors else None,
         round(500.0 * period_s, 1) or 17.0,
         min(2.0, max(0.5, round(recording.duration_s / 2, 1))),
@@ -53,3 +72,11 @@ def device(path: Path) -> Device:
             f"abs-service replay {shown} --images --config " + "{file}",
         ),
     )
+
+
+def _structured_light(recording: Recording, head: str) -> str:
+    """Noise model of a head: that of a PrimeSense camera, or more if its first depth images scatter more."""
+    frames = (frame for frame in recording.frames({(head, "depth")}) if isinstance(frame, Frame))
+    measured = np.median([scatter(frame.si()) for frame in islice(frames, _IMAGES)] or [np.nan])
+    usual = np.hypot(_PRIMESENSE.noise, _PRIMESENSE.step / np.sqrt(12))
+    return _SCATTERED.format(measured * 1e3) if measured > _MORE * usual else STRUCTURED_LIGHT

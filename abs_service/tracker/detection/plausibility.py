@@ -9,6 +9,7 @@ from abs_service.pairing.images import Image
 from abs_service.tracker.detection.image_alignment import alignment_warnings
 from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection
 from abs_service.tracker.mesh import Mesh, pieces_of
+from calib.noise.fit.scatter import scatter
 from calib.rig import Rig
 
 #: Range of the extent of an object [m]; outside, the distances have the wrong unit.
@@ -29,6 +30,10 @@ SCENE_OF_MEASURED, SCENE_OF_IMAGE = 1 / 2, 1 / 3
 #: Share of the width or height at each end that a surface may leave out and still span the image: structured light
 #: sensors have no returns in the outer 7 % of an image that is registered to another camera.
 SCENE_MARGIN = 0.08
+
+#: Distances that scatter by this factor more than their noise model says contradict it. They are judged where they
+#: differ from the object's by less than this share, because deviations change with the distance.
+TOO_MUCH_SCATTER, AS_FAR = 1.5, 0.25
 
 
 class ExtentError(DetectionError):
@@ -82,7 +87,12 @@ def doubts(detection: InitialDetection, mesh: Mesh, images: Mapping[str, Image],
         images: of the same moment, by sensor.
         rig: the sensors.
     """
-    return warnings(detection) + mesh_warnings(mesh) + alignment_warnings(detection, images, rig)
+    return (
+        warnings(detection)
+        + noise_warnings(detection)
+        + mesh_warnings(mesh)
+        + alignment_warnings(detection, images, rig)
+    )
 
 
 def mesh_warnings(mesh: Mesh) -> tuple[str, ...]:
@@ -94,6 +104,22 @@ def mesh_warnings(mesh: Mesh) -> tuple[str, ...]:
     return (
         f"the mesh has {len(sizes)} pieces, of {shares} of its vertices: is something in front of the object, "
         "or another one in the region?",
+    )
+
+
+def noise_warnings(detection: InitialDetection) -> tuple[str, ...]:
+    """Doubts about the noise model of the distances, which weighs all measurements: they may not scatter much more."""
+    if not (detection.surroundings.size and detection.deviation):
+        return ()
+    middle = float(np.nanmedian(detection.distance))
+    as_far = np.abs(detection.surroundings - middle) < AS_FAR * middle
+    seen = scatter(np.where(as_far, detection.surroundings, np.nan)) * middle**2
+    if not seen > TOO_MUCH_SCATTER * detection.deviation:
+        return ()
+    return (
+        f"distances scatter by {seen * 1e3:.1f} mm about flat things as far away as the object, and not by "
+        f"{detection.deviation * 1e3:.1f} mm, as the sensor's noise model says: the mesh would seem to disagree – "
+        "measure the noise by abs-service calibrate noise",
     )
 
 

@@ -1,13 +1,17 @@
 """`abs-service new --recording` writes the rig file that a recording without one is replayed with."""
 
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from abs_service import cli
 from abs_service.commands.new import new, recorded
 from abs_service.supervision.exit_codes import Exit
+from drivers.contract.device import Truth
+from drivers.contract.frame import Frame
 from drivers.simulated.address import parse
 from tests.abs_service.commands.recordings.simulated_recording import write_take
 from tests.drivers.o3r import pcic_messages
@@ -34,6 +38,35 @@ def test_sensors_noise_and_tolerance_follow_from_the_images(tmp_path, capsys):
     assert table["synchronisation"] == {"reference": "range/depth", "tolerance_ms": 50.0}  # half of 0.1 s
     assert cli.main(["check", str(rig)]) == Exit.OK
     assert cli.main(["check", str(rig), "--replay", str(recording)]) == Exit.OK
+
+
+class Scattering:
+    """A wall at half a metre, whose inverse distances scatter, as a simulation's images."""
+
+    def __init__(self, noise: float) -> None:
+        self._simulation = parse("simulated://sheet?sensors=structured_light&structured_light=160x120").build()
+        self.heads, self._noise = self._simulation.heads, noise
+
+    def frames(self, k: int) -> list[Frame]:
+        def scattered(frame: Frame) -> Frame:
+            inverse = 2.0 + self._noise * np.random.default_rng(k).standard_normal(frame.data.shape)
+            return replace(frame, data=(1 / inverse).astype("<f4"), encoding="32FC1", scale=1.0, invalid=None)
+
+        return [scattered(frame) for frame in self._simulation.frames(k)]
+
+    def truths(self, k: int) -> list[Truth]:
+        return []
+
+
+@pytest.mark.parametrize(("noise", "written"), [(1.0e-3, 1.425e-3), (4.0e-3, 4.0e-3)])
+def test_a_camera_that_scatters_more_than_usual_is_weighed_less(tmp_path, noise, written):
+    """Half of the vertices of a good estimate would not seem to agree, and it would be DEGRADED."""
+    rig, recording = tmp_path / "rig.toml", tmp_path / "x.mcap"
+    write_take(recording, Scattering(noise), range(2), {"structured_light": "depth"})
+    assert cli.main(["new", str(rig), "--recording", str(recording), *ANSWERS]) == Exit.OK
+    model = tomllib.loads(rig.read_text())["sensors"]["depth"]["noise"]
+    assert (model["type"], model["noise"]) == ("structured_light", pytest.approx(written, rel=0.1))
+    assert cli.main(["check", str(rig)]) == Exit.OK
 
 
 def test_of_several_depth_sensors_the_first_is_taken_and_the_others_are_told(tmp_path, capsys):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from abs_service.tracker.detection.grid_mesh import grid_mesh
-from abs_service.tracker.detection.plausibility import mesh_warnings, warnings
+from abs_service.tracker.detection.plausibility import mesh_warnings, noise_warnings, warnings
 from abs_service.tracker.detection.regions import box, nearest, seed
 from tests.abs_service.tracker.detection.test_segmentation import EVERYWHERE, SHEET, detect
 
@@ -27,6 +27,19 @@ def test_a_large_object_that_ends_in_the_image_raises_no_doubts():
     distance = np.full((48, 64), 2.0, np.float32)
     distance[5:43, 6:58] = 1.0  # 64 % of the image
     assert warnings(detect(distance, nearest.Settings().build())) == ()
+
+
+@pytest.mark.parametrize(("error_m", "told"), [(4e-3, False), (12e-3, True)])
+def test_distances_that_scatter_more_than_their_noise_model_says_are_told(error_m, told):
+    """Beside the object, too, and not by a background that scatters more because it is farther away."""
+    generator = np.random.default_rng(1)
+    scene, inside = generator.normal(2.0, 0.05, (96, 128)), np.s_[10:86, 12:116]
+    scene[inside] = generator.normal(1.0, error_m, (76, 104))
+    object_only = np.full_like(scene, np.nan)
+    object_only[inside] = scene[inside]
+    given = detect(SHEET, nearest.Settings().build())
+    doubts = noise_warnings(replace(given, distance=object_only, surroundings=scene, deviation=5e-3))
+    assert [doubt[:24] for doubt in doubts] == ["distances scatter by 11."] * told
 
 
 def test_a_mesh_of_two_pieces_is_told_unless_a_file_has_it_so():
