@@ -23,7 +23,7 @@ from playwright.sync_api import Error, Page, sync_playwright
 RIG = Path(__file__).parents[2] / "examples" / "rigs" / "paper.toml"
 
 #: Length of the recording [s], the times that are shown [s], and estimates of the recording for each picture.
-DURATION_S, FROM_S, TO_S, STEP = 14, 1.0, 8.0, 2
+DURATION_S, FROM_S, TO_S, STEP = 14, 2.0, 9.0, 2
 #: Width of the picture [px], and the time in which the page has drawn a step [s].
 WIDTH, DRAWN_S = 800, 0.5
 
@@ -70,10 +70,10 @@ def _open(page: Page) -> None:
     page.get_by_role("button", name="Pause").click(timeout=120_000)
     page.get_by_role("button", name="Play").wait_for()
     page.add_style_tag(content=f"{HIDDEN} {{ display: none !important }}")
-    page.get_by_role("tab", name="Images").click()
     at = page.get_by_role("textbox").first
     at.fill(str(FROM_S))
     at.press("Enter")
+    page.get_by_role("tab", name="Images").click()  # the time counts when its field is left
 
 
 def _photographs(page: Page) -> list[Image.Image]:
