@@ -1,5 +1,6 @@
 """One process of a rig as the supervisor sees it."""
 
+import signal
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -19,7 +20,7 @@ class State(StrEnum):
     STALLED = "stalled"  # sent no health in time and was killed; will be restarted
     RENEWED = "renewed"  # was told to end, and starts again as soon as it has
     FINISHED = "finished"  # there is nothing left for it to do
-    FAILED = "failed"  # given up
+    FAILED = "failed"  # given up for a while
     STOPPED = "stopped"
 
 
@@ -33,7 +34,8 @@ class Child:
         stage: children of lower stages are stopped first.
         state: its state.
         reason: of the state, in plain words.
-        restarts: how often it was started again.
+        restarts: how often it was started again after a failure.
+        starts: how often it was started.
         process: the running one; `NO_PROCESS` if there is none.
         exit_code: of its last end.
         worst_code: the highest with which it ended by itself or because it was told; 128 + N for signal N that ended it
@@ -47,6 +49,7 @@ class Child:
     state: State = State.BACKOFF
     reason: str = ""
     restarts: int = 0
+    starts: int = 0
     exit_code: int = 0
     worst_code: int = 0
     process: Process = field(default=NO_PROCESS, repr=False)
@@ -58,3 +61,15 @@ class Child:
     heard_ns: int = 0
     threads: Mapping[int, ThreadTimes] = field(default_factory=dict, repr=False)
     exits_ns: deque[int] = field(default_factory=deque, repr=False)
+
+    def end(self) -> None:
+        """Keeps the exit code of a process that was told to end, and kills it if it has not; no effect without one."""
+        if self.process is NO_PROCESS:
+            return
+        self.process.kill()
+        code = self.process.poll()
+        self.exit_code = -signal.SIGKILL if code is None else code  # None: it is stuck in the kernel
+        # Processes end in order by SIGTERM, unless they have not begun.
+        counted = 0 if self.exit_code == -signal.SIGTERM else self.exit_code
+        self.worst_code = max(self.worst_code, counted if counted >= 0 else 128 - counted)
+        self.process = NO_PROCESS

@@ -4,7 +4,6 @@ A state machine without threads: the caller calls `poll` periodically; clock and
 """
 
 import logging
-import signal
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
@@ -30,7 +29,8 @@ class Limits:
     """Limits and timeouts of a supervisor.
 
     Attributes:
-        restarts, window_ns: a process that needs more restarts than this within the window is given up [ns].
+        restarts, window_ns: a process that needs more restarts than this within the window is given up, for as long
+            [ns].
         startup_ns: timeout for the first health, and between healths while a process reports to be busy [ns].
         stall_ns: timeout between healths afterwards; a process that exceeds it is restarted [ns]. The time that it
             waited for a processor is added, up to `startup_ns`.
@@ -72,7 +72,9 @@ class Supervisor:
                 self._check(child, now_ns)
             if child.state is State.RENEWED and child.process.poll() is not None:
                 child.start_at_ns = now_ns
-            if child.state in (State.BACKOFF, State.STALLED, State.RENEWED) and now_ns >= child.start_at_ns:
+            waits = child.state in (State.BACKOFF, State.STALLED, State.RENEWED, State.FAILED)
+            if waits and now_ns >= child.start_at_ns:
+                child.restarts += child.state is State.FAILED
                 self._start(child, now_ns)
 
     def processes(self) -> frozenset[int]:
@@ -99,8 +101,11 @@ class Supervisor:
         child.start_at_ns = self._clock() + self._limits.stop_ns
 
     def misconfigured(self) -> Child | None:
-        """A child that ended with a user error, after which the rig should stop; None if there is none."""
-        failed = (child for child in self.children.values() if child.state is State.FAILED)
+        """A child that its first start has ended with a user error, after which the rig should stop; None if none has.
+
+        Later, in a rig that works, a file may be wrong that another configuration names, or that somebody has replaced.
+        """
+        failed = (child for child in self.children.values() if child.state is State.FAILED and child.starts == 1)
         return next((child for child in failed if child.exit_code == Exit.USER), None)
 
     def exit_code(self) -> Exit | None:
@@ -154,7 +159,7 @@ class Supervisor:
         return now_ns < child.deadline_ns + min(waited_ns, self._limits.startup_ns)
 
     def _start(self, child: Child, now_ns: int) -> None:
-        _end(child)
+        child.end()
         try:
             child.process = self._spawn(child.component, child.arguments)
         except (OSError, EOFError, RuntimeError, MemoryError) as error:  # RuntimeError: too many threads
@@ -165,7 +170,7 @@ class Supervisor:
             return
         started = {"component": child.component, "child": child.process.pid, "restarts": child.restarts}
         _log.info("%s is started", child.component, extra={"fields": started})
-        child.state, child.reason = State.RUNNING, ""
+        child.state, child.reason, child.starts = State.RUNNING, "", child.starts + 1
         child.started_ns, child.heard_ns, child.threads = now_ns, now_ns, {}
         child.deadline_ns = child.overdue_ns = now_ns + self._limits.startup_ns
 
@@ -180,8 +185,8 @@ class Supervisor:
         child.exit_code, child.worst_code = code, max(child.worst_code, code)
         if code == Exit.ENDED:
             child.state, child.process = State.FINISHED, NO_PROCESS
-        elif code == Exit.USER:
-            self._give_up(child, child.process.output_tail())
+        elif code == Exit.USER and child.starts == 1:
+            self._give_up(child, now_ns, child.process.output_tail())
         else:
             self._schedule_restart(child, now_ns, _exit_reason(code, child.process.output_tail()), State.BACKOFF)
 
@@ -197,8 +202,9 @@ class Supervisor:
         while child.exits_ns and child.exits_ns[0] <= now_ns - self._limits.window_ns:
             child.exits_ns.popleft()
         if len(child.exits_ns) >= self._limits.restarts:
-            times = f"needed more than {self._limits.restarts} restarts in {self._limits.window_ns / 1e9:g} s"
-            self._give_up(child, f"{times}; the last time it {reason}")
+            window = f"{self._limits.window_ns / 1e9:g} s"
+            times = f"needed more than {self._limits.restarts} restarts in {window}, and is started again in {window}"
+            self._give_up(child, now_ns, f"{times}; the last time it {reason}")
             return
         worked = now_ns - child.started_ns > WORKED_NS
         child.backoff_ns = FIRST_BACKOFF_NS if worked else min(2 * child.backoff_ns, LONGEST_BACKOFF_NS)
@@ -208,7 +214,8 @@ class Supervisor:
         child.state, child.reason, child.process = state, reason, NO_PROCESS
         _log.warning("%s %s; starting it again", child.component, reason)
 
-    def _give_up(self, child: Child, reason: str) -> None:
+    def _give_up(self, child: Child, now_ns: int, reason: str) -> None:
+        child.start_at_ns = now_ns + self._limits.window_ns
         child.state, child.reason, child.process = State.FAILED, reason, NO_PROCESS
         if child is not self.misconfigured():  # whose message is the last word of the whole run
             _log.error("%s is given up: %s", child.component, reason)
@@ -218,20 +225,7 @@ class Supervisor:
             child.reason = "did not end in time and was killed"
         if child.state in (State.RUNNING, State.BACKOFF, State.STALLED, State.RENEWED):
             child.state = State.STOPPED
-            _end(child)
-
-
-def _end(child: Child) -> None:
-    """Keeps the exit code of a process that was told to end, and kills it if it has not; no effect without one."""
-    if child.process is NO_PROCESS:
-        return
-    child.process.kill()
-    code = child.process.poll()
-    child.exit_code = -signal.SIGKILL if code is None else code  # None: it is stuck in the kernel
-    # Processes end in order by SIGTERM, unless they have not begun.
-    counted = 0 if child.exit_code == -signal.SIGTERM else child.exit_code
-    child.worst_code = max(child.worst_code, counted if counted >= 0 else 128 - counted)
-    child.process = NO_PROCESS
+            child.end()
 
 
 def _exit_reason(code: int, output_tail: str) -> str:

@@ -179,7 +179,8 @@ class RunTable(Table):
     """`[run]`: limits and timeouts of the supervisor, and its notifications.
 
     Attributes:
-        max_restarts: number of restarts within `restart_window_s` that a process may need; with more, it is given up.
+        max_restarts: number of restarts within `restart_window_s` that a process may need; with more, it is given up
+            for as long. Without cameras or any tracker, `abs-service run` ends.
         restart_window_s: time over which the restarts of a process are counted [s].
         startup_timeout_s: longest time without health of a process that starts or compiles its kernels [s].
         stall_timeout_s: longest time without health afterwards [s]; a process that exceeds either is restarted. The

@@ -57,6 +57,35 @@ def test_a_child_that_crashes_too_often_is_given_up_and_the_others_go_on(world):
     assert supervisor.children["track/b"].state is State.RUNNING
 
 
+def test_a_child_that_was_given_up_is_tried_again_when_the_window_is_over(world):
+    supervisor = world.supervisor("capture", "record")
+    for _ in range(6):
+        ends(world, supervisor, "record", -9)
+    record = supervisor.children["record"]
+    assert record.state is State.FAILED
+    passes(world, supervisor, 55)
+    assert record.state is State.FAILED
+    passes(world, supervisor, 2)
+    assert (record.state, record.restarts, record.reason) == (State.RUNNING, 6, "")
+    ends(world, supervisor, "record", -9)
+    assert (record.state, record.restarts) == (State.RUNNING, 7), "with as many tries as before"
+
+
+@pytest.mark.parametrize("component", ["track/a", "record"])
+def test_a_file_that_is_wrong_when_a_child_starts_again_does_not_end_a_rig_that_works(world, component):
+    supervisor = world.supervisor("capture", "track/a", "track/b", "record")
+    world.words = "abs-service: error: sensors.tof.noise.file: No such file"
+    ends(world, supervisor, component, -9)
+    for _ in range(6):
+        ends(world, supervisor, component, Exit.USER)
+    child = supervisor.children[component]
+    assert (child.state, supervisor.exit_code(), supervisor.misconfigured()) == (State.FAILED, None, None)
+    assert "ended with code 2" in child.reason
+    assert "No such file" in child.reason
+    passes(world, supervisor, 60)
+    assert child.state is State.RUNNING
+
+
 def test_crashes_that_are_long_ago_are_forgiven(world):
     supervisor = world.supervisor("capture")
     for _ in range(20):
