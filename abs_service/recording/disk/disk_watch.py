@@ -2,19 +2,18 @@
 
 import shutil
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from abs_service.bus.health import Health, Level
 from abs_service.bus.stamps import WallClock
 from abs_service.recording.disk import forecast
-from abs_service.recording.disk.retention import Retention
+from abs_service.recording.disk.retention import Ages, Retention
 
 #: Time between two looks [ns].
 PERIOD_NS = 10_000_000_000
 #: Room below which health warns [s].
 WARN_S = 3600.0
-#: Change of the wall clock after which nothing is deleted by its age until the process starts again [ns].
-STEP_NS = 86_400_000_000_000
 
 
 class DiskWatch:
@@ -45,7 +44,7 @@ class DiskWatch:
         self._clock = clock
         self._free_bytes = free_bytes
         self._meters = forecast.RateMeter(), forecast.RateMeter()
-        self._offset_ns = clock.wall(0)
+        self._ages = Ages(clock.wall(0)), Ages(clock.wall(0))
         self._next_ns = 0
 
     def look(self, written: tuple[int, int]) -> None:
@@ -66,18 +65,15 @@ class DiskWatch:
             self._health.label("forecast", "")
 
     def _delete(self, now_ns: int) -> None:
-        # A wall clock that jumps years ahead makes all recordings old.
-        is_steady = abs(self._clock.wall(0) - self._offset_ns) < STEP_NS
-        try:
-            wall_ns = self._clock.wall(now_ns) if is_steady else 0
-            deleted = [path for kept in (self._recordings, self._estimates) for path in kept.apply(wall_ns)]
-        except OSError as error:
-            self._health.report("retention", Level.WARNING, f"an old recording cannot be deleted: {error}")
-            return
-        self._health.report("retention", Level.OK)
-        for path in deleted:
-            self._health.count("deleted")
-            self._health.label("deleted", path.name)
+        warning = ""
+        for kept, ages in zip((self._recordings, self._estimates), self._ages, strict=True):
+            deleted, failures = kept.apply(partial(ages.of, now_ns=now_ns))
+            for path in deleted:
+                self._health.count("deleted")
+                self._health.label("deleted", path.name)
+            if failures:
+                warning = f"an old recording cannot be deleted: {failures[0]}"
+        self._health.report("retention", Level.WARNING if warning else Level.OK, warning)
 
     def _forecast(self, rate: float, estimates_rate: float) -> None:
         room = self._free_bytes(self._recordings.directory) - self._minimum_free_bytes

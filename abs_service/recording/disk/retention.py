@@ -2,10 +2,12 @@
 
 import os
 import re
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
 from abs_service.recording.disk.forecast import Growth
+from abs_service.recording.recording_file import ACTIVE
 
 #: Beside a recording, `x.mcap.keep` for `x.mcap`: it is never deleted.
 KEEP = ".keep"
@@ -18,6 +20,40 @@ class Kept:
     path: Path
     size: int
     mtime_ns: int
+
+
+class Ages:
+    """Ages of recordings, which no step of the wall clock changes.
+
+    It is asked for once, and tells how old those are that are there already. What comes later counts from the last time
+    at which it was seen unfinished.
+
+    Args:
+        wall_ns: wall-clock time of the zero of the monotonic clock [ns].
+    """
+
+    def __init__(self, wall_ns: int) -> None:
+        self._wall_ns = wall_ns
+        self._changed_ns: dict[str, int] | None = None  # by name, CLOCK_MONOTONIC [ns]
+
+    def of(self, files: Iterable[Kept], now_ns: int) -> dict[Path, int]:
+        """Times since the last change of all files that there are [ns].
+
+        Args:
+            files: they.
+            now_ns: the present, CLOCK_MONOTONIC [ns].
+        """
+        before, self._changed_ns, ages = self._changed_ns, {}, {}
+        for file in files:
+            name = file.path.name.removesuffix(ACTIVE)
+            changed_ns = now_ns
+            if before is None:
+                changed_ns = min(file.mtime_ns - self._wall_ns, now_ns)
+            elif name == file.path.name:
+                changed_ns = before.get(name, now_ns)
+            self._changed_ns[name] = changed_ns
+            ages[file.path] = now_ns - changed_ns
+        return ages
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,25 +99,29 @@ class Retention:
         """Growth of the recordings at a recording rate [bytes/s]."""
         return Growth(rate, sum(file.size for file in self.files()), self.retain_s, self.retain_bytes)
 
-    def apply(self, wall_ns: int) -> list[Path]:
-        """Deletes the files beyond the limits, and returns them.
+    def apply(self, ages: Callable[[Iterable[Kept]], dict[Path, int]]) -> tuple[list[Path], list[OSError]]:
+        """Deletes the files beyond the limits.
 
         Args:
-            wall_ns: the present [ns since the epoch].
+            ages: ages of files [ns].
 
-        Raises:
-            OSError: a file cannot be deleted.
+        Returns:
+            The deleted files, and why others could not be deleted.
         """
-        if self.retain_s == self.retain_bytes == float("inf"):
-            return []
-        files = self.files()
-        excess = sum(file.size for file in files) - self.retain_bytes
         deleted: list[Path] = []
-        for file in files:
-            if file.path.suffix == ".active":
+        failures: list[OSError] = []
+        if self.retain_s == self.retain_bytes == float("inf"):
+            return deleted, failures
+        files = self.files()
+        excess, age_ns = sum(file.size for file in files) - self.retain_bytes, ages(files)
+        for file in sorted(files, key=lambda file: -age_ns[file.path]):
+            if file.path.suffix == ACTIVE or (excess <= 0 and age_ns[file.path] <= self.retain_s * 1e9):
                 continue
-            if excess > 0 or wall_ns - file.mtime_ns > self.retain_s * 1e9:
+            try:
                 file.path.unlink(missing_ok=True)
-                excess -= file.size
-                deleted.append(file.path)
-        return deleted
+            except OSError as error:
+                failures.append(error)
+                continue
+            excess -= file.size
+            deleted.append(file.path)
+        return deleted, failures

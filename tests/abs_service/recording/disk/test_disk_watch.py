@@ -1,6 +1,7 @@
 """The forecast, and old recordings that are deleted while new ones are written."""
 
 import math
+import os
 
 import pytest
 from absmsg.v1.health_pb2 import Health as HealthMessage
@@ -109,11 +110,54 @@ def test_estimates_outlive_their_recordings(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == [names[1]]
 
 
-def test_a_wall_clock_that_jumps_by_years_makes_no_recording_old(tmp_path):
-    put(tmp_path, take(1), 1)
-    watch = Watch(tmp_path, 1, retain_s=4.5 * 86_400)
-    watch.jump_ns = 3000 * DAY_NS
-    assert watch.pass_seconds(30).counters["deleted"] == 0
+#: An hour that the time zone was wrong, a year, and to 1970 [days].
+STEPS = (1 / 24, -1 / 24, 365, -NOW_NS / DAY_NS)
+
+
+@pytest.mark.parametrize("days", STEPS)
+def test_no_step_of_the_wall_clock_makes_a_recording_older_or_younger(tmp_path, days):
+    watch = Watch(tmp_path, 1, retain_s=60.0)
+    put(tmp_path, take(1), 20 / 86_400)
+    watch.pass_seconds(11)
+    watch.jump_ns = int(days * DAY_NS)
+    assert watch.pass_seconds(20).counters["deleted"] == 0
+    assert watch.pass_seconds(20).counters["deleted"] == 1
+
+
+@pytest.mark.parametrize("days", STEPS)
+def test_what_is_recorded_after_a_step_of_the_wall_clock_is_the_newest(tmp_path, days):
+    for day in (1, 2, 3):
+        put(tmp_path, take(day), 8 - day)
+    watch = Watch(tmp_path, 1, retain_bytes=400)
+    watch.pass_seconds(11)
+    for day in (4, 5):
+        active = put(tmp_path, take(day) + ".active", -days)
+        watch.pass_seconds(10)
+        active.rename(tmp_path / take(day))
+    watch.pass_seconds(10)
+    assert sorted(path.name for path in tmp_path.iterdir()) == [take(day) for day in (2, 3, 4, 5)]
+
+
+def test_a_recording_is_as_old_as_its_end(tmp_path):
+    watch = Watch(tmp_path, 1, retain_s=60.0)
+    active = put(tmp_path, take(1) + ".active")
+    watch.pass_seconds(300)
+    active.rename(tmp_path / take(1))
+    assert watch.pass_seconds(50).counters["deleted"] == 0
+    assert watch.pass_seconds(30).counters["deleted"] == 1
+
+
+def test_what_cannot_be_deleted_does_not_keep_the_others(tmp_path, monkeypatch):
+    def unlink(path, missing_ok):
+        if path.name == take(1):
+            raise PermissionError(1, "Operation not permitted")
+        os.unlink(path)
+
+    for day in (1, 2, 3):
+        put(tmp_path, take(day), 8 - day)
+    monkeypatch.setattr("pathlib.Path.unlink", unlink)
+    said = Watch(tmp_path, 10**15, retain_s=86_400).pass_seconds(1)
+    assert (said.counters["deleted"], "Operation not permitted" in said.message) == (2, True)
 
 
 def test_what_cannot_be_deleted_is_said(tmp_path, monkeypatch):

@@ -2,10 +2,11 @@
 
 import math
 import os
+from functools import partial
 
 import pytest
 
-from abs_service.recording.disk.retention import Retention
+from abs_service.recording.disk.retention import Ages, Retention
 from abs_service.recording.recording_file import ESTIMATES
 
 DAY_NS = 86_400_000_000_000
@@ -25,6 +26,13 @@ def take(day):
     return f"demo_2026-11-{day:02}T10-00-00Z.mcap"
 
 
+def apply(retention):
+    """The files that it deletes in a process that has just started."""
+    deleted, failures = retention.apply(partial(Ages(NOW_NS).of, now_ns=0))
+    assert failures == []
+    return deleted
+
+
 def names(paths):
     return [path.name for path in paths]
 
@@ -39,22 +47,22 @@ def week(tmp_path):
 
 def test_what_is_too_old_is_deleted(week):
     retention = Retention(week, "demo", "", retain_s=4.5 * 86_400, retain_bytes=math.inf)
-    assert names(retention.apply(NOW_NS)) == [take(1), take(2), take(3)]
-    assert retention.apply(NOW_NS) == []
+    assert names(apply(retention)) == [take(1), take(2), take(3)]
+    assert apply(retention) == []
     assert len(list(week.iterdir())) == 4
 
 
 def test_the_oldest_are_deleted_until_the_others_fit(week):
-    assert names(Retention(week, "demo", "", math.inf, 350).apply(NOW_NS)) == [take(day) for day in (1, 2, 3, 4)]
+    assert names(apply(Retention(week, "demo", "", math.inf, 350))) == [take(day) for day in (1, 2, 3, 4)]
 
 
 def test_nothing_is_deleted_unless_it_was_asked_for(week):
-    assert Retention(week, "demo", "", math.inf, math.inf).apply(NOW_NS) == []
+    assert apply(Retention(week, "demo", "", math.inf, math.inf)) == []
 
 
 def test_what_is_marked_is_kept_and_does_not_count(week):
     (week / (take(1) + ".keep")).touch()
-    assert names(Retention(week, "demo", "", math.inf, 500).apply(NOW_NS)) == [take(2)]
+    assert names(apply(Retention(week, "demo", "", math.inf, 500))) == [take(2)]
     assert (week / take(1)).exists()
 
 
@@ -71,20 +79,20 @@ def test_what_is_marked_is_kept_and_does_not_count(week):
 )
 def test_what_is_no_finished_recording_of_this_rig_stays(week, name):
     put(week, name, age_days=100)
-    Retention(week, "demo", "", 0.5, 0).apply(NOW_NS)
+    apply(Retention(week, "demo", "", 0.5, 0))
     assert names(week.iterdir()) == [name]
 
 
 def test_the_unfinished_file_counts(week):
     put(week, take(8) + ".active", size=400)
-    assert len(Retention(week, "demo", "", math.inf, 700).apply(NOW_NS)) == 4
+    assert len(apply(Retention(week, "demo", "", math.inf, 700))) == 4
 
 
 def test_what_recoveries_left_goes_with_the_recordings(tmp_path):
     left = [f"demo_2026-11-01T10-00-00Z{end}" for end in ("_2.mcap", ".mcap.broken", ".recovered.mcap")]
     for name in left:
         put(tmp_path, name, age_days=2)
-    assert sorted(names(Retention(tmp_path, "demo", "", 86_400, math.inf).apply(NOW_NS))) == sorted(left)
+    assert sorted(names(apply(Retention(tmp_path, "demo", "", 86_400, math.inf)))) == sorted(left)
 
 
 def test_files_of_estimates_are_kept_as_long_as_their_own_limits_say(week):
@@ -94,9 +102,9 @@ def test_files_of_estimates_are_kept_as_long_as_their_own_limits_say(week):
     ]
     for name in left:
         put(week, name, age_days=9)
-    assert sorted(names(Retention(week, "demo", ESTIMATES, 86_400, math.inf).apply(NOW_NS))) == sorted(left)
+    assert sorted(names(apply(Retention(week, "demo", ESTIMATES, 86_400, math.inf)))) == sorted(left)
     assert len(list(week.iterdir())) == 7
 
 
 def test_a_folder_that_is_gone_holds_nothing(tmp_path):
-    assert Retention(tmp_path / "gone", "demo", "", 1.0, 1.0).apply(NOW_NS) == []
+    assert apply(Retention(tmp_path / "gone", "demo", "", 1.0, 1.0)) == []
