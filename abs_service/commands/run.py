@@ -24,7 +24,7 @@ from abs_service.bus import keys
 from abs_service.bus.session import Role
 from abs_service.bus.stamps import WallClock
 from abs_service.commands.parts import logs, rig_process
-from abs_service.commands.parts.rig_in_memory import in_memory
+from abs_service.commands.parts.rig_in_memory import RigInMemory, in_memory
 from abs_service.commands.running import view
 from abs_service.display.terminal import choice
 from abs_service.recording.disk import folder
@@ -33,7 +33,7 @@ from abs_service.supervision.child import Child
 from abs_service.supervision.child_process import ChildProcess, Process, Spawn
 from abs_service.supervision.exit_codes import Exit
 from abs_service.supervision.rig_view import Display
-from abs_service.supervision.run_session import RunSession
+from abs_service.supervision.run_session import Renewal, RunSession
 from abs_service.supervision.supervisor import Limits, Supervisor
 from abs_service.wire.commands import RefusedError
 
@@ -88,7 +88,7 @@ def run(arguments: argparse.Namespace) -> int:
         notifier = systemd.notifier(os.environ)
         watchers = (notifier.update, measure, lambda _: forked.ensure_running())
         session = RunSession(bus, *about, rig.trackers, supervisor, display, WallClock(), watchers)
-        session.answer_reloads(lambda: file.exchange(partial(read_again, arguments), supervisor.children))
+        session.answer_reloads(partial(renewal, file, arguments, page))
         rig_process.on_hangup(session.reload)
         try:
             session.run_until(lambda: stop.is_set() or session.elapsed_s >= arguments.duration)
@@ -146,6 +146,16 @@ def read_again(arguments: argparse.Namespace) -> config.ServiceConfig:
     if rig.record.enabled:
         folder.check(rig.record.directory)
     return rig
+
+
+def renewal(file: RigInMemory, arguments: argparse.Namespace, page: Sequence[str] | None) -> Renewal:
+    """Lets the file have the configuration that the rig file has now; returns what follows for the processes.
+
+    Raises:
+        RefusedError: it cannot be taken over.
+    """
+    changes = file.exchange(partial(read_again, arguments))
+    return Renewal(file.rig.record.directory, children(file.rig, file.path, page), changes.components, changes.ends)
 
 
 def page_options(arguments: argparse.Namespace) -> list[str] | None:

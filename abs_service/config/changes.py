@@ -18,11 +18,13 @@ class Changes:
 
     Attributes:
         fixed: keys that differ and cannot change as long as the rig runs.
-        components: names, as in health, of the processes that have to start again.
+        components: names, as in health, of the processes that have to start, or to start again.
+        ends: those of the processes that have to end.
     """
 
     fixed: tuple[str, ...]
     components: tuple[str, ...]
+    ends: tuple[str, ...] = ()
 
 
 def between(old: ServiceConfig, new: ServiceConfig) -> Changes:
@@ -34,17 +36,16 @@ def between(old: ServiceConfig, new: ServiceConfig) -> Changes:
     if before == after:
         return Changes((), ())
     fixed = [key for key in FIXED if before[key] != after[key]]
-    if set(before["trackers"]) != set(after["trackers"]):
-        fixed.append("trackers")
     if before["record"]["enabled"] != after["record"]["enabled"]:
         fixed.append("record.enabled")
     if fixed:
         return Changes(tuple(fixed), ())
     capture = ["capture"] if _opened(before) != _opened(after) else []
     trackers = [f"track/{name}" for name in after["trackers"] if _tracked(before, name) != _tracked(after, name)]
+    ends = tuple(f"track/{name}" for name in before["trackers"] if name not in after["trackers"])
     record = ["record"] if after["record"]["enabled"] else []
     page = ["view"] if any(before[key] != after[key] for key in ("devices", "sensors", "trackers")) else []
-    return Changes((), (*capture, *trackers, *record, *page))
+    return Changes((), (*capture, *trackers, *record, *page), ends)
 
 
 def _opened(rig: dict[str, Any]) -> object:
@@ -54,7 +55,9 @@ def _opened(rig: dict[str, Any]) -> object:
 
 
 def _tracked(rig: dict[str, Any], tracker: str) -> object:
-    """Everything that one tracker has read."""
+    """Everything that one tracker has read; None if there is no such tracker."""
+    if tracker not in rig["trackers"]:
+        return None
     table = rig["trackers"][tracker]
     sensors = {name: rig["sensors"][name] for name in table["sensors"]}
     devices = {sensor["device"]: rig["devices"][sensor["device"]] for sensor in sensors.values()}

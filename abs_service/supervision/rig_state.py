@@ -51,8 +51,18 @@ class RigState:
         self.trackers = {name: TrackerLog() for name in trackers}
         self.received: dict[str, Received] = {}
         self.malformed = 0
+        self._removed: frozenset[str] = frozenset()  # components, whose last words come later
         self._ended: defaultdict[str, Counter[str]] = defaultdict(Counter)  # counters of processes that have ended
         self._clock = clock
+
+    def follow(self, trackers: Iterable[str]) -> None:
+        """Goes on with other trackers; those that there were before keep their logs."""
+        names, before = tuple(trackers), self.trackers
+        self.trackers = {name: before.get(name) or TrackerLog() for name in names}
+        now, gone = ({f"track/{name}" for name in some} for some in (names, before.keys() - set(names)))
+        self._removed = (self._removed | gone) - now
+        for component in gone:
+            self.received.pop(component, None)
 
     def take(self, sample: Sample) -> list[EstimateReport]:
         """Processes one message and returns the estimates that it completes; counts malformed messages."""
@@ -65,6 +75,8 @@ class RigState:
     def _take(self, sample: Sample) -> list[EstimateReport]:
         if sample.message == Health.DESCRIPTOR.full_name:
             health = Health.FromString(sample.payload)
+            if health.component in self._removed:
+                return []
             before = self.health(health.component)
             if before.header.boot_id != health.header.boot_id:
                 self._ended[health.component].update(before.counters)

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from queue import SimpleQueue
@@ -41,6 +42,23 @@ _LEVELS: Mapping[State, Level] = {
 }
 
 
+@dataclass(frozen=True, slots=True)
+class Renewal:
+    """The consequences of another configuration.
+
+    Attributes:
+        directory: folder of the recordings.
+        children: all processes of the rig, not started.
+        components: those that have to start, or to start again; one that the rig has not is ignored.
+        ends: those that it had and has no longer.
+    """
+
+    directory: Path
+    children: Sequence[Child]
+    components: Sequence[str]
+    ends: Sequence[str] = ()
+
+
 class RunSession:
     """Everything that `abs-service run` does between its start and its end.
 
@@ -73,7 +91,7 @@ class RunSession:
         trackers = tuple(trackers)
         self._monitor = partial(SilenceMonitor, clock.monotonic, math.inf)
         self._silence_monitors = {keys.state(name): self._monitor() for name in trackers}
-        self._renewals: SimpleQueue[tuple[Path, Sequence[str]]] = SimpleQueue()
+        self._renewals: SimpleQueue[Renewal] = SimpleQueue()
         self._supervisor = supervisor
         self._display = display
         self._clock = clock
@@ -94,17 +112,17 @@ class RunSession:
         """Time since the start [s]."""
         return (self._clock.monotonic() - self._begin_ns) * 1e-9
 
-    def answer_reloads(self, read: Callable[[], tuple[Path, Sequence[str]]]) -> None:
+    def answer_reloads(self, read: Callable[[], Renewal]) -> None:
         """Answers requests to read the rig file again.
 
         Args:
-            read: reads it, and returns the folder of the recordings and the processes that have to start again; raises
-                RefusedError. Called from a thread of the transport.
+            read: reads it; raises RefusedError. Called from a thread of the transport.
         """
 
-        def act() -> Sequence[str]:
+        def act() -> tuple[Sequence[str], Sequence[str]]:
             self._renewals.put(renewal := read())
-            return renewal[1]
+            has = {child.component for child in renewal.children}
+            return [component for component in renewal.components if component in has], renewal.ends
 
         commands.answer_reload(self._bus, self._headers, self._health, act)
 
@@ -116,7 +134,7 @@ class RunSession:
         """Runs until `stop_requested` returns True or the supervisor has an exit code."""
         while not stop_requested() and self._supervisor.exit_code() is None:
             while not self._renewals.empty():
-                self._renew(*self._renewals.get())
+                self._renew(self._renewals.get())
             self._supervisor.poll()
             self._pools.update(self._supervisor.processes())
             self._report()
@@ -164,12 +182,21 @@ class RunSession:
         for watch in self._watchers:
             watch(view)
 
-    def _renew(self, directory: Path, components: Sequence[str]) -> None:
+    def _renew(self, renewal: Renewal) -> None:
         """Starts some processes again with another configuration; the others go on, capture with what it publishes."""
-        self._directory = directory
-        if "capture" not in components:
+        self._directory = renewal.directory
+        known = self._supervisor.children.keys()
+        self._supervisor.exchange(renewal.children)
+        names = [child.component for child in renewal.children]
+        trackers = [name.removeprefix("track/") for name in names if name.startswith("track/")]
+        self._live.follow(trackers)
+        monitors = self._silence_monitors
+        self._silence_monitors = {topic: monitors.get(topic) or self._monitor() for topic in map(keys.state, trackers)}
+        for topic in (*renewal.ends, *(monitors.keys() - self._silence_monitors.keys())):
+            self._health.report(topic, Level.OK)
+        if "capture" not in renewal.components:
             self._supervisor.children["capture"].process.wake()
-        for component in components:
+        for component in [one for one in renewal.components if one in known and one in names]:
             self._supervisor.renew(component)
             topic = keys.state(component.removeprefix("track/"))
             if topic in self._silence_monitors:

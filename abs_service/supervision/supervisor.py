@@ -61,12 +61,16 @@ class Supervisor:
         self._spawn = spawn
         self._clock = clock
         self._limits = limits or Limits()
+        self._leaving: list[Child] = []
         self._polled_ns = clock()
 
     def poll(self) -> None:
         """Starts, restarts and gives up children as due."""
         now_ns = self._clock()
         self._excuse_pause(now_ns)
+        for child in [one for one in self._leaving if one.process.poll() is not None or now_ns >= one.start_at_ns]:
+            child.end()
+            self._leaving.remove(child)
         for child in self.children.values():
             if child.state is State.RUNNING:
                 self._check(child, now_ns)
@@ -79,7 +83,7 @@ class Supervisor:
 
     def processes(self) -> frozenset[int]:
         """Numbers of the processes that run."""
-        return frozenset(child.process.pid for child in self.children.values()) - {NO_PROCESS.pid}
+        return frozenset(one.process.pid for one in (*self.children.values(), *self._leaving)) - {NO_PROCESS.pid}
 
     def heartbeat(self, component: str, busy: bool = False) -> None:
         """Extends a component's deadline; further for a busy one, which compiles kernels."""
@@ -99,6 +103,14 @@ class Supervisor:
         child.exits_ns.clear()
         child.state, child.reason = State.RENEWED, "starts again with the configuration that was read"
         child.start_at_ns = self._clock() + self._limits.stop_ns
+
+    def exchange(self, children: Iterable[Child]) -> None:
+        """Has the given children from now on: those of new components start, those that are not given end in order."""
+        wanted = {child.component: child for child in children}
+        for component in self.children.keys() - wanted.keys():
+            self.renew(component)
+            self._leaving.append(self.children[component])
+        self.children = {component: self.children.get(component, child) for component, child in wanted.items()}
 
     def misconfigured(self) -> Child | None:
         """A child that its first start has ended with a user error, after which the rig should stop; None if none has.
@@ -143,6 +155,8 @@ class Supervisor:
                 wait(0.02)
             for child in children:
                 self._finalize(child)
+        for child in self._leaving:
+            child.end()
 
     def _excuse_pause(self, now_ns: int) -> None:
         """Extends all deadlines by the time in which this process was stopped and received nothing."""

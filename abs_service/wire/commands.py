@@ -116,18 +116,25 @@ def answer_record(bus: Bus, headers: HeaderFactory, health: Health, act: Callabl
     return answer_valid(bus, keys.RECORD, RECORD, headers, health, on_command, which)
 
 
-def answer_reload(bus: Bus, headers: HeaderFactory, health: Health, act: Callable[[], Sequence[str]]) -> Subscription:
+def answer_reload(
+    bus: Bus, headers: HeaderFactory, health: Health, act: Callable[[], tuple[Sequence[str], Sequence[str]]]
+) -> Subscription:
     """Answers requests to read the rig file again; counts and tells them as `answer_reinitialize`.
 
     Args:
         bus: of the rig.
         headers: of the answers.
         health: of who answers.
-        act: reads it and returns the components that start again, or raises RefusedError. Called from a thread of the
-            transport.
+        act: reads it and returns the components that start, or start again, and those that end, or raises
+            RefusedError. Called from a thread of the transport.
     """
     reply = partial(answer_valid, bus, keys.RELOAD, RELOAD, headers, health)
-    return reply(lambda payload: CommandAnswer(restarts=act()), lambda payload: "")
+
+    def on_command(payload: bytes) -> CommandAnswer:
+        restarts, ends = act()
+        return CommandAnswer(restarts=restarts, ends=ends)
+
+    return reply(on_command, lambda payload: "")
 
 
 def reinitialize(

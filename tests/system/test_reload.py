@@ -38,9 +38,9 @@ def test_one_tracker_starts_anew_and_the_other_one_keeps_its_object(endpoint, la
         refused = abs_service("reload", rig_file)
         assert refused.returncode == 2
         assert "trackers.left.budget_ms" in refused.stderr
-        rig_file.write_text(text.replace("[trackers.left]", "[trackers.centre]"), encoding="utf-8")
+        rig_file.write_text(text.replace("stop_timeout_s = 20.0", "stop_timeout_s = 21.0"), encoding="utf-8")
         refused = abs_service("reload", rig_file)
-        assert (refused.returncode, refused.stdout[:26]) == (1, "the rig refuses: trackers:")
+        assert (refused.returncode, refused.stdout[:21]) == (1, "the rig refuses: run:")
 
         rig_file.write_text(text.replace("[trackers.left]", "[trackers.left]\nbudget_ms = 29.0"), encoding="utf-8")
         done = abs_service("reload", rig_file)

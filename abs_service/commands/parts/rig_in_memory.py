@@ -1,7 +1,7 @@
 """The configuration that the processes of a running rig read: a file in memory, whose content can be exchanged."""
 
 import os
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import IO
@@ -41,17 +41,8 @@ class RigInMemory:
         os.truncate(self._stream.fileno(), len(content))
         self.rig = rig
 
-    def exchange(
-        self, read: Callable[[], config.ServiceConfig], components: Collection[str]
-    ) -> tuple[Path, tuple[str, ...]]:
-        """Takes over a configuration, if it can be used without an end of the rig.
-
-        Args:
-            read: reads it.
-            components: processes that the rig has.
-
-        Returns:
-            Folder of the recordings, and the processes that have to start again.
+    def exchange(self, read: Callable[[], config.ServiceConfig]) -> changes.Changes:
+        """Takes over a configuration, which `read` reads, if it can be used without an end of the rig.
 
         Raises:
             RefusedError: it cannot; everything stays as it was.
@@ -67,7 +58,7 @@ class RigInMemory:
             keys = ", ".join(found.fixed)
             raise RefusedError(f"{keys}: can change only when the rig is stopped and started; nothing was taken over")
         self.write(new)
-        return new.record.directory, tuple(name for name in found.components if name in components)
+        return found
 
 
 @contextmanager

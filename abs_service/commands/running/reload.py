@@ -4,10 +4,10 @@
   abs-service reload rig.toml --connect tcp/192.168.1.7:7447      on another host, where the file of that host is read
 
 A tracker starts again if its table, one of its sensors or their devices have changed, and then detects its object
-anew; other trackers keep theirs. The devices start again if they, or the cameras of their sensors, have changed. The
-recorder begins another file, because a recording has one configuration. The file is checked first, as `abs-service
-check` does; if something is wrong with it, or a key has changed that cannot change while the rig runs, all stays as it
-was.
+anew; other trackers keep theirs, also when one is added or removed. The devices start again if they, or the cameras of
+their sensors, have changed. The recorder begins another file, because a recording has one configuration. The file is
+checked first, as `abs-service check` does; if something is wrong with it, or a key has changed that cannot change while
+the rig runs, all stays as it was.
 """
 
 import argparse
@@ -40,5 +40,6 @@ def request(bus: Bus, headers: HeaderFactory) -> int:
     if answer is None or not answer.accepted:
         print(f"the rig refuses: {answer.reason if answer else 'it gives no answer; is it `abs-service run`?'}")
         return Exit.FAILED
-    print(f"starts again: {', '.join(answer.restarts)}" if answer.restarts else "nothing has changed")
+    said = (("starts again", answer.restarts), ("ends", answer.ends))
+    print("; ".join(f"{what}: {', '.join(names)}" for what, names in said if names) or "nothing has changed")
     return Exit.OK

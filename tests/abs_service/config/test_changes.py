@@ -74,13 +74,17 @@ def test_only_what_is_concerned_starts_again(tmp_path, old, new, components):
     assert between(tmp_path, (old, new)) == changes.Changes((), components)
 
 
+def test_a_tracker_is_added_and_removed_without_the_other_one(tmp_path):
+    found = between(tmp_path, ("[trackers.right]", "[trackers.centre]"))
+    assert found == changes.Changes((), ("track/centre", "record", "view"), ("track/right",))
+
+
 @pytest.mark.parametrize(
     ("old", "new", "fixed"),
     [
         ('name = "pair"', 'name = "couple"', "name"),
         ("[record]", '[bus]\nendpoint = "tcp/127.0.0.1:7999"\n\n[record]', "bus"),
         ("[record]", "[run]\nmax_restarts = 9\n\n[record]", "run"),
-        ("[trackers.right]", "[trackers.centre]", "trackers"),
         ("[record]", "[record]\nenabled = false", "record.enabled"),
     ],
 )

@@ -20,7 +20,7 @@ from abs_service.display.terminal.lines import PlainDisplay
 from abs_service.display.terminal.output import Output
 from abs_service.supervision.child import Child, State
 from abs_service.supervision.exit_codes import Exit
-from abs_service.supervision.run_session import RunSession
+from abs_service.supervision.run_session import Renewal, RunSession
 from abs_service.supervision.supervisor import Limits, Supervisor
 from abs_service.tracking.monitors import silence_monitor
 from abs_service.wire import commands, estimate_messages
@@ -183,7 +183,8 @@ def test_a_tracker_that_falls_silent_is_an_error_whatever_the_cause(monkeypatch)
 
 def test_what_a_new_configuration_concerns_starts_again_and_capture_is_told():
     bench = Bench(PlainDisplay(Output(io.StringIO().write), Output(io.StringIO().write)))
-    bench.session.answer_reloads(lambda: (Path("other"), ("record",)))
+    children = [Child("capture", (), 0), Child("record", (), 1)]
+    bench.session.answer_reloads(lambda: Renewal(Path("other"), children, ("record", "view")))
     bench.supervisor.poll()
     capture, record = (child.process for child in bench.supervisor.children.values())
     commands.reload(bench.bus, HeaderFactory("bench", WallClock()), 1.0)

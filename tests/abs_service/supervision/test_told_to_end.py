@@ -46,6 +46,18 @@ def test_a_renewed_process_ends_in_order_and_starts_again_which_counts_as_no_fai
     assert [process.component for process in world.started] == ["capture", *4 * ["track/a"]]
 
 
+def test_a_process_that_is_not_wanted_any_more_ends_in_order_or_is_killed(world):
+    supervisor = world.supervisor("capture", "track/a", "track/b", "record", stop_ns=4 * S)
+    world.stubborn = {"track/b"}
+    supervisor.exchange([child for child in supervisor.children.values() if "track" not in child.component])
+    assert sorted(world.events) == [("terminate", "track/a"), ("terminate", "track/b")]
+    passes(world, supervisor, 3)
+    assert (len(world.events), len(supervisor.processes())) == (2, 3)
+    passes(world, supervisor, 1)
+    assert (world.events[-1], len(supervisor.processes())) == (("kill", "track/b"), 2)
+    assert (len(world.started), supervisor.exit_code()) == (4, None)
+
+
 def test_a_renewed_process_that_does_not_end_is_killed_and_one_that_was_given_up_begins_again(world):
     supervisor = world.supervisor("capture", "record", stop_ns=4 * S)
     ends(world, supervisor, "record", 2)
