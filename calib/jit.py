@@ -4,6 +4,7 @@ import functools
 import hashlib
 import os
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from importlib import import_module
 from inspect import ismodule
 from types import FunctionType
@@ -130,7 +131,10 @@ class Kernel:
         copy.__module__ = self.function.__module__
         copy.__qualname__ = f"{self.function.__qualname__}_{self.digest}{suffix}"
         settings: dict[str, Any] = _OPTIONS | {"fastmath": set(_FASTMATH)} | options
-        return njit(**settings)(copy)
+        compiled: Any = njit(**settings)(copy)
+        if settings["cache"] and not isinstance(compiled, FunctionType):  # Numba may be switched off
+            _tolerate_damage(compiled._cache)  # noqa: SLF001
+        return compiled
 
     @functools.cached_property
     def size(self) -> int:
@@ -157,6 +161,28 @@ class Kernel:
         used = set(self.function.__code__.co_names)
         known = self.function.__globals__ | dict(self._parts)
         return {name: value for name, value in known.items() if name in used}
+
+
+def _tolerate_damage(cache: Any) -> None:
+    """Lets a cache of Numba be empty where its files cannot be read, and stay as it is where the disk takes none.
+
+    A power cut or a full disk may leave empty or cut files, with which each call would fail, for ever.
+    """
+    load, save = cache.load_overload, cache.save_overload
+
+    def load_if_whole(*key: Any) -> Any:
+        try:
+            return load(*key)
+        except Exception:  # whatever cut bytes are to `pickle`
+            with suppress(OSError):
+                cache.flush()
+            return None
+
+    def save_if_possible(*key_and_code: Any) -> None:
+        with suppress(OSError):
+            save(*key_and_code)
+
+    cache.load_overload, cache.save_overload = load_if_whole, save_if_possible
 
 
 def load_compiler() -> None:

@@ -11,7 +11,6 @@ import os
 import shutil
 import signal
 import sys
-import tempfile
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from importlib import import_module
@@ -41,8 +40,7 @@ def preload(module: str) -> None:
     Should it die, this process becomes the parent of its children: prctl(2), PR_SET_CHILD_SUBREAPER.
     """
     ctypes.CDLL(None).prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
-    parent = tempfile.gettempdir() if len(os.fsencode(tempfile.gettempdir())) <= LONGEST_PARENT else "/tmp"
-    os.environ[_FOLDER] = folder = tempfile.mkdtemp(prefix="abs-service-", dir=parent)
+    os.environ[_FOLDER] = folder = standard_files.temporary_folder("abs-service-", LONGEST_PARENT)
     # Of one that multiprocessing makes for itself, it complains when somebody else has deleted it.
     current_process()._config["tempdir"] = folder  # pyright: ignore # noqa: SLF001
     atexit.register(shutil.rmtree, folder, ignore_errors=True)

@@ -3,9 +3,9 @@
 import atexit
 import os
 import shutil
-import tempfile
 
 import abs_service
+from abs_service.supervision import standard_files
 
 #: Numba's environment variable for it.
 VARIABLE = "NUMBA_CACHE_DIR"
@@ -18,7 +18,7 @@ def ensure() -> None:
     user = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
     given = os.environ.get(VARIABLE)
     if not any(map(_can_be_written, [given] if given else [os.path.dirname(abs_service.__file__), user])):
-        os.environ[VARIABLE] = folder = tempfile.mkdtemp(prefix="abs-service-kernels-")
+        os.environ[VARIABLE] = folder = standard_files.temporary_folder("abs-service-kernels-")
         atexit.register(shutil.rmtree, folder, ignore_errors=True)
 
 

@@ -1,11 +1,14 @@
 """Standard input, output and error, which a caller may have closed, or given an encoding without our characters.
 
-Nor may a caller's limit of open files be too low, where zenoh would end the process, nor its working directory be gone.
+Nor may a caller's limit of open files be too low, where zenoh would end the process, its working directory be gone, or
+its temporary folder be full.
 """
 
 import os
 import resource
 import sys
+import tempfile
+from contextlib import suppress
 
 #: Limits of open files: that a process asks for, and the least with which it begins.
 FILES, FEWEST_FILES = 1024, 64
@@ -19,7 +22,7 @@ class OutputError(Exception):
 
 
 class StartError(Exception):
-    """A process cannot work as it was started: with too few open files, or in a folder that was deleted."""
+    """A process cannot work as it was started: with too few open files, say, or in a folder that was deleted."""
 
 
 def is_folder_deleted() -> bool:
@@ -49,6 +52,26 @@ def allow_files() -> None:
         resource.setrlimit(resource.RLIMIT_NOFILE, (files, highest))
     if files < FEWEST_FILES:
         raise StartError(f"the limit of open files is {files}, at least {FEWEST_FILES} are needed: ulimit -n {FILES}")
+
+
+def temporary_folder(prefix: str, longest: int = 4096) -> str:
+    """Makes a folder in the temporary one; if that is full, or its path too long, in /tmp or in memory.
+
+    Args:
+        prefix: of its name.
+        longest: path of the folder that it is in, at most [bytes].
+
+    Raises:
+        StartError: it can be made nowhere.
+    """
+    parents = ["/tmp", "/dev/shm"]
+    with suppress(FileNotFoundError):  # no folder takes the file with which Python tries it
+        parents.insert(0, tempfile.gettempdir())
+    for parent in parents:
+        if len(os.fsencode(parent)) <= longest:
+            with suppress(OSError):
+                return tempfile.mkdtemp(prefix=prefix, dir=parent)
+    raise StartError(f"no folder can be made in {', '.join(parents)}; make room, or set TMPDIR to another folder")
 
 
 def secure() -> None:

@@ -1,5 +1,6 @@
 """Kernels are put together from others, and found again in the compiler's cache by what they are made from."""
 
+import errno
 import os
 import subprocess
 import sys
@@ -110,3 +111,21 @@ def test_what_was_compiled_is_found_again_unless_something_that_it_calls_has_cha
     assert first[1] == again[1]
     assert len(changed[1]) > len(again[1]) > 0
     assert back[1] == changed[1]
+    for file in cache.rglob("*.nb[ic]"):
+        file.write_bytes(file.read_bytes()[:40] if file.suffix == ".nbc" else b"")  # as after a power cut
+    mended, found = run(1), run(1)
+    assert (mended[0], found) == ("4.0", mended)
+
+
+def test_a_kernel_is_compiled_also_where_the_disk_takes_no_machine_code(monkeypatch: pytest.MonkeyPatch) -> None:
+    from numba.core.caching import IndexDataCacheFile
+
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(IndexDataCacheFile, "save", full)
+
+    def tripled(x: float) -> float:
+        return 3 * x
+
+    assert kernel(tripled)(2.0) == 6.0

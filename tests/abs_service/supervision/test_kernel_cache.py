@@ -1,12 +1,13 @@
 """Kernels are kept in a temporary folder where no other can be written."""
 
+import errno
 import os
 import tempfile
 
 import pytest
 
 import abs_service
-from abs_service.supervision import kernel_cache
+from abs_service.supervision import kernel_cache, standard_files
 
 
 @pytest.fixture
@@ -33,6 +34,23 @@ def test_a_temporary_folder_replaces_one_that_cannot_be_written(given, tmp_path,
 def test_a_folder_that_can_be_written_is_kept(given, tmp_path):
     assert given(tmp_path / "not" / "yet") == str(tmp_path / "not" / "yet")
     assert given("", user=tmp_path) == ""
+
+
+def test_a_full_temporary_folder_is_replaced_by_one_in_memory(given, monkeypatch):
+    room = ["/dev/shm"]
+
+    def full(**where):
+        if where["dir"] not in room:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        return f"{where['dir']}/{where['prefix']}x"
+
+    monkeypatch.setattr(tempfile, "mkdtemp", full)
+    assert given("/nonexistent") == "/dev/shm/abs-service-kernels-x"
+    monkeypatch.setattr(tempfile, "gettempdir", lambda: os.stat("/nowhere/at/all"))
+    assert given("/nonexistent") == "/dev/shm/abs-service-kernels-x"
+    room.clear()
+    with pytest.raises(standard_files.StartError, match="make room, or set TMPDIR"):
+        given("/nonexistent")
 
 
 def test_a_full_disk_is_replaced(given, tmp_path, monkeypatch):
