@@ -116,12 +116,11 @@ def _of_components(view: RigView) -> Iterator[Row]:
         yield "abs_health_age_seconds", "time since the last health, sent every second", labels, age_s
         for name, number in received.health.counters.items():
             yield "abs_count_total", "counters of health, by name", labels | {"name": name}, number
-        for name, value in received.health.gauges.items():
+        for name, value in view.gauges(component).items():
             if math.isfinite(value):
                 yield "abs_gauge", "gauges of health, by name, which ends in the unit", labels | {"name": name}, value
-    recorder = view.live.health("record")
-    if "free_bytes" in recorder.gauges:
-        yield "abs_disk_free_bytes", "room on the disk of the recordings", {}, recorder.gauges["free_bytes"]
+    if "free_bytes" in (gauges := view.gauges("record")):
+        yield "abs_disk_free_bytes", "room on the disk of the recordings", {}, gauges["free_bytes"]
 
 
 def _ignore(view: RigView) -> None:

@@ -9,8 +9,11 @@ from absmsg.v1.health_pb2 import Health
 
 from abs_service.bus import keys
 from abs_service.supervision.child import Child, State
-from abs_service.supervision.rig_state import RigState
+from abs_service.supervision.rig_state import Received, RigState
 from abs_service.tracking.log.tracker_log import EstimateReport
+
+#: A component that says nothing for this long, of its healths each second, has no present numbers [ns].
+SILENT_NS = 5_000_000_000
 
 
 @dataclass(frozen=True)
@@ -72,7 +75,7 @@ class RigView:
     def streams(self) -> list[Stream]:
         """All streams of images, by name."""
         counters, ages = self.live.counters("capture"), self._ages_ms()
-        gauges = self.live.health("capture").gauges
+        gauges = self.gauges("capture")
         topics = [key.removeprefix("published.") for key in counters if key.startswith("published.")]
         return [
             Stream(
@@ -85,6 +88,11 @@ class RigView:
             for topic in sorted(topics)
             if keys.is_image(topic)
         ]
+
+    def gauges(self, component: str) -> Mapping[str, float]:
+        """Present gauges of a component; none if it is silent: those of one that hangs or was given up are no more."""
+        received = self.live.received.get(component, Received())
+        return received.health.gauges if self.now_ns - received.t_ns < SILENT_NS else {}
 
     @property
     def recording(self) -> Recording | None:

@@ -93,6 +93,17 @@ def test_numbers_are_taken_once_a_second(read, port):
         assert read()[key] == 3
 
 
+def test_a_process_that_says_nothing_any_more_has_counters_and_an_age_but_no_present_numbers(read, port):
+    capture = {"counters": {"published.tof/depth/image": 30}, "gauges": {"rate_hz.tof/depth/image": 29.5}}
+    with metrics.served(port) as update:
+        update(view(NOW_NS + 6 * S, **capture))
+        found = read()
+    assert found["abs_stream_rate_hertz", "rig=demo", "stream=tof/depth"] == 0
+    assert found["abs_health_age_seconds", "component=capture", "rig=demo"] == 6
+    assert found["abs_count_total", "component=capture", "name=published.tof/depth/image", "rig=demo"] == 30
+    assert {name for name, *_ in found}.isdisjoint({"abs_gauge", "abs_disk_free_bytes"})
+
+
 def test_only_loopback_is_answered_and_nobody_after_the_end(read, port):
     with metrics.served(port):
         assert read() == {}
