@@ -15,6 +15,7 @@ from abs_service.bus.sequence_gaps import SequenceGaps
 from abs_service.bus.stamps import WallClock
 from abs_service.recording.take import Take
 from abs_service.wire import message_header as header
+from drivers.contract.host_clock import host_clock
 from drivers.encoding.encoded_image import ImageEncoder
 from drivers.encoding.mcap_file import McapFileError
 from drivers.encoding.parsing import CodecError
@@ -29,13 +30,15 @@ class SampleWriter:
     Args:
         encode_image: makes the recorded message of an image.
         health: of the recorder; has the counters.
-        clock: stamps messages without a stamp.
+        clock: stamps messages without a stamp; its wall clock at the beginning of a file is that of the whole file.
     """
 
     def __init__(self, encode_image: ImageEncoder, health: Health, clock: WallClock) -> None:
         self._encode_image = encode_image
         self._health = health
         self._clock = clock
+        self._offset_ns = clock.wall(0)  # of the open file
+        self._host_clock = host_clock()
         self._lock = threading.Lock()
         self._latched: dict[str, Sample] = {}
         self._gaps = SequenceGaps()
@@ -53,6 +56,7 @@ class SampleWriter:
         """Begins a recording with the metadata that makes it self-contained. Raises as `write`."""
         self._counts = Counter()
         self._attached = {}
+        self._offset_ns = self._clock.wall(0)
         self.unsaved = 0
         with self._lock:
             latched = list(self._latched.values())
@@ -78,7 +82,7 @@ class SampleWriter:
         self.unsaved += 1
         try:
             about = header.parse(sample)
-            stamp_ns = self._stamp_ns(about.stamp_ns, is_repeated)
+            stamp_ns = self._stamp_ns(about, is_repeated)
             message, payload = sample.message, sample.payload
             if message == header.IMAGE:
                 message, payload = self._encode_image(payload)
@@ -112,9 +116,15 @@ class SampleWriter:
             take.attach(f"calibration/{model.sensor}.json", "application/json", text, stamp_ns)
             self._attached[model.sensor] = model.calib_id
 
-    def _stamp_ns(self, stamp_ns: int, is_repeated: bool) -> int:
-        is_usable = 0 < stamp_ns < 1 << 63
-        return stamp_ns if is_usable and not is_repeated else self._clock.wall(self._clock.monotonic())
+    def _stamp_ns(self, about: header.MessageHeader, is_repeated: bool) -> int:
+        """Time of a message in the file, where no step of this host's wall clock changes their order."""
+        stamp_ns = about.stamp_ns
+        if about.host_clock == self._host_clock:
+            stamp_ns = about.t_host_ns + self._offset_ns
+        elif stamp_ns and not about.host_clock:
+            stamp_ns -= self._clock.wall(0) - self._offset_ns
+        is_usable = about.stamp_ns > 0 and 0 < stamp_ns < 1 << 63 and not is_repeated
+        return stamp_ns if is_usable else self._clock.monotonic() + self._offset_ns
 
     def _count(self, topic: str, about: header.MessageHeader) -> None:
         self._counts[f"messages.{topic}"] += 1

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from absmsg.v1 import (
+    common_pb2,
     deformation_state_pb2,
     deformed_mesh_pb2,
     frame_info_pb2,
@@ -31,11 +32,16 @@ class MessageHeaderError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class MessageHeader:
-    """Time stamp (wall clock) [ns], 0 if the message has none, sequence number, and the process that counts."""
+    """Time stamp (wall clock) [ns], 0 if the message has none, sequence number, and the process that counts.
+
+    And the same moment on a monotonic clock [ns], with the identity of that clock; 0 and "" if it does not say.
+    """
 
     stamp_ns: int
     seq: int
     publisher: str = ""
+    t_host_ns: int = 0
+    host_clock: str = ""
 
 
 _WITH_HEADER = (
@@ -54,8 +60,12 @@ def _ns(stamp: Timestamp) -> int:
     return stamp.seconds * 1_000_000_000 + stamp.nanos
 
 
+def _of(header: common_pb2.Header, seq: int) -> MessageHeader:
+    return MessageHeader(_ns(header.stamp), seq, header.boot_id, header.t_host_ns, header.host_clock)
+
+
 def _of_header(message: Any) -> MessageHeader:
-    return MessageHeader(_ns(message.header.stamp), message.header.seq, message.header.boot_id)
+    return _of(message.header, message.header.seq)
 
 
 def _of_timestamp(message: Any) -> MessageHeader:
@@ -108,7 +118,7 @@ def parse(sample: Sample) -> MessageHeader:
     try:
         if sample.message == IMAGE:
             info = frame_info_pb2.FrameInfo.FromString(sample.attachment)
-            return MessageHeader(_ns(info.header.stamp), info.seq, info.header.boot_id)
+            return _of(info.header, info.seq)
         message, header = _PARSERS[sample.message]
         return header(message.FromString(sample.payload))
     except KeyError:

@@ -36,7 +36,8 @@ class Rig:
         **settings,
     ):
         self.bus = LoopbackBus()
-        self.clock = WallClock(monotonic)
+        self.steps_ns = 0
+        self.clock = WallClock(monotonic, lambda: time.time_ns() + self.steps_ns)
         self.headers = HeaderFactory("demo", self.clock)
         self.health = Health(self.bus, "record", self.headers)
         settings = RecorderSettings(directory, "demo", "version = 1\n", **settings)

@@ -2,21 +2,24 @@
 
 import json
 import threading
+from dataclasses import replace
 
 import pytest
 from absmsg.v1 import frame_info_pb2
 from absmsg.v1.common_pb2 import Header
 from absmsg.v1.health_pb2 import Health
 from absmsg.v1.sensor_model_pb2 import SensorModel
+from foxglove_schemas_protobuf.PointCloud_pb2 import PointCloud
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
 from abs_service.bus import keys
-from abs_service.bus.contract import Sample
+from abs_service.bus.contract import IMAGES, Sample
 from abs_service.capture import sensor_metadata
 from abs_service.wire import message_header
 from calib.camera import Camera
 from drivers.encoding import codec, encoded_image
 from drivers.encoding.encoded_image import ImageCodec
+from drivers.replay import Recording
 from tests.abs_service.recording.recorder_rig import DEPTH, Rig, depth, metadata, read, recordings, sequences
 from tests.waiting import eventually
 
@@ -41,6 +44,29 @@ def test_a_recording_holds_what_was_published_byte_for_byte(tmp_path):
     schemas = {m.schema and m.schema.name for m in messages}
     assert schemas == {"foxglove.RawImage", "absmsg.v1.FrameInfo", "absmsg.v1.Health"}
     assert metadata(path) == {"ended": "stopped", "messages.tof/depth/image": "5", "messages.health/record": "1"}
+
+
+@pytest.mark.parametrize("step_s", [-3600, 3600, 31_557_600, -1_700_000_000])
+def test_a_step_of_the_wall_clock_changes_the_order_of_no_message_in_the_file(tmp_path, step_s):
+    rig = Rig(tmp_path)
+    points = PointCloud(frame_id="tof")
+    begin_ns = rig.clock.wall(rig.clock.monotonic())
+    rig.recorder.start()
+    for seq in range(4):
+        if seq == 2:
+            assert eventually(lambda: rig.written(1))  # the file has begun
+            rig.steps_ns = step_s * 10**9
+            rig.clock.measure()
+        now_ns = rig.clock.monotonic()
+        rig.publish_image(replace(depth(seq), t_host_ns=now_ns))
+        points.timestamp.FromNanoseconds(rig.clock.wall(now_ns))
+        cloud = rig.bus.publisher("tof/depth/points", points.DESCRIPTOR.full_name, IMAGES)
+        cloud.put(points.SerializeToString())
+    rig.recorder.stop(5)
+    (path,) = recordings(tmp_path)
+    assert [frame.seq for frame in Recording(path).frames()] == [0, 1, 2, 3]
+    times = [message.message.log_time for message in read(path)[0]]
+    assert begin_ns <= times[0] <= times[-1] < begin_ns + 60 * 10**9
 
 
 def test_images_are_recorded_in_the_form_that_the_settings_say(tmp_path):
