@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from calib.board.target_checks import TargetError, check_counts, check_length
+from calib.board.target_checks import TargetError, check_counts, check_extent, check_length
 
 #: Width of a tag's black frame, and number of bits across it; Kalibr's family is tag36h11.
 BORDER, BITS = 2, 6
@@ -38,6 +38,7 @@ class AprilGrid:
         check_counts(self.columns, self.rows, 2)
         check_length("tag", self.tag)
         check_length("gap", self.gap)
+        check_extent("tag", self.tag, max(self.columns, self.rows))
         if self.gap >= self.tag:
             raise TargetError(f"gap: {self.gap:g} m must be less than the tag of {self.tag:g} m")
         if self.columns * self.rows > len(TAGS.bytesList):

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.board.april_grid import AprilGrid
-from calib.board.target_checks import TargetError, check_counts, check_length
+from calib.board.target_checks import TargetError, check_counts, check_extent, check_length
 
 Points = NDArray[np.float64]
 
@@ -41,6 +41,7 @@ class Chessboard:
     def __post_init__(self) -> None:
         check_counts(self.columns, self.rows, 3)
         check_length("square", self.square)
+        check_extent("square", self.square, max(self.grid))
 
     @property
     def grid(self) -> tuple[int, int]:
@@ -87,6 +88,7 @@ class Charuco:
         check_counts(self.columns, self.rows, 3)
         check_length("square", self.square)
         check_length("marker", self.marker)
+        check_extent("square", self.square, max(self.columns, self.rows))
         if self.marker >= self.square:
             raise TargetError(f"marker: {self.marker:g} m must be less than the square of {self.square:g} m around it")
         if self.dictionary not in DICTIONARIES:
@@ -142,7 +144,8 @@ class Circles:
     diameter: float
 
     def __post_init__(self) -> None:
-        _check_discs(self.columns, self.rows, self.spacing, self.diameter, "spacing")
+        _check_discs(self.columns, self.rows, self.spacing, self.diameter)
+        check_extent("spacing", self.spacing, max(self.grid))
 
     @property
     def grid(self) -> tuple[int, int]:
@@ -176,7 +179,8 @@ class AsymmetricCircles:
     diameter: float
 
     def __post_init__(self) -> None:
-        _check_discs(self.columns, self.rows, self.spacing, self.diameter, "spacing")
+        _check_discs(self.columns, self.rows, self.spacing, self.diameter)
+        check_extent("spacing", self.spacing, max(2 * self.columns, self.rows))
         if self.rows % 2 == 0:
             raise TargetError(f"rows: {self.rows} must be odd; with an even number the board has two ways up")
 
@@ -211,9 +215,9 @@ def _lattice(columns: int, rows: int, spacing: float) -> Points:
     return spacing * np.stack([column, row, 0 * row], axis=1, dtype=np.float64)
 
 
-def _check_discs(columns: int, rows: int, spacing: float, diameter: float, name: str) -> None:
+def _check_discs(columns: int, rows: int, spacing: float, diameter: float) -> None:
     check_counts(columns, rows, 3)
-    check_length(name, spacing)
+    check_length("spacing", spacing)
     check_length("diameter", diameter)
     if diameter >= spacing:
-        raise TargetError(f"diameter: {diameter:g} m must be less than the {name} of {spacing:g} m")
+        raise TargetError(f"diameter: {diameter:g} m must be less than the spacing of {spacing:g} m")

@@ -1,5 +1,10 @@
 """Checks of the parameters of boards."""
 
+import math
+
+#: Least and largest length of a board [m], and one that is usual.
+LEAST_M, LARGEST_M, USUAL_M = 0.01, 5.0, 0.3
+
 
 class TargetError(ValueError):
     """Invalid board parameters; the message begins with the wrong attribute."""
@@ -17,4 +22,16 @@ def check_length(name: str, length: float) -> None:
     if not 1e-4 <= length <= 10:
         raise TargetError(
             f"{name}: {length:g} m must be from 0.0001 to 10 m; {name}_mm is in millimetres, {name} in metres"
+        )
+
+
+def check_extent(name: str, spacing: float, count: int) -> None:
+    """Checks the longer side of a board, `count` times a length `spacing` [m], as units are mixed up by powers of ten."""
+    extent = count * spacing
+    if not LEAST_M <= extent <= LARGEST_M:
+        factor = 10.0 ** round(math.log10(USUAL_M / extent))
+        raise TargetError(
+            f"{name}: {spacing:g} m makes the board {extent:g} m long, which must be from {LEAST_M:g} to {LARGEST_M:g} "
+            f"m; {name}_mm is in millimetres, {name} in metres. {factor * spacing:g} m would make it "
+            f"{factor * extent:g} m"
         )

@@ -12,6 +12,7 @@ from abs_service.report.content import Column, Level, Picture, Report, Section, 
 from abs_service.report.provenance import Provenance
 from calib.board.distinct import counts_of
 from calib.solve.solution import Solution, ViewFit
+from calib.solve.validation.projection_uncertainty import reach
 from calib.solve.validation.verdict import Assessment
 
 
@@ -123,7 +124,10 @@ def _cross_validation(found: Assessment) -> Section:
 
 
 def cameras(solution: Solution) -> Iterator[str]:
-    """A line for each sensor: focal lengths and principal point with their deviations [px], and how corners fit."""
+    """A line for each sensor: its optics with their deviations, how corners fit, and the distances of the boards.
+
+    Of one camera, nothing else shows squares that are described 10 times too large.
+    """
     for name in solution.task.sensors:
         own = {each.name: each for each in solution.parameters}
         free = [(key, own[f"{name}.{key}"]) for key in ("fx", "fy", "cx", "cy") if f"{name}.{key}" in own]
@@ -132,7 +136,8 @@ def cameras(solution: Solution) -> Iterator[str]:
         ]
         rms = [view.rms for view in solution.views if (view.sensor, view.of) == (name, "corners")]
         fit = [f"corners miss by {np.sqrt(np.mean(np.square(rms))):.2g} px"] if rms else []
-        yield f"{name}: {', '.join([*known, *fit])}"
+        near, far = reach(solution, name)
+        yield f"{name}: {', '.join([*known, *fit])}, boards {near:.2g} to {far:.2g} m away"
 
 
 def _digits(sigma: float) -> int:

@@ -121,7 +121,8 @@ def _check_saturation(share: float, largest: float) -> None:
 
 def _detection_error(target: Target, image: Image, levels: Grey, found: int) -> errors.BoardError:
     """Most specific error for too few points."""
-    if isinstance(target, Charuco | AprilGrid) and len(find(target, np.ascontiguousarray(levels[:, ::-1]))[0]) > found:
+    mirrored = np.ascontiguousarray(levels[:, ::-1])
+    if isinstance(target, Charuco | AprilGrid) and len(find(target, mirrored)[0]) >= MIN_POINTS:
         return errors.MirroredBoardError(
             "the board is seen as in a mirror: switch off the mirroring of the camera or its driver, or print the "
             "board anew if the print itself is mirrored"

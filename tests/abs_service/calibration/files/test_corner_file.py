@@ -69,7 +69,8 @@ def test_a_rig_is_solved_again_without_images_and_with_other_options(
     color = calibrations.load(out).sensors["color"].camera
     assert color.lens.coefficients[4] == 0
     assert color.fx == pytest.approx(color.fy, rel=1e-12)
-    assert re.search(r"^light: fx \d+\.?\d* ± \d+\.?\d*, fy .*, corners miss by 0\.\d+ px$", said, re.MULTILINE)
+    line = r"^light: fx \d+\.?\d* ± \d+\.?\d*, fy .*, corners miss by 0\.\d+ px, boards \S+ to \S+ m away$"
+    assert re.search(line, said, re.MULTILINE)
     report = json.loads(out.with_suffix(".json").read_text(encoding="utf-8"))
     assert {view["shot"] for view in report["values"]["views"]} == set(range(1, 14))
 

@@ -52,6 +52,8 @@ def test_lengths_are_metres_or_millimetres(tmp_path: Path) -> None:
         ("columns = 9", "columns = 2", ["columns = 2", "from 3 to 100"]),
         ("columns = 9", "", ["columns: missing"]),
         ("square_mm = 30", "square = 30", ["square = 30", "from 0.0001 to 10 m"]),
+        ("square_mm = 30", "square_mm = 3000", ["square_mm = 3000", "27 m long", "0.03 m would make it 0.27 m"]),
+        ("square_mm = 30\nmarker = 0.022", "square_mm = 0.3\nmarker = 2.2e-4", ["0.0027 m long", "to 5 m", "0.03 m"]),
         ("square_mm = 30", 'square_mm = "30"', ['square_mm = "30"', "must be a number"]),
         ("square_mm = 30", "square_mm = 30\nsquare = 0.03", ["square = 0.03", "given twice"]),
         ("marker = 0.022", "marker = 0.05", ["marker = 0.05", "less than the square of 0.03 m"]),
