@@ -26,7 +26,7 @@ def check_length(name: str, length: float) -> None:
 
 
 def check_extent(name: str, spacing: float, count: int) -> None:
-    """Checks the longer side of a board, `count` times a length `spacing` [m], as units are mixed up by powers of ten."""
+    """Checks the longer side of a board, `count` times `spacing` [m], as units are mixed up by powers of ten."""
     extent = count * spacing
     if not LEAST_M <= extent <= LARGEST_M:
         factor = 10.0 ** round(math.log10(USUAL_M / extent))

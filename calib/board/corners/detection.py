@@ -25,6 +25,9 @@ MAX_SATURATED_ACTIVE = 0.10
 _MAY_BE_SATURATED, _IS_SATURATED = 0.3, 0.95
 #: Largest width of an edge, in pixels or relative to the distance between points, whichever is larger.
 MAX_EDGE_PX, MAX_EDGE_SHARE = 3.5, 0.15
+#: The latter of a board without markers that is out of focus: edges of both directions are wide, by at most this factor
+#: between them. Its points stay in place (0.08 px), while a camera that reads row by row shears a board that moves.
+MAX_UNFOCUSED_SHARE, UNFOCUSED = 0.3, 2.0
 #: Radius of the subpixel refinement, relative to the distance between corners; excludes a ChArUco's markers.
 _REFINED = 0.13
 #: Minimum distance of points from the image's border [px]; their neighbourhood must be complete.
@@ -78,7 +81,7 @@ def detect(target: Target, image: Image, largest_saturated: float = MAX_SATURATE
     points = quality.lattice(target, ids, pixels)
     if isinstance(target, AprilGrid):
         description.require_grid(target, points)
-    spacing, edge = quality.spacing_px(points), quality.edge_px(target, points, levels)
+    spacing, (edge, narrow) = quality.spacing_px(points), quality.edges_px(target, points, levels)
     _check_whole(target, pixels, points, levels.shape)
     if spacing < MIN_SPACING_PX:
         raise errors.TooSmallError(
@@ -86,11 +89,7 @@ def detect(target: Target, image: Image, largest_saturated: float = MAX_SATURATE
             "needed. Come closer, or use a board with larger squares"
         )
     _check_saturation(quality.saturated_fraction(target, ids, pixels, image), largest_saturated)
-    if edge > max(MAX_EDGE_PX, MAX_EDGE_SHARE * spacing):
-        raise errors.BlurredError(
-            f"the image is blurred: edges of the board rise over {edge:.1f} pixels. Hold the board still, shorten the "
-            "exposure, or focus"
-        )
+    _check_sharp(edge, narrow, spacing, has_markers=isinstance(target, Charuco | AprilGrid))
     if isinstance(target, Circles | AsymmetricCircles):
         pixels = pixels - ellipse.center_bias(target, ids, pixels)
     else:
@@ -109,6 +108,16 @@ def _check_whole(
         reach += 0.5 * target.diameter / target.spacing * quality.spacing_px(points)
     if distance < reach:
         raise errors.CutOffError(_CUT_OFF)
+
+
+def _check_sharp(edge: float, narrow: float, spacing: float, has_markers: bool) -> None:
+    """Rejects edges [px] that are too wide; next to a blurred corner, markers move it."""
+    is_unfocused = edge < UNFOCUSED * narrow and not has_markers
+    if edge > max(MAX_EDGE_PX, (MAX_UNFOCUSED_SHARE if is_unfocused else MAX_EDGE_SHARE) * spacing):
+        raise errors.BlurredError(
+            f"the image is blurred: edges of the board rise over {edge:.1f} pixels. Hold the board still, shorten the "
+            "exposure, or focus"
+        )
 
 
 def _check_saturation(share: float, largest: float) -> None:

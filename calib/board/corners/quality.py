@@ -86,14 +86,15 @@ def is_saturated(image: Image) -> NDArray[np.bool_]:
     return np.asarray(full.all(axis=2) if full.ndim == 3 else full)
 
 
-def edge_px(target: Target, points: NDArray[np.float64], levels: Grey) -> float:
-    """Width of edges from 10 to 90 % [px], along the axis with the wider ones; NaN without edges.
+def edges_px(target: Target, points: NDArray[np.float64], levels: Grey) -> tuple[float, float]:
+    """Widths of edges from 10 to 90 % [px], along the axis with the wider ones and along the other; NaN without edges.
 
     Brightness is sampled along a line across each edge; the width of a direction is the median over its edges. Profiles
     are not averaged: distortion and tilt move edges off the middle of their lines, so the mean edge would be wide.
     """
     widths = [_widths(*_lines(target, points, axis), levels) for axis in (0, 1)]
-    return max((float(np.median(width)) for width in widths if len(width)), default=float("nan"))
+    known = [float(np.median(width)) for width in widths if len(width)]
+    return max(known, default=float("nan")), min(known, default=float("nan"))
 
 
 def _widths(start: NDArray[np.float64], end: NDArray[np.float64], levels: Grey) -> NDArray[np.float64]:

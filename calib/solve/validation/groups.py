@@ -48,8 +48,8 @@ class Groups:
         shots = ",".join(map(str, self.shots))
         return (
             f"{self.sensor}: shots {shots} have a principal point of their own, ({across:+.1f}, {down:+.1f}) px from "
-            "that of the others: are these images of two cameras, or were some turned by 180°, mirrored, cropped or "
-            f"stabilised? Look at both groups, and leave one out: --skip {shots}"
+            "that of the others: are these images of two cameras, or were some turned by 180°, mirrored, cropped, "
+            f"stretched or stabilised, or taken in motion? Look at both groups, and leave one out: --skip {shots}"
         )
 
 

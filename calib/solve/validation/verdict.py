@@ -128,7 +128,8 @@ def _of_optics(one: Change, sensors: int) -> str:
     return (
         f"{one.sensor}: projects otherwise from about shot {one.shot} on: focal length by {focal:+.1%}, principal "
         f"point by ({across:+.1f}, {down:+.1f}) px, which shifts its corners by {one.shift_px:.2g} px: {cause} "
-        "switch autofocus, zoom and image stabilisation off, and leave out the shots before or after with --skip"
+        "switch autofocus, zoom and image stabilisation off, and leave out the shots before or after with --skip; if "
+        "nothing changed but where the boards were, the kind of lens fits nearly only, or the board is bent"
     )
 
 
