@@ -11,9 +11,12 @@ from abs_service.report import figures
 from abs_service.report.content import Column, Level, Picture, Report, Section, Table, Verdict, drawing
 from abs_service.report.provenance import Provenance
 from calib.board.distinct import counts_of
-from calib.solve.solution import Solution, ViewFit
+from calib.solve.solution import Parameter, Solution, ViewFit
 from calib.solve.validation.projection_uncertainty import reach
 from calib.solve.validation.verdict import Assessment
+
+#: Difference of the two focal lengths from which on pixels are not called square; sensors' are to better than 0.3 %.
+ASPECT = 0.01
 
 
 def report(title: str, origin: Provenance, solution: Solution, found: Assessment, notes: Sequence[str]) -> Report:
@@ -126,7 +129,7 @@ def _cross_validation(found: Assessment) -> Section:
 def cameras(solution: Solution) -> Iterator[str]:
     """A line for each sensor: its optics with their deviations, how corners fit, and the distances of the boards.
 
-    Of one camera, nothing else shows squares that are described 10 times too large.
+    Of one camera, nothing else shows squares that are described 10 times too large, or images that were all stretched.
     """
     for name in solution.task.sensors:
         own = {each.name: each for each in solution.parameters}
@@ -137,7 +140,21 @@ def cameras(solution: Solution) -> Iterator[str]:
         rms = [view.rms for view in solution.views if (view.sensor, view.of) == (name, "corners")]
         fit = [f"corners miss by {np.sqrt(np.mean(np.square(rms))):.2g} px"] if rms else []
         near, far = reach(solution, name)
-        yield f"{name}: {', '.join([*known, *fit])}, boards {near:.2g} to {far:.2g} m away"
+        yield f"{name}: {', '.join([*known, *fit])}, boards {near:.2g} to {far:.2g} m away{_stretched(own, name)}"
+
+
+def _stretched(parameters: Mapping[str, Parameter], name: str) -> str:
+    """End of a line on a camera whose pixels are not square; "" if they are, or if that is not known."""
+    fx, fy = (parameters.get(f"{name}.{key}") for key in ("fx", "fy"))
+    if fx is None or fy is None:
+        return ""
+    known = 5 * np.hypot(fx.sigma, fy.sigma) / fx.value
+    if abs(fy.value / fx.value - 1) < max(ASPECT, known):
+        return ""
+    return (
+        f"; fy is {fy.value / fx.value:.3f} times fx, as of images that were stretched: "
+        "this calibration is for images that are stretched alike"
+    )
 
 
 def _digits(sigma: float) -> int:

@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -73,6 +74,20 @@ def test_a_rig_is_solved_again_without_images_and_with_other_options(
     assert re.search(line, said, re.MULTILINE)
     report = json.loads(out.with_suffix(".json").read_text(encoding="utf-8"))
     assert {view["shot"] for view in report["values"]["views"]} == set(range(1, 14))
+
+
+def test_images_that_were_all_stretched_are_said(
+    seen: BoardObservations, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    views = [replace(view, pixels=view.pixels * (1, 1.03)) for view in seen.corners if view.sensor == "color"]
+    width, height = seen.sizes["color"]
+    corner_file.write(
+        BoardObservations(tuple(views), (), {}, {"color": (width, height + 32)}), tmp_path / "b.corners.npz"
+    )
+    target_file.write(BOARD, tmp_path / "b.toml")
+    given = [str(tmp_path / "b.corners.npz"), "--target", str(tmp_path / "b.toml")]
+    cli.main(["calibrate", "intrinsics", *given, "--out", str(tmp_path / "c.toml")])
+    assert re.search(r"; fy is 1\.0[23]\d times fx, as of images that were stretched", capsys.readouterr().out)
 
 
 def test_what_cannot_be_fixed_is_named(
