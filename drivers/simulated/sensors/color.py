@@ -1,6 +1,7 @@
 """Colour rendering of the scene, and a colour head."""
 
 from dataclasses import replace
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -41,7 +42,10 @@ class Picture:
         self._samples = samples
         self._blur_px = blur_px
         self._view = View(scene, _finer(camera, samples))
-        self._wall = _levels(self._view.wall)
+
+    @cached_property
+    def _wall(self) -> NDArray[np.float32]:
+        return _levels(self._view.wall)
 
     def take(self, moment: Moment) -> NDArray[np.float32]:
         """Image (height, width, 3) in levels of 256 at one moment, antialiased at rims, blurred by the lens."""

@@ -1,6 +1,9 @@
 """Infra-red head with active illumination."""
 
+from functools import cached_property
+
 import numpy as np
+from numpy.typing import NDArray
 
 from calib.camera import Camera
 from drivers.contract.frame import Frame, Kind
@@ -21,7 +24,10 @@ class Infrared:
         self.streams = (stream_of(name, "ir", Kind.IR, "mono16", camera, rate_hz),)
         self._sigma = sigma
         self._view = View(scene, camera)
-        self._wall = np.nan_to_num(returned(self._view.wall))
+
+    @cached_property
+    def _wall(self) -> NDArray[np.float32]:
+        return np.nan_to_num(returned(self._view.wall))
 
     def expose(self, exposure: Exposure) -> list[Frame]:
         """Takes the infra-red image of one exposure, antialiased at rims."""

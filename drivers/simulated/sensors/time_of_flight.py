@@ -1,6 +1,7 @@
 """Time-of-flight head: radial distance and amplitude, with amplitude-dependent errors."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,9 +86,12 @@ class TimeOfFlight:
             stream_of(name, "amplitude", Kind.AMPLITUDE, "16UC1", camera, rate_hz),
         )
         self._view = View(scene, camera)
-        self._wall_amplitude = returned(self._view.wall)
         normal = np.random.default_rng(_MADE).standard_normal((camera.height, camera.width), np.float32)
         self.pattern = np.float32(noise.pattern) * normal
+
+    @cached_property
+    def _wall_amplitude(self) -> NDArray[np.float32]:
+        return returned(self._view.wall)
 
     def expose(self, exposure: Exposure) -> list[Frame]:
         """Takes depth and amplitude of one exposure."""

@@ -1,6 +1,7 @@
 """Ray casting of a scene for one camera: the wall once, the bodies in every exposure."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,13 +31,29 @@ class View:
 
     Attributes:
         rays: unit direction of every pixel in the sensor frame, (height, width, 3).
-        wall: the wall without bodies: a `BodyImage` of the whole image with `share` 1.
     """
 
     def __init__(self, scene: Scene, camera: Camera) -> None:
+        self._scene = scene
         self._camera = camera
         self.rays = np.ascontiguousarray(camera.rays())
-        self.wall = self._look_at_wall(scene)
+
+    @cached_property
+    def wall(self) -> BodyImage:
+        """The wall without bodies: an image of all pixels with `share` 1. Who only opens the device needs no kernel."""
+        T_ws = pose.inverse(self._scene.T_rw) @ self._camera.T_rs
+        directions_w = self.rays @ T_ws[:3, :3].T
+        with np.errstate(divide="ignore"):
+            distance = -T_ws[2, 3] / directions_w[..., 2]
+        distance = np.where((distance > 0) & np.isfinite(distance), distance, np.nan)
+        points_w = (T_ws[:3, 3] + directions_w * distance[..., None]).astype(np.float32)
+        return BodyImage(
+            share=np.ones_like(distance, np.float32),
+            distance=distance.astype(np.float32),
+            cosine=np.abs(directions_w[..., 2]).astype(np.float32),
+            albedo=self._scene.wall.at(points_w[..., 0], points_w[..., 1]),
+            region=(slice(0, self._camera.height), slice(0, self._camera.width)),
+        )
 
     def look(self, moment: Moment) -> tuple[BodyImage, ...]:
         """Image of each body, occluding ones after occluded ones."""
@@ -64,21 +81,6 @@ class View:
         region = self._region(body)
         seen = body.cast(np.ascontiguousarray(self.rays[region]), self._camera.T_rs)
         return BodyImage(seen.share, seen.distance, seen.cosine, seen.albedo, region)
-
-    def _look_at_wall(self, scene: Scene) -> BodyImage:
-        T_ws = pose.inverse(scene.T_rw) @ self._camera.T_rs
-        directions_w = self.rays @ T_ws[:3, :3].T
-        with np.errstate(divide="ignore"):
-            distance = -T_ws[2, 3] / directions_w[..., 2]
-        distance = np.where((distance > 0) & np.isfinite(distance), distance, np.nan)
-        points_w = (T_ws[:3, 3] + directions_w * distance[..., None]).astype(np.float32)
-        return BodyImage(
-            share=np.ones_like(distance, np.float32),
-            distance=distance.astype(np.float32),
-            cosine=np.abs(directions_w[..., 2]).astype(np.float32),
-            albedo=scene.wall.at(points_w[..., 0], points_w[..., 1]),
-            region=(slice(0, self._camera.height), slice(0, self._camera.width)),
-        )
 
     def _region(self, body: Body) -> tuple[slice, slice]:
         """Rows and columns that contain a body, empty if it is out of view."""
