@@ -134,16 +134,16 @@ def test_at_rest_the_normals_face_the_side_that_faces_the_sensor():
 
 @dataclass(frozen=True)
 class Seen:
-    """A strip in a simulated depth camera, with ground truth."""
+    """A strip in a simulated depth camera, with ground truth; of the colour camera, few pixels cost least."""
 
     detection: InitialDetection
     strip: PlacedStrip
 
 
 def seen(uri: str, exposure: int) -> Seen:
-    simulation, plan = simulate(uri), default_plan()
+    simulation, plan = simulate(f"{uri}&color=32x24"), default_plan()
     rig = rig_of(simulation)
-    frames, _ = simulation.expose(exposure)
+    frames = simulation.frames(exposure)
     observation = Observer(rig).observe(frame_set(frames, 0))
     strip = simulation.scene.at(exposure / 30).surfaces[0]
     assert isinstance(strip, PlacedStrip)
