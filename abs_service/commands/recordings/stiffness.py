@@ -52,6 +52,8 @@ def run(arguments: argparse.Namespace) -> int:
     plot = arguments.plot or path.with_name(f"{path.stem}-stiffness.png")
     if plot.suffix not in SUFFIXES:
         raise StiffnessOptionError(f"--plot {plot}: its suffix must be one of {', '.join(SUFFIXES)}")
+    if not plot.parent.is_dir():  # before minutes of tracking, not after
+        raise StiffnessOptionError(f"--plot {plot}: {plot.parent} is no folder")
     recording = Recording(path)
     for note in replay.notes(recording):
         print(f"abs-service: note: {note}", file=sys.stderr)

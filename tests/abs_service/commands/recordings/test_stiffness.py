@@ -1,7 +1,9 @@
 """`abs-service stiffness`: one number with its deviation and a picture, or clear words."""
 
+import io
 import json
 import re
+from contextlib import redirect_stdout
 from pathlib import Path
 
 import cv2
@@ -24,22 +26,27 @@ def recording(tmp_path_factory) -> Path:
     return write_take(tmp_path_factory.mktemp("strips") / "strip.mcap", simulation, range(60), HEADS, TOML)
 
 
-def test_the_stiffness_and_a_picture_come_out(recording, capsys):
+@pytest.fixture(scope="module")
+def said(recording) -> dict:
+    """Output of the command as JSON; it has also drawn profile.png beside the recording."""
     plot = recording.with_name("profile.png")
-    assert cli.main(["stiffness", str(recording), "--weight", "0.3", "--plot", str(plot), "--json"]) == Exit.OK
-    said = json.loads(capsys.readouterr().out)
+    with redirect_stdout(io.StringIO()) as output:
+        assert cli.main(["stiffness", str(recording), "--weight", "0.3", "--plot", str(plot), "--json"]) == Exit.OK
+    return json.loads(output.getvalue())
+
+
+def test_the_stiffness_and_a_picture_come_out(recording, said):
     assert said["frames"] + said["frames_untracked"] == 60
     error = np.log(said["bending_stiffness_per_width_nm"] / 0.02)
     assert abs(error) < 4 * said["relative_deviation"] < 0.6
     assert said["bending_stiffness_nm2"] == pytest.approx(said["bending_stiffness_per_width_nm"] * said["width_m"])
-    picture = cv2.imread(str(plot))
+    picture = cv2.imread(str(recording.with_name("profile.png")))
     assert picture is not None
     assert np.ptp(picture) > 100
 
 
+@pytest.mark.usefixtures("said")  # when no kernel has to be compiled any more, images are all that is counted
 def test_the_text_has_stiffness_and_uncertainty(recording, capsys):
-    assert cli.main(["stiffness", str(recording), "--weight", "0.3", "--json"]) == Exit.OK
-    capsys.readouterr()  # now that no kernel has to be compiled, images are all that is counted
     assert cli.main(["stiffness", str(recording), "--weight", "0.3"]) == Exit.OK
     said, progress = capsys.readouterr()
     assert re.search(r"images \S+ (\d+)/\1 ", progress)
@@ -55,7 +62,7 @@ def test_the_text_has_stiffness_and_uncertainty(recording, capsys):
         (["--weight", "-1"], "--weight -1: must be more than 0 kg/m²"),
         (["--weight", "0.3", "--plot", "x.doc"], "--plot x.doc: its suffix must be one of .png, .svg, .pdf"),
         (["--weight", "0.3", "--tracker", "sheet"], "--tracker sheet: must be a tracker with a gravity model, one of"),
-        (["--weight", "0.3", "--plot", "no/folder/x.png"], "--plot no/folder/x.png: No such file or directory"),
+        (["--weight", "0.3", "--plot", "no/folder/x.png"], "--plot no/folder/x.png: no/folder is no folder"),
         (
             ["--weight", "0.3", "--config", str(ROOT / "examples" / "rigs" / "flexpad.toml")],
             "no tracker has a gravity model",
