@@ -10,8 +10,10 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import tomli_w
+from absmsg.v1.frame_info_pb2 import FrameInfo
 from mcap.reader import make_reader
 
+from abs_service.bus import keys
 from abs_service.recording.recovery import RecoveryError, leftovers, recover
 from evaluation.experiment import UnavailableError
 from evaluation.service.faults.listener import DEPTH, Listener
@@ -137,8 +139,9 @@ class RunningRig:
                     recover(path)
             for path in folder.glob("*.mcap"):
                 with path.open("rb") as stream:
-                    messages = make_reader(stream).iter_messages(f"/{DEPTH}", log_time_order=False)
-                    found |= {message.log_time for *_, message in messages}
+                    messages = make_reader(stream).iter_messages(f"/{keys.info(DEPTH)}", log_time_order=False)
+                    infos = (FrameInfo.FromString(message.data) for *_, message in messages)
+                    found |= {info.header.stamp.ToNanoseconds() for info in infos}
         return found
 
     @staticmethod
