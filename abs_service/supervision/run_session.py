@@ -58,6 +58,12 @@ class Renewal:
     components: Sequence[str]
     ends: Sequence[str] = ()
 
+    @property
+    def starts(self) -> list[str]:
+        """Those of the components that the rig has."""
+        has = {child.component for child in self.children}
+        return [component for component in self.components if component in has]
+
 
 class RunSession:
     """Everything that `abs-service run` does between its start and its end.
@@ -121,8 +127,7 @@ class RunSession:
 
         def act() -> tuple[Sequence[str], Sequence[str]]:
             self._renewals.put(renewal := read())
-            has = {child.component for child in renewal.children}
-            return [component for component in renewal.components if component in has], renewal.ends
+            return renewal.starts, renewal.ends
 
         commands.answer_reload(self._bus, self._headers, self._health, act)
 
@@ -187,8 +192,8 @@ class RunSession:
         self._directory = renewal.directory
         known = self._supervisor.children.keys()
         self._supervisor.exchange(renewal.children)
-        names = [child.component for child in renewal.children]
-        trackers = [name.removeprefix("track/") for name in names if name.startswith("track/")]
+        names = [child.component for child in renewal.children if child.component.startswith("track/")]
+        trackers = [name.removeprefix("track/") for name in names]
         self._live.follow(trackers)
         monitors = self._silence_monitors
         self._silence_monitors = {topic: monitors.get(topic) or self._monitor() for topic in map(keys.state, trackers)}
@@ -196,7 +201,7 @@ class RunSession:
             self._health.report(topic, Level.OK)
         if "capture" not in renewal.components:
             self._supervisor.children["capture"].process.wake()
-        for component in [one for one in renewal.components if one in known and one in names]:
+        for component in [one for one in renewal.starts if one in known]:
             self._supervisor.renew(component)
             topic = keys.state(component.removeprefix("track/"))
             if topic in self._silence_monitors:

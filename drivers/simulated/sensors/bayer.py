@@ -54,6 +54,5 @@ class Bayer:
 
     def expose(self, exposure: Exposure) -> list[Frame]:
         """Takes the mosaic of one exposure."""
-        levels = exposure.brightness * self._mosaic.expose(self._picture.take(exposure.moment))
-        data = digitize(levels, self._sigma, exposure.generator)
+        data = digitize(self._mosaic.expose(self._picture.take(exposure.moment)), self._sigma, exposure)
         return [exposure.frame(self.streams[0], self.camera, data, exposure_s=exposure.color_s)]

@@ -71,17 +71,17 @@ class Color:
 
     def expose(self, exposure: Exposure) -> list[Frame]:
         """Takes the colour image of one exposure."""
-        levels = exposure.brightness * self._picture.take(exposure.moment)
-        data = digitize(levels, self._sigma, exposure.generator)
+        data = digitize(self._picture.take(exposure.moment), self._sigma, exposure)
         return [exposure.frame(self.streams[0], self.camera, data, exposure_s=exposure.color_s)]
 
 
-def digitize(levels: NDArray[np.float32], sigma: float, generator: np.random.Generator) -> NDArray[np.uint8]:
-    """Adds noise of deviation `sigma` to levels of 256 and rounds to 8 bits."""
+def digitize(levels: NDArray[np.float32], sigma: float, exposure: Exposure) -> NDArray[np.uint8]:
+    """Exposes levels of 256, adds noise of deviation `sigma` and rounds to 8 bits."""
     # Same result as `generator.bytes`, in a quarter of the time.
-    words = generator.integers(0, 2**64, size=-(-levels.size // 4), dtype=np.uint64)
+    words = exposure.generator.integers(0, 2**64, size=-(-levels.size // 4), dtype=np.uint64)
     draws = words.astype("<u8", copy=False).view("<u2")[: levels.size]
-    return _quantize(levels.reshape(-1), draws, np.float32(sigma) * _NORMAL).reshape(levels.shape)
+    noise, brightness = np.float32(sigma) * _NORMAL, np.float32(exposure.brightness)
+    return _quantize(levels.reshape(-1), draws, noise, brightness).reshape(levels.shape)
 
 
 def _finer(camera: Camera, samples: int) -> Camera:
@@ -104,10 +104,12 @@ def _levels(seen: RayImage) -> NDArray[np.float32]:
 
 
 @kernel
-def _quantize(levels: NDArray[np.float32], draws: NDArray[np.uint16], noise: NDArray[np.float32]) -> NDArray[np.uint8]:
-    """Rounds levels (n,) plus noise (65536,) indexed by draws (n,)."""
+def _quantize(
+    levels: NDArray[np.float32], draws: NDArray[np.uint16], noise: NDArray[np.float32], brightness: np.float32
+) -> NDArray[np.uint8]:
+    """Rounds levels (n,) times the brightness plus noise (65536,) indexed by draws (n,)."""
     pixels = np.empty(levels.size, np.uint8)
     for i in range(levels.size):
-        value = levels[i] + noise[draws[i]] + np.float32(0.5)
+        value = brightness * levels[i] + noise[draws[i]] + np.float32(0.5)
         pixels[i] = np.uint8(min(max(value, np.float32(0)), np.float32(255)))
     return pixels
