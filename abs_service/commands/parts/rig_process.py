@@ -17,7 +17,7 @@ from abs_service.bus.security.mutual_tls import TlsError
 from abs_service.bus.session import Role
 from abs_service.bus.zenoh_bus import ZenohBus
 from abs_service.commands.parts import library_output, logs
-from abs_service.supervision import gc_tuning
+from abs_service.supervision import process_tuning
 from abs_service.wire.checked_bus import CheckedBus
 
 #: Least time between two calls by SIGHUP [s].
@@ -82,6 +82,7 @@ def open_bus(rig: config.ServiceConfig, arguments: argparse.Namespace, *names: s
         BusError: it cannot be opened.
         SecurityError: a file of `[bus.tls]` cannot be used.
     """
+    process_tuning.keep_freed_memory()
     role = Role.ROUTER if arguments.listen else Role.CLIENT
     endpoint = arguments.listen or arguments.connect or rig.bus.endpoint
     with logs.in_background(), open_bus_at(endpoint, role, rig, arguments, *names) as bus:
@@ -93,7 +94,7 @@ def open_bus_at(
     endpoint: str, role: Role, rig: config.ServiceConfig, arguments: argparse.Namespace, *names: str
 ) -> Iterator[CheckedBus]:
     """`open_bus` at a given endpoint, in a given role."""
-    gc_tuning.shorten_switch_interval()
+    process_tuning.shorten_switch_interval()
     # Zenoh says on standard output which clients it refuses.
     with library_output.logged() if role is Role.ROUTER and rig.bus.tls else nullcontext():
         try:

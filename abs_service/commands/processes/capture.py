@@ -24,7 +24,7 @@ from abs_service.capture.device_supervisor import DeviceSupervisor
 from abs_service.capture.metadata_publisher import MetadataPublisher
 from abs_service.capture.point_clouds import PointCloudPublisher
 from abs_service.commands.parts import rig_devices, rig_process
-from abs_service.supervision import gc_tuning
+from abs_service.supervision import process_tuning
 from abs_service.supervision.exit_codes import Exit
 from abs_service.wire import control_commands
 from drivers.contract.device import AddressError, Device, Sink
@@ -93,7 +93,7 @@ def _supervisor(
         rig_devices.set_controls(device, rig.devices[name].controls, f"{source}: devices.{name}.controls")
         asked.renew(device)
         metadata.add(rig_devices.cameras(rig, name, device))
-        gc_tuning.freeze_loaded_objects()
+        process_tuning.freeze_loaded_objects()
 
     supervisor = DeviceSupervisor(
         name,

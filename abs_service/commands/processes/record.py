@@ -24,7 +24,7 @@ from abs_service.recording.recorder_settings import RecorderSettings
 from abs_service.recording.recovery import RecoveryError, leftovers, recover, remove_interrupted
 from abs_service.recording.triggers.first_tracking import FirstTracking
 from abs_service.recording.triggers.trigger import ALWAYS, Asked, Trigger
-from abs_service.supervision import gc_tuning
+from abs_service.supervision import process_tuning
 from abs_service.supervision.exit_codes import Exit
 from abs_service.wire import commands
 from drivers.encoding import encoded_image
@@ -66,7 +66,7 @@ def run(arguments: argparse.Namespace) -> int:
             return Exit.OK
         recorder.start()
         commands.answer_record(bus, headers, health, recorder.ask)
-        gc_tuning.freeze_loaded_objects()
+        process_tuning.freeze_loaded_objects()
         watch = DiskWatch(disk.recordings(rig), disk.estimates(rig), settings.minimum_free_bytes, health, clock)
         while not stop.wait(0.2):
             health.label("tracking", "" if tracking.seen.is_set() else "nothing is tracked yet")

@@ -27,7 +27,7 @@ from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.commands.parts import chosen_region, rig_process
 from abs_service.pairing.common_clock import CommonClock
 from abs_service.pairing.frame_set_queue import FrameSetQueue
-from abs_service.supervision import gc_tuning
+from abs_service.supervision import process_tuning
 from abs_service.supervision.exit_codes import Exit
 from abs_service.tracking.live.estimate_publisher import EstimatePublisher
 from abs_service.tracking.live.live_tracker import LiveTracker
@@ -90,7 +90,7 @@ def _track(
     _await(preparing, health, stop)
     if stop.is_set():
         return
-    gc_tuning.freeze_loaded_objects()
+    process_tuning.freeze_loaded_objects()
     tracking = TrackingSession(rig, plan)
     act = partial(chosen_region.reinitialize, tracking, rig, plan, name)
     commands.answer_reinitialize(bus, name, headers, health, act)

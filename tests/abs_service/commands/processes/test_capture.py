@@ -33,7 +33,7 @@ def captured(tmp_path, endpoint, monkeypatch):
         devices = iter([device, *others])
         monkeypatch.setattr(capture.rig_process, "stop_on_signals", lambda: stop)
         monkeypatch.setattr(capture, "open_device", lambda *_: next(devices))
-        monkeypatch.setattr(capture.gc_tuning, "freeze_loaded_objects", lambda: None)
+        monkeypatch.setattr(capture.process_tuning, "freeze_loaded_objects", lambda: None)
         return cli.main(["capture", str(tmp_path / "rig.toml"), "--listen", endpoint])
 
     return captured

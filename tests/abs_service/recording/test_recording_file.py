@@ -1,0 +1,45 @@
+"""The file of a recording on disk."""
+
+import os
+
+import pytest
+
+from abs_service.recording.recording_file import RecordingFile
+from drivers.encoding.mcap_file import Compression
+
+SCHEMA, SIZE = "absmsg.v1.Health", 1 << 20
+
+
+def is_in_memory(path, size):
+    """True if the system can give the bytes of a file without its disk."""
+    with path.open("rb", buffering=0) as stream:
+        try:
+            return os.preadv(stream.fileno(), [bytearray(size)], 0, os.RWF_NOWAIT) == size
+        except BlockingIOError:
+            return False
+        except OSError:
+            return pytest.skip("the file system does not say what is in memory")
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A folder of a file system on a disk."""
+    path = tmp_path / "sample"
+    with path.open("wb") as stream:
+        stream.write(bytes(SIZE))
+        stream.flush()
+        os.fdatasync(stream.fileno())
+        os.posix_fadvise(stream.fileno(), 0, 0, os.POSIX_FADV_DONTNEED)
+    if is_in_memory(path, SIZE):
+        pytest.skip("the file system keeps its files in memory")
+    return tmp_path
+
+
+def test_what_was_flushed_leaves_the_memory_to_others(folder):
+    file = RecordingFile(folder / "a.mcap", 1, {}, Compression.NONE, chunk_size=1 << 16)
+    active = folder / "a.mcap.active"
+    file.write("health/a", SCHEMA, bytes(SIZE), 1, 1)
+    assert is_in_memory(active, SIZE)
+    file.flush()
+    assert not is_in_memory(active, SIZE)
+    assert file.finish({}).stat().st_size > SIZE
