@@ -15,6 +15,9 @@ ACTIVE = ".active"
 #: End of the name of the file that has the estimates alone.
 ESTIMATES = "_estimates"
 
+#: Bytes that gather in memory before the disk begins to write them, without waiting for it.
+BEGUN_SIZE = 8 << 20
+
 
 def private(path: str, flags: int) -> int:
     """Opener of a recording, which shows people: its owner may write it, its group may read it, no others may."""
@@ -53,6 +56,7 @@ class RecordingFile:
     ) -> None:
         self.path = path
         self._active = self.path.with_name(self.path.name + ACTIVE)
+        self._begun = 0  # size up to which the disk has been told to write
         self._stream = open_file(self._active)
         try:
             fcntl.flock(self._stream.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -84,19 +88,26 @@ class RecordingFile:
     def write(self, topic: str, message: str, payload: bytes, stamp_ns: int, seq: int) -> None:
         """Appends one message; see `McapFile.write`. After an `OSError` only `abandon` makes sense."""
         self._file.write(f"/{topic}", message, payload, stamp_ns, seq)
+        if (size := self.size) > self._begun + BEGUN_SIZE:
+            self._begun = size
+            self._let_go()
 
     def attach(self, name: str, media_type: str, text: str, stamp_ns: int) -> None:
         """Adds an attachment, at the start or later; see `McapFile.attach`."""
         self._file.attach(name, media_type, text.encode(), stamp_ns)
 
     def flush(self) -> None:
-        """Flushes to the disk (fdatasync): what was written survives a kill and a power failure.
-
-        Its pages, which nobody reads soon, then make room for the next ones: the system takes longer to find new ones,
-        and would take them from other programs.
-        """
+        """Flushes to the disk (fdatasync): what was written survives a kill and a power failure."""
         self._file.flush()
         os.fdatasync(self._stream.fileno())
+        self._let_go()
+
+    def _let_go(self) -> None:
+        """Begins to write pages to the disk, and leaves those that are there to others, since nobody reads them soon.
+
+        All of a second at once would keep others from the disk; and the system takes longer to find new pages for the
+        next messages, which would be those of other programs.
+        """
         os.posix_fadvise(self._stream.fileno(), 0, 0, os.POSIX_FADV_DONTNEED)
 
     def finish(self, summary: Mapping[str, str]) -> Path:

@@ -1,6 +1,7 @@
 """Real-time playback of a recording as a device."""
 
 import threading
+from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 
@@ -117,31 +118,41 @@ class ReplayDevice:
 
     def _play(self, stop: threading.Event) -> bool:
         """Plays the file once; returns True unless stopped. Each recorded epoch becomes one epoch of the device."""
-        latest_ns, host_clock = self._clock(), ""
         epochs: dict[int, int] = {}
-        begins: dict[str, tuple[int, int]] = {}  # by host clock, which a reboot changes: the first time, and its own
-        malformed = 0
-        for item in self._recording.frames():
-            self._gate.drop("malformed", self._recording.malformed - malformed)
-            malformed = self._recording.malformed
-            host_clock = item.host_clock if isinstance(item, Frame) else host_clock
-            unnamed = begins.pop("", (item.t_host_ns, latest_ns))  # of truths before the first frame
-            first_ns, begin_ns = begins.setdefault(host_clock, unnamed)
-            t_host_ns = begin_ns + round((item.t_host_ns - first_ns) / self._speed)
-            latest_ns = max(latest_ns, t_host_ns)
-            if self._wait_for(t_host_ns, stop):
-                break
+        for t_host_ns, item in self._due(stop):
             if isinstance(item, Truth):
                 self._gate.deliver_truth(replace(item, t_host_ns=t_host_ns))
                 continue
             epoch = epochs.setdefault(item.epoch, self._next_epoch + len(epochs))
             times = {"t_host_ns": t_host_ns, "t_arrival_ns": self._clock(), "host_clock": ""}
             self._gate.deliver(replace(item, **times, epoch=epoch))
-        else:
-            self._gate.drop("malformed", self._recording.malformed - malformed)
-            self._gate.drop("unpaired", self._recording.unpaired)
         self._next_epoch += len(epochs)
         return not stop.is_set()
+
+    def _due(self, stop: threading.Event) -> Iterator[tuple[int, Frame | Truth]]:
+        """What is in the file, with new host times, each when it is due; some of it is read before, in spare time."""
+        timeline, malformed = _Timeline(self._clock(), self._speed), 0
+        ahead: deque[tuple[int, Frame | Truth]] = deque()
+        failure: Exception | None = None
+        try:
+            for item in self._recording.frames():
+                self._gate.drop("malformed", self._recording.malformed - malformed)
+                malformed = self._recording.malformed
+                ahead.append((timeline.time_ns(item), item))
+                while ahead and (len(ahead) > len(self.capabilities.streams) or ahead[0][0] <= self._clock()):
+                    if self._wait_for(ahead[0][0], stop):
+                        return
+                    yield ahead.popleft()
+        except (RecordingError, OSError) as error:
+            failure = error
+        for t_host_ns, item in ahead:
+            if self._wait_for(t_host_ns, stop):
+                return
+            yield t_host_ns, item
+        if failure is not None:
+            raise failure
+        self._gate.drop("malformed", self._recording.malformed - malformed)
+        self._gate.drop("unpaired", self._recording.unpaired)
 
     def _wait_for(self, t_host_ns: int, stop: threading.Event) -> bool:
         """Waits until a host time; returns True if the replay is stopped. A long wait is said."""
@@ -154,6 +165,31 @@ class ReplayDevice:
         if is_pause:
             self._gate.warn("pause", "")
         return is_stopped
+
+
+class _Timeline:
+    """Host times of a replay that begins now.
+
+    Args:
+        begin_ns: now [ns].
+        speed: of the replay.
+    """
+
+    def __init__(self, begin_ns: int, speed: float) -> None:
+        self._latest_ns = begin_ns
+        self._speed = speed
+        self._host_clock = ""
+        # By host clock, which a reboot changes: its first time, and when that is due.
+        self._begins: dict[str, tuple[int, int]] = {}
+
+    def time_ns(self, item: Frame | Truth) -> int:
+        """When the next item of the file is due [ns]."""
+        self._host_clock = item.host_clock if isinstance(item, Frame) else self._host_clock
+        unnamed = self._begins.pop("", (item.t_host_ns, self._latest_ns))  # of truths before the first frame
+        first_ns, begin_ns = self._begins.setdefault(self._host_clock, unnamed)
+        t_host_ns = begin_ns + round((item.t_host_ns - first_ns) / self._speed)
+        self._latest_ns = max(self._latest_ns, t_host_ns)
+        return t_host_ns
 
 
 def _streams(recording: Recording, speed: float) -> tuple[StreamInfo, ...]:

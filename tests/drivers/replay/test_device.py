@@ -1,6 +1,8 @@
 """Real-time playback of recordings."""
 
 import dataclasses
+import threading
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -12,6 +14,7 @@ from drivers.contract.frame import Frame
 from drivers.encoding.mcap_file import McapFile
 from drivers.opening import open_device
 from drivers.replay import Recording, ReplayDevice
+from drivers.replay.contents import RecordingError
 from tests.drivers.manual_time import ManualTime
 from tests.drivers.recording_sink import RecordingSink
 from tests.drivers.replay.recordings import (
@@ -93,6 +96,42 @@ def test_a_replay_of_a_corrupt_file_ends_for_good_with_the_reason(tmp_path: Path
     assert "a.mcap: the chunk" in reason
     assert "is damaged" in reason
     assert "`abs-service recover`" in reason
+
+
+def test_the_file_is_read_while_nothing_is_due(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    time, sink = ManualTime(BEGIN_NS), RecordingSink()
+    recording = Recording(write(tmp_path / "a.mcap", recorded(4)))
+    device = ReplayDevice("", recording, 1.0, False, time.clock, time.wait)
+    read = Recording.frames
+
+    def read_slowly(self: Recording) -> Iterator[Frame | Truth]:
+        for item in read(self):
+            time.wait(threading.Event(), 0.004)
+            yield item
+
+    monkeypatch.setattr(Recording, "frames", read_slowly)
+    device.start(sink)
+    sink.wait_for(DeviceState.CLOSED)
+    device.close()
+    late_ms = [(frame.t_arrival_ns - frame.t_host_ns) * 1e-6 for frame in sink.frames]
+    assert len(late_ms) == 12
+    assert max(late_ms[3:]) < 0.1
+
+
+def test_what_was_read_before_the_damage_is_delivered(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    items = recorded(3)
+    time, sink = ManualTime(BEGIN_NS), RecordingSink()
+    device = ReplayDevice("", Recording(write(tmp_path / "a.mcap", items)), 1.0, False, time.clock, time.wait)
+
+    def read(self: Recording) -> Iterator[Frame | Truth]:
+        yield from items
+        raise RecordingError("a.mcap: the chunk at byte 1 is damaged")
+
+    monkeypatch.setattr(Recording, "frames", read)
+    device.start(sink)
+    assert "is damaged" in sink.wait_for(DeviceState.BROKEN)
+    device.close()
+    assert [item.seq for item in sink.items] == [item.seq for item in items]
 
 
 def test_malformed_frames_are_counted_and_left_out_of_a_replay(tmp_path: Path) -> None:
