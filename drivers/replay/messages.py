@@ -1,16 +1,21 @@
 """Messages of an MCAP file in order of time."""
 
 import heapq
-from collections.abc import Iterator, Set
+import os
+from collections.abc import Iterator, Sequence, Set
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 from mcap.records import Message
 
-from drivers.replay.contents import DAMAGE, Contents, RecordingError, Topic, read_chunk
+from drivers.replay.contents import DAMAGE, ChunkLocation, Contents, RecordingError, Topic, read_chunk
 
 #: Largest time [ns].
 LAST_NS = (1 << 63) - 1
+
+#: Bytes that the disk reads ahead, so that nobody waits for it while others use it as well.
+AHEAD = 32 << 20
 
 
 def messages(path: Path, contents: Contents, schemas: Set[str]) -> Iterator[tuple[Topic, Message]]:
@@ -30,7 +35,9 @@ def messages(path: Path, contents: Contents, schemas: Set[str]) -> Iterator[tupl
     earliest = np.minimum.accumulate(starts[::-1])[::-1]
     held: list[tuple[int, int, int, Message]] = []
     with path.open("rb") as stream:
+        begun = 0
         for number, chunk in enumerate(contents.chunks):
+            begun = _read_ahead(stream, contents.chunks, wanted, begun, chunk.offset + AHEAD)
             try:
                 records = read_chunk(stream, chunk) if chunk.may_have(wanted) else []
             except DAMAGE as error:
@@ -42,3 +49,13 @@ def messages(path: Path, contents: Contents, schemas: Set[str]) -> Iterator[tupl
             while held and held[0][0] <= earliest[number + 1]:
                 message = heapq.heappop(held)[-1]
                 yield contents.topics[message.channel_id], message
+
+
+def _read_ahead(stream: BinaryIO, chunks: Sequence[ChunkLocation], wanted: Set[int], begun: int, end: int) -> int:
+    """Lets the disk begin to read chunks with wanted channels, from number `begun` up to a byte; the next number."""
+    while begun + 1 < len(chunks) and chunks[begun].offset < end:
+        if chunks[begun].may_have(wanted):
+            size = max(chunks[begun + 1].offset - chunks[begun].offset, 1)  # other writers may order them otherwise
+            os.posix_fadvise(stream.fileno(), chunks[begun].offset, size, os.POSIX_FADV_WILLNEED)
+        begun += 1
+    return begun
