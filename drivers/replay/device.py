@@ -17,6 +17,9 @@ from drivers.replay.recording import Recording
 #: A recording in which nothing comes for longer [s] is said to pause: it is waited for as it was recorded.
 PAUSE_S = 5.0
 
+#: Longest time after images were delivered in which nothing is read, at most a quarter of that until the next ones [s].
+REST_S = 0.006
+
 #: Waits until the event is set or the timeout [s] has passed; returns True if it is set.
 Wait = Callable[[threading.Event, float], bool]
 
@@ -130,19 +133,22 @@ class ReplayDevice:
         return not stop.is_set()
 
     def _due(self, stop: threading.Event) -> Iterator[tuple[int, Frame | Truth]]:
-        """What is in the file, with new host times, each when it is due; some of it is read before, in spare time."""
+        """Frames and truths of the file, with new host times, each when it is due; some are read before, in spare time."""
         timeline, malformed = _Timeline(self._clock(), self._speed), 0
         ahead: deque[tuple[int, Frame | Truth]] = deque()
+        most = len(self.capabilities.streams) + 1  # those of one moment, and its truth
         failure: Exception | None = None
         try:
             for item in self._recording.frames():
                 self._gate.drop("malformed", self._recording.malformed - malformed)
                 malformed = self._recording.malformed
                 ahead.append((timeline.time_ns(item), item))
-                while ahead and (len(ahead) > len(self.capabilities.streams) or ahead[0][0] <= self._clock()):
+                while ahead and (len(ahead) > most or ahead[0][0] <= self._clock()):
                     if self._wait_for(ahead[0][0], stop):
                         return
                     yield ahead.popleft()
+                    if ahead:  # whoever publishes what is due goes before whoever reads what is not
+                        self._wait(stop, min(REST_S, max(ahead[0][0] - self._clock(), 0) * 1e-9 / 4))
         except (RecordingError, OSError) as error:
             failure = error
         for t_host_ns, item in ahead:
@@ -183,7 +189,7 @@ class _Timeline:
         self._begins: dict[str, tuple[int, int]] = {}
 
     def time_ns(self, item: Frame | Truth) -> int:
-        """When the next item of the file is due [ns]."""
+        """Host time [ns] at which the next item of the file is due."""
         self._host_clock = item.host_clock if isinstance(item, Frame) else self._host_clock
         unnamed = self._begins.pop("", (item.t_host_ns, self._latest_ns))  # of truths before the first frame
         first_ns, begin_ns = self._begins.setdefault(self._host_clock, unnamed)
