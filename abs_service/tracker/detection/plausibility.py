@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -30,6 +31,13 @@ SCENE_OF_MEASURED, SCENE_OF_IMAGE = 1 / 2, 1 / 3
 #: Share of the width or height at each end that a surface may leave out and still span the image: structured light
 #: sensors have no returns in the outer 7 % of an image that is registered to another camera.
 SCENE_MARGIN = 0.08
+
+#: A surface lines the image's border if it lies along it for so many times the root of its area: at most once, if one
+#: side of the image cuts off a thing as deep as wide; 1.25 to 4 times for the walls and floors of real scenes.
+LINING = 1.2
+
+#: Depth below the border of all that is measured at which the length along it is counted [px]: surfaces end inside.
+BELOW_BORDER_PX = 6
 
 #: Distances that scatter by this factor more than their noise model says contradict it. They are judged where they
 #: differ from the object's by less than this share, because deviations change with the distance.
@@ -76,6 +84,16 @@ def is_scene(surface: NDArray[np.bool_], measured: NDArray[np.bool_]) -> bool:
         return False
     rows, columns = np.nonzero(surface)
     return _spans(columns, surface.shape[1]) or _spans(rows, surface.shape[0])
+
+
+def lines_border(surface: NDArray[np.bool_], measured: NDArray[np.bool_]) -> bool:
+    """True if a surface lies along the image's border like a wall or a floor, and not like a thing that it cuts off.
+
+    Args:
+        surface: its pixels (height, width).
+        measured: pixels (height, width) with a return.
+    """
+    return _along_border(surface, measured) > LINING * np.sqrt(np.count_nonzero(surface))
 
 
 def doubts(detection: InitialDetection, mesh: Mesh, images: Mapping[str, Image], rig: Rig) -> tuple[str, ...]:
@@ -126,12 +144,35 @@ def noise_warnings(detection: InitialDetection) -> tuple[str, ...]:
 def warnings(detection: InitialDetection) -> tuple[str, ...]:
     """Doubts about an object that was found, in plain words, for `check`, health and the state alike."""
     inside, measured = np.isfinite(detection.distance), np.isfinite(detection.surroundings)
-    if not (measured.size and is_scene(inside, measured)):
+    if not measured.size:
         return ()
-    return (
-        f"the object fills {np.mean(inside):.0%} of the image, {inside.sum() / measured.sum():.0%} of all returns, "
-        "from side to side: is the region right?",
-    )
+    if is_scene(inside, measured):
+        return (
+            f"the object fills {np.mean(inside):.0%} of the image, {inside.sum() / measured.sum():.0%} of all returns, "
+            "from side to side: is the region right?",
+        )
+    if lines_border(inside, measured):
+        return (
+            f"the object lies along {_along_border(inside, measured):.0f} pixels of the image's border, like a wall or "
+            "a floor: is the region right? A seed or a box would tell where the object is",
+        )
+    return ()
+
+
+def _along_border(surface: NDArray[np.bool_], measured: NDArray[np.bool_]) -> int:
+    """Length [px] over which a surface lies along the border of what is measured, where that is about the image's."""
+    margin_y, margin_x = (round(SCENE_MARGIN * size) + BELOW_BORDER_PX for size in surface.shape)
+    near = surface.copy()
+    near[margin_y : surface.shape[0] - margin_y, margin_x : surface.shape[1] - margin_x] = False
+    if not near.any():
+        return 0
+    rows = np.flatnonzero(measured.any(axis=1))
+    first, last = measured[rows].argmax(axis=1), surface.shape[1] - 1 - measured[rows, ::-1].argmax(axis=1)
+    ends = np.concatenate([np.stack([first, rows], 1), np.stack([last, rows], 1)]).astype(np.int32)
+    # Surrounded by one pixel, so that the image's border is an edge as well.
+    hull = cv2.fillConvexPoly(np.zeros(np.add(surface.shape, 2), np.uint8), cv2.convexHull(ends + 1), 1)
+    below = cv2.distanceTransform(hull, cv2.DIST_L2, cv2.DIST_MASK_5)[1:-1, 1:-1]
+    return int(np.count_nonzero(near & (below > BELOW_BORDER_PX - 1) & (below <= BELOW_BORDER_PX)))
 
 
 def _spans(places: NDArray[np.int64], size: int) -> bool:

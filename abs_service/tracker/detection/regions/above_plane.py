@@ -10,13 +10,17 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.detection.depth_view import DepthView, limited
 from abs_service.tracker.detection.initial_detection import DetectionError
-from abs_service.tracker.detection.segments.depth_segments import large_surfaces, surface_at
+from abs_service.tracker.detection.plausibility import lines_border
+from abs_service.tracker.detection.segments.depth_segments import deepest_pixel, large_surfaces, surface_at
 from abs_service.tracker.detection.segments.within import Polygon, Restricted, restricted
 from calib.noise.base import NoiseError
 from calib.sequences import plane
 
 #: Minimum share of the returns on a plane for it to be what the object lies on.
 MIN_SHARE = 0.2
+
+#: A surface with less than this share of a wall's pixels says nothing against it.
+SPECK = 0.02
 
 #: Number of pixels of the subsampled image in which the plane is found; more are slower but not more accurate.
 MAX_PIXELS = 20_000
@@ -29,7 +33,8 @@ class Settings:
     Attributes:
         clearance_m: height above the plane up to which a pixel belongs to it [m]; several standard deviations of the
             distances there.
-        seed: column and row of a pixel of the object [px]; without it, the object is the largest connected surface.
+        seed: column and row of a pixel of the object [px]; without it, the object is the largest connected surface,
+            unless that may be a wall or a floor.
         largest_step_m: largest difference in distance between neighbouring pixels of one surface [m].
         minimum_pixels: minimum number of pixels of a surface; smaller ones are ignored as noise.
         within: mask image as of the region `mask`; pixels outside are ignored, except for finding the plane.
@@ -46,7 +51,34 @@ class Settings:
 
     def build(self) -> Restricted:
         """The region; DetectionError if `within` is missing or no image."""
+        if self.seed is None and self.within is None and self.polygon is None:
+            return restricted(self._unaided, None, None)
         return Restricted(self._above, restricted(self._selected, self.within, self.polygon).select)
+
+    def _unaided(self, view: DepthView) -> NDArray[np.bool_]:
+        """Pixels (height, width) of the object in a view of which nothing is known; DetectionError if in doubt."""
+        labels, large = self._surfaces(self._above(view))
+        largest = labels == large[0]
+        if lines_border(largest, view.measured):
+            self._refuse_background(largest, [labels == label for label in large[1:]], view)
+        return largest
+
+    def _refuse_background(self, largest: NDArray[np.bool_], others: list[NDArray[np.bool_]], view: DepthView) -> None:
+        """DetectionError if one of the other surfaces is a thing before the largest one, and no speck."""
+        pixels, away = np.count_nonzero(largest), np.median(view.distance[largest])
+        medians = {
+            float(np.median(view.distance[other])): other
+            for other in others
+            if np.count_nonzero(other) >= SPECK * pixels and not lines_border(other, view.measured)
+        }
+        if medians and min(medians) < away:
+            row, column = deepest_pixel(medians[min(medians)])
+            share = pixels / np.count_nonzero(view.measured)
+            raise DetectionError(
+                f"the largest surface above the plane has {share:.0%} of all returns and lies along the image's "
+                f"border, like a wall or a floor, and another one is nearer, at [{column}, {row}]: "
+                'set region.seed to a pixel of the object, or region.type to "box"'
+            )
 
     def _above(self, view: DepthView) -> DepthView:
         """The view without the plane and everything beyond it; DetectionError if there is no plane."""
@@ -64,13 +96,23 @@ class Settings:
 
     def _selected(self, view: DepthView) -> NDArray[np.bool_]:
         """Pixels (height, width) of the object among those above the plane; DetectionError if there is none."""
+        if self.seed is None:
+            labels, large = self._surfaces(view)
+            return labels == large[0]
         try:
-            if self.seed is not None:
-                return surface_at(self.seed, view.distance, self.largest_step_m, self.minimum_pixels)
-            labels, large = large_surfaces(view.distance, self.largest_step_m, self.minimum_pixels)
+            return surface_at(self.seed, view.distance, self.largest_step_m, self.minimum_pixels)
         except DetectionError as error:
-            raise DetectionError(f"more than clearance_m = {self.clearance_m:g} m above the plane: {error}") from None
-        return labels == large[0]
+            raise self._nothing(error) from None
+
+    def _surfaces(self, view: DepthView) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
+        """`large_surfaces` of what is above the plane; DetectionError if there is none."""
+        try:
+            return large_surfaces(view.distance, self.largest_step_m, self.minimum_pixels)
+        except DetectionError as error:
+            raise self._nothing(error) from None
+
+    def _nothing(self, error: DetectionError) -> DetectionError:
+        return DetectionError(f"more than clearance_m = {self.clearance_m:g} m above the plane: {error}")
 
 
 def _dominant_plane(view: DepthView, tolerance: float) -> NDArray[np.float64]:

@@ -103,3 +103,10 @@ def surface_at(
             f"{list(pixel)}; the nearest one is {away[nearest]:.0f} pixels away, at [{column}, {row}]"
         )
     return labels == labels[row, column]
+
+
+def deepest_pixel(surface: NDArray[np.bool_]) -> tuple[int, int]:
+    """Row and column of a surface's pixel (height, width) that is farthest inside it."""
+    depth = cv2.distanceTransform(np.pad(surface, 1).view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)[1:-1, 1:-1]
+    row, column = np.unravel_index(np.argmax(depth), depth.shape)
+    return int(row), int(column)

@@ -29,6 +29,14 @@ def test_a_large_object_that_ends_in_the_image_raises_no_doubts():
     assert warnings(detect(distance, nearest.Settings().build())) == ()
 
 
+def test_an_object_along_the_border_of_the_image_is_told():
+    distance = np.full((48, 64), 2.0, np.float32)
+    distance[:, 50:] = 1.0  # a side wall
+    (doubt,) = warnings(detect(distance, nearest.Settings().build()))
+    assert doubt.startswith("the object lies along 5")
+    assert "pixels of the image's border, like a wall or a floor: is the region right?" in doubt
+
+
 @pytest.mark.parametrize(("error_m", "told"), [(4e-3, False), (12e-3, True)])
 def test_distances_that_scatter_more_than_their_noise_model_says_are_told(error_m, told):
     """Beside the object, too, and not by a background that scatters more because it is farther away."""

@@ -228,9 +228,8 @@ def test_nearest_refuses_a_real_table(toy):
 def test_a_real_sponge_is_found_on_its_table(toy):
     view, path = toy
     sponge = mask.Settings(path).build().select(view)
-    with_hands = above_plane.Settings().build().select(view)
-    assert np.count_nonzero(with_hands & sponge) > 0.9 * np.count_nonzero(sponge)
-    assert np.count_nonzero(with_hands) > 5 * np.count_nonzero(sponge)  # hand, arm and body are connected to it
+    with pytest.raises(DetectionError, match=r"has 16% of all returns and lies along the image's border"):
+        above_plane.Settings().build().select(view)  # hand, arm and body are connected to it
     alone = above_plane.Settings(seed=(111, 133), largest_step_m=0.015).build().select(view)
     assert np.count_nonzero(alone & sponge) > 0.75 * np.count_nonzero(sponge)
     assert np.count_nonzero(alone & ~sponge) < 0.02 * np.count_nonzero(alone)
