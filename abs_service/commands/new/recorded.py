@@ -1,5 +1,6 @@
 """A recording in place of a camera: its sensors are those that it has images of."""
 
+import re
 import shlex
 from itertools import islice
 from pathlib import Path
@@ -29,6 +30,9 @@ _SCATTERED = """\
 # in inverse distance [1/m]. Measure yours with `abs-service calibrate noise`.
 noise = {{ type = "structured_light", noise = {:.1f}e-3, step = 0.0 }}
 """
+#: A head with such a name is a time-of-flight camera, whatever else it recorded.
+_TIME_OF_FLIGHT_NAME = re.compile(r"(?<![a-z])tof(?![a-z])", re.IGNORECASE)
+
 _PRIMESENSE = StructuredLight()
 #: Less more than that says nothing: images differ.
 _MORE = 1.2
@@ -51,7 +55,7 @@ def device(path: Path) -> Device:
     if not heads:
         raise RecordingError(f"{path}: there are no depth images in it, so nothing can be tracked")
     head = min(heads)
-    noise = (model for stream, model in _NOISE.items() if (head, stream) in recording.counts)
+    noise, assumed = _noise(recording, head)
     colors = sorted((sensor, stream) for sensor, stream in recording.counts if stream in _COLORS)
     period_s = recording.duration_s / max(1, recording.counts[head, "depth"] - 1)
     shown = printable(shlex.quote(str(path)))
@@ -61,17 +65,31 @@ def device(path: Path) -> Device:
         f"recording {printable(path.name)}",
         f"replay://{quote(str(path.resolve()))}",
         head,
-        next(noise, "") or _structured_light(recording, head),
+        noise,
         Color(colors[0][0], _COLORS[colors[0][1]]) if colors else None,
         round(500.0 * period_s, 1) or 17.0,
         min(2.0, max(0.5, round(recording.duration_s / 2, 1))),
         address="\n# ".join(filter(None, (f"The recording; `abs-service info {shown}` describes it.", note))),
-        note=note,
+        note=" ".join(filter(None, (note, assumed))),
         commands=(
             "abs-service check {file} --picture first.png",
             f"abs-service replay {shown} --images --config " + "{file}",
         ),
     )
+
+
+def _noise(recording: Recording, head: str) -> tuple[str, str]:
+    """Noise model of a head with comments, and what had to be assumed for it, for people; "" if that is nothing."""
+    for stream, model in _NOISE.items():
+        if (head, stream) in recording.counts:
+            return model, ""
+    if _TIME_OF_FLIGHT_NAME.search(head):
+        return TIME_OF_FLIGHT, ""
+    assumed = (
+        f"{printable(head)} has distances only, so it is taken for structured light or stereo.",
+        'Of a time-of-flight camera write noise = { type = "constant", sigma = 0.01 } instead.',
+    )
+    return "".join(f"# {line}\n" for line in assumed) + _structured_light(recording, head), " ".join(assumed)
 
 
 def _structured_light(recording: Recording, head: str) -> str:

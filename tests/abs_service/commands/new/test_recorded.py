@@ -40,6 +40,18 @@ def test_sensors_noise_and_tolerance_follow_from_the_images(tmp_path, capsys):
     assert cli.main(["check", str(rig), "--replay", str(recording)]) == Exit.OK
 
 
+@pytest.mark.parametrize(
+    ("head", "model"), [("tof", "constant"), ("left_tof2", "constant"), ("autofocus", "structured_light")]
+)
+def test_distances_alone_are_weighed_by_the_name_of_their_head(tmp_path, capsys, head, model):
+    rig, recording = tmp_path / "rig.toml", tmp_path / "x.mcap"
+    write_take(recording, Scattering(1.0e-3), range(2), {"structured_light": head})
+    assert cli.main(["new", str(rig), "--recording", str(recording), *ANSWERS]) == Exit.OK
+    assert tomllib.loads(rig.read_text())["sensors"][head]["noise"]["type"] == model
+    said = f"{head} has distances only, so it is taken for structured light or stereo."
+    assert [said in text for text in (rig.read_text(), capsys.readouterr().out)] == [model == "structured_light"] * 2
+
+
 class Scattering:
     """A wall at half a metre, whose inverse distances scatter, as a simulation's images."""
 
