@@ -80,13 +80,15 @@ def device(path: Path) -> Device:
 
 def _noise(recording: Recording, head: str) -> tuple[str, str]:
     """Noise model of a head with comments, and what had to be assumed for it, for people; "" if that is nothing."""
+    # Two infra-red images are a stereo pair, one of which the distances were computed for.
+    is_pair = sum(stream == "ir" for _, stream in recording.counts) > 1
     for stream, model in _NOISE.items():
-        if (head, stream) in recording.counts:
+        if (head, stream) in recording.counts and not (stream == "ir" and is_pair):
             return model, ""
     if _TIME_OF_FLIGHT_NAME.search(head):
         return TIME_OF_FLIGHT, ""
     assumed = (
-        f"{printable(head)} has distances only, so it is taken for structured light or stereo.",
+        f"{printable(head)} is taken for structured light or stereo, as it has no amplitudes beside its distances.",
         'Of a time-of-flight camera write noise = { type = "constant", sigma = 0.01 } instead.',
     )
     return "".join(f"# {line}\n" for line in assumed) + _structured_light(recording, head), " ".join(assumed)

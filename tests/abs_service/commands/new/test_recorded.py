@@ -11,7 +11,7 @@ from abs_service import cli
 from abs_service.commands.new import new, recorded
 from abs_service.supervision.exit_codes import Exit
 from drivers.contract.device import Truth
-from drivers.contract.frame import Frame
+from drivers.contract.frame import Frame, Geometry, Kind
 from drivers.simulated.address import parse
 from tests.abs_service.commands.recordings.simulated_recording import write_take
 from tests.drivers.o3r import pcic_messages
@@ -48,7 +48,7 @@ def test_distances_alone_are_weighed_by_the_name_of_their_head(tmp_path, capsys,
     write_take(recording, Scattering(1.0e-3), range(2), {"structured_light": head})
     assert cli.main(["new", str(rig), "--recording", str(recording), *ANSWERS]) == Exit.OK
     assert tomllib.loads(rig.read_text())["sensors"][head]["noise"]["type"] == model
-    said = f"{head} has distances only, so it is taken for structured light or stereo."
+    said = f"{head} is taken for structured light or stereo, as it has no amplitudes beside"
     assert [said in text for text in (rig.read_text(), capsys.readouterr().out)] == [model == "structured_light"] * 2
 
 
@@ -79,6 +79,28 @@ def test_a_camera_that_scatters_more_than_usual_is_weighed_less(tmp_path, noise,
     model = tomllib.loads(rig.read_text())["sensors"]["depth"]["noise"]
     assert (model["type"], model["noise"]) == ("structured_light", pytest.approx(written, rel=0.1))
     assert cli.main(["check", str(rig)]) == Exit.OK
+
+
+class Infrared(Scattering):
+    """The same wall with infra-red images, of the depth camera and of others."""
+
+    def __init__(self, *heads: str) -> None:
+        super().__init__(1.0e-3)
+        self.heads = dict.fromkeys(["structured_light", *heads], self.heads["structured_light"])
+
+    def frames(self, k: int) -> list[Frame]:
+        (depth,) = super().frames(k)
+        picture = {"stream": "ir", "kind": Kind.IR, "geometry": Geometry.NONE, "encoding": "mono8", "unit": "dn"}
+        grey = np.full(depth.data.shape, 9, np.uint8)
+        return [depth, *(replace(depth, sensor=head, data=grey, **picture) for head in self.heads)]
+
+
+@pytest.mark.parametrize(("others", "model"), [((), "constant"), (("right",), "structured_light")])
+def test_a_pair_of_infrared_images_is_stereo(tmp_path, others, model):
+    rig, recording = tmp_path / "rig.toml", tmp_path / "x.mcap"
+    write_take(recording, Infrared(*others), range(2), {"structured_light": "depth"} | dict(zip(others, others)))
+    assert cli.main(["new", str(rig), "--recording", str(recording), *ANSWERS]) == Exit.OK
+    assert tomllib.loads(rig.read_text())["sensors"]["depth"]["noise"]["type"] == model
 
 
 def test_of_several_depth_sensors_the_first_is_taken_and_the_others_are_told(tmp_path, capsys):
