@@ -9,11 +9,18 @@ from abs_service.pairing.images import Window
 from abs_service.tracker.terms.depth.classification.background import Background, dropouts
 from abs_service.tracker.terms.depth.classification.beyond_view import BeyondView
 from abs_service.tracker.terms.depth.classification.interruption import interruptions
-from abs_service.tracker.terms.depth.classification.visibility import Visibility, classify, surfaces_of
+from abs_service.tracker.terms.depth.classification.separation import separating_step
+from abs_service.tracker.terms.depth.classification.visibility import (
+    AGREEMENT_M,
+    LARGEST_STEP_M,
+    Visibility,
+    classify,
+    surfaces_of,
+)
 
 
 class Classifier:
-    """Knows from the first image where the background gives no return, and where the field of view ends.
+    """Knows from the first image where the background gives no return, and where the field of view and the object end.
 
     Args:
         focal: focal length of the camera [px].
@@ -22,7 +29,7 @@ class Classifier:
     def __init__(self, focal: float) -> None:
         self._focal = focal
         self._background, self._beyond_view = Background(), BeyondView()
-        self._begun, self._is_interrupted = False, True
+        self._begun, self._is_interrupted, self._step = False, True, LARGEST_STEP_M
 
     def classify(
         self, distance: NDArray[np.float32], expected: NDArray[np.float32], window: Window, shape: tuple[int, ...]
@@ -37,11 +44,16 @@ class Classifier:
         """
         missing, silhouette = np.isnan(distance), np.isfinite(expected)
         beyond, single = self._beyond_view.observe(missing, silhouette, window), dropouts(missing)
-        surfaces, areas = surfaces_of(distance), missing & ~(single | beyond)
+        if not self._begun:
+            self._step = separating_step(distance, silhouette)
+        surfaces, areas = surfaces_of(distance, self._step), missing & ~(single | beyond)
         # What the surface goes on beyond is a hole, not the background. If there is none at first, none is looked for.
         hole = interruptions(surfaces, areas, silhouette) if self._is_interrupted else np.False_
         if not self._begun:
             self._begun, self._is_interrupted = True, bool(hole.any())
         empty = self._background.observe(areas & ~hole, silhouette, window, shape)
-        seen = classify(surfaces, expected, self._focal, empty, single, beyond)
+        given = expected, self._focal, empty, single, beyond
+        seen = classify(surfaces, *given, agreement=AGREEMENT_M * (self._step / LARGEST_STEP_M))
+        if self._step < LARGEST_STEP_M and not seen.object.any():  # it moved farther than a finer agreement allows for
+            seen = classify(surfaces_of(distance), *given)
         return replace(seen, hole=seen.hole | hole)

@@ -53,9 +53,9 @@ class Visibility:
     free_m: NDArray[np.float32]
 
 
-def surfaces_of(distance: NDArray[np.floating]) -> Surfaces:
-    """Surfaces of radial distances (height, width) [m], NaN without return, separated at `LARGEST_STEP_M`."""
-    return connected_surfaces(np.ascontiguousarray(distance, np.float32), LARGEST_STEP_M)
+def surfaces_of(distance: NDArray[np.floating], largest_step: float = LARGEST_STEP_M) -> Surfaces:
+    """Surfaces of radial distances (height, width) [m], NaN without return, separated at larger steps [m]."""
+    return connected_surfaces(np.ascontiguousarray(distance, np.float32), largest_step)
 
 
 def classify(
@@ -65,6 +65,7 @@ def classify(
     empty: NDArray[np.bool_] | np.bool_ = np.False_,
     dropout: NDArray[np.bool_] | np.bool_ = np.False_,
     beyond: NDArray[np.bool_] | np.bool_ = np.False_,
+    agreement: float = AGREEMENT_M,
 ) -> Visibility:
     """Classifies the pixels of one depth image by connected surfaces.
 
@@ -77,16 +78,17 @@ def classify(
         empty: missing returns (height, width) that show the background, see `Background`.
         dropout: missing returns of single pixels, see `dropouts`.
         beyond: missing returns beyond the field of view, see `BeyondView`; they count as a hole.
+        agreement: distance from the prediction up to which a measurement shows the object [m].
     """
     distance, labels, predicted = surfaces.distance, surfaces.labels, np.ascontiguousarray(predicted, np.float32)
     is_object = np.zeros(surfaces.count, np.bool_)
-    _recognize(distance, predicted, labels, is_object)
+    _recognize(distance, predicted, labels, agreement, is_object)
     nothing = np.zeros(distance.shape, np.bool_)
     if not is_object.any():
         return Visibility(nothing, nothing, nothing, nothing, nothing | beyond, np.zeros(distance.shape, np.float32))
     near = _extended(predicted)
     shown, before, solid, behind, missing = (np.empty(distance.shape, np.bool_) for _ in range(5))
-    _compare(distance, near, labels, is_object, shown, before, solid, behind, missing)
+    _compare(distance, near, labels, is_object, agreement, shown, before, solid, behind, missing)
     foreground = before & (cv2.dilate(solid.view(np.uint8), np.ones((3, 3))) > 0) if solid.any() else nothing
     hole, past, single = nothing, nothing, missing & dropout & ~beyond
     if missing.any():
@@ -101,6 +103,7 @@ def _recognize(
     distance: NDArray[np.float32],
     predicted: NDArray[np.float32],
     labels: NDArray[np.int32],
+    agreement: float,
     is_object: NDArray[np.bool_],
 ) -> None:
     """True for each connected surface (count,) that is the object; label 0 is no surface."""
@@ -110,7 +113,7 @@ def _recognize(
             expected, label = predicted[row, column], labels[row, column]
             if np.isfinite(expected):
                 inside[label] += 1
-                agreeing[label] += 1 if abs(distance[row, column] - expected) < AGREEMENT_M else 0
+                agreeing[label] += 1 if abs(distance[row, column] - expected) < agreement else 0
     for label in range(1, is_object.size):
         is_object[label] = agreeing[label] >= max(MIN_PIXELS, MIN_SHARE * inside[label])
 
@@ -121,6 +124,7 @@ def _compare(
     near: NDArray[np.float32],
     labels: NDArray[np.int32],
     is_object: NDArray[np.bool_],
+    agreement: float,
     shown: NDArray[np.bool_],
     before: NDArray[np.bool_],
     solid: NDArray[np.bool_],
@@ -132,10 +136,10 @@ def _compare(
         for column in range(distance.shape[1]):
             label, beyond = labels[row, column], distance[row, column] - near[row, column]
             is_shown = is_object[label]
-            is_before = not is_shown and beyond < -AGREEMENT_M
+            is_before = not is_shown and beyond < -agreement
             shown[row, column], before[row, column] = is_shown, is_before
             solid[row, column] = is_before and label > 0
-            behind[row, column] = not is_shown and beyond > AGREEMENT_M
+            behind[row, column] = not is_shown and beyond > agreement
             missing[row, column] = not np.isfinite(distance[row, column])
 
 
