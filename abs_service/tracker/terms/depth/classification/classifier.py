@@ -9,7 +9,7 @@ from abs_service.pairing.images import Window
 from abs_service.tracker.terms.depth.classification.background import Background, dropouts
 from abs_service.tracker.terms.depth.classification.beyond_view import BeyondView
 from abs_service.tracker.terms.depth.classification.interruption import interruptions
-from abs_service.tracker.terms.depth.classification.separation import separating_step
+from abs_service.tracker.terms.depth.classification.separation import separates, separating_step
 from abs_service.tracker.terms.depth.classification.visibility import (
     AGREEMENT_M,
     LARGEST_STEP_M,
@@ -46,14 +46,17 @@ class Classifier:
         beyond, single = self._beyond_view.observe(missing, silhouette, window), dropouts(missing)
         if not self._begun:
             self._step = separating_step(distance, silhouette)
-        surfaces, areas = surfaces_of(distance, self._step), missing & ~(single | beyond)
+        # A flat thing that is lifted ends as others do, and its surface may be steep then.
+        is_flat = self._step < LARGEST_STEP_M and not separates(LARGEST_STEP_M, distance, silhouette)
+        step = self._step if is_flat else LARGEST_STEP_M
+        surfaces, areas = surfaces_of(distance, step), missing & ~(single | beyond)
         # What the surface goes on beyond is a hole, not the background. If there is none at first, none is looked for.
         hole = interruptions(surfaces, areas, silhouette) if self._is_interrupted else np.False_
         if not self._begun:
             self._begun, self._is_interrupted = True, bool(hole.any())
         empty = self._background.observe(areas & ~hole, silhouette, window, shape)
         given = expected, self._focal, empty, single, beyond
-        seen = classify(surfaces, *given, agreement=AGREEMENT_M * (self._step / LARGEST_STEP_M))
-        if self._step < LARGEST_STEP_M and not seen.object.any():  # it moved farther than a finer agreement allows for
+        seen = classify(surfaces, *given, agreement=AGREEMENT_M * (step / LARGEST_STEP_M))
+        if is_flat and not seen.object.any():  # it moved farther than a finer agreement allows for
             seen = classify(surfaces_of(distance), *given)
         return replace(seen, hole=seen.hole | hole)

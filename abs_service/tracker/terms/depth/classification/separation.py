@@ -29,19 +29,20 @@ def separating_step(distance: NDArray[np.float32], silhouette: NDArray[np.bool_]
         distance: measured radial distances (height, width) [m], NaN without return.
         silhouette: pixels (height, width) of the mesh.
     """
-    if not silhouette.any():
+    if separates(LARGEST_STEP_M, distance, silhouette):
         return LARGEST_STEP_M
-    part = around(silhouette, int(REACH * np.sqrt(np.count_nonzero(silhouette))))
-    if _separates(LARGEST_STEP_M, distance[part], silhouette[part]):
-        return LARGEST_STEP_M
-    finer = (step for step in FINER_STEPS_M if _separates(step, distance[part], silhouette[part]))
+    finer = (step for step in FINER_STEPS_M if separates(step, distance, silhouette))
     return next(reversed(list(islice(finer, 2))), LARGEST_STEP_M)
 
 
-def _separates(step: float, distance: NDArray[np.float32], silhouette: NDArray[np.bool_]) -> bool:
-    """True if a step separates the surface of a mesh's pixels from those beside it."""
-    labels, pixels = surfaces_of(distance, step).labels, np.count_nonzero(silhouette)
-    own = np.bincount(labels[silhouette], minlength=2)
+def separates(step: float, distance: NDArray[np.float32], silhouette: NDArray[np.bool_]) -> bool:
+    """True if a step [m] separates the surface of a mesh's pixels (rows, columns) from those beside it."""
+    if not silhouette.any():
+        return False
+    pixels = np.count_nonzero(silhouette)
+    part = around(silhouette, int(REACH * np.sqrt(pixels)))
+    labels = surfaces_of(distance[part], step).labels
+    own = np.bincount(labels[silhouette[part]], minlength=2)
     own[0] = 0  # of no surface
     shared, all_of_it = own.max(), np.count_nonzero(labels == own.argmax())
     return bool(shared > MIN_SHARE * pixels and all_of_it < LARGEST_RATIO * pixels)

@@ -50,6 +50,17 @@ def test_a_table_beside_a_flat_thing_is_not_the_object(nearer_m):
     assert (seen.free_m[60, 20] > 0) == (nearer_m == 0)
 
 
+def test_a_flat_thing_that_is_lifted_is_classified_as_others_are():
+    distance, silhouette = scene(0.01)
+    classifier = Classifier(140.0)
+    for lifted_m, agreeing_m in ((0.0, 0.0), (0.1, 0.02)):  # farther off than the finer agreement
+        distance[THING] -= np.float32(lifted_m)
+        expected = np.where(silhouette, distance + np.float32(agreeing_m), np.float32(np.inf))
+        seen = classifier.classify(distance, expected, WHOLE, distance.shape)
+        assert seen.object[60, 80]
+        assert seen.free_m[60, 20] > 0
+
+
 def test_a_flat_thing_that_slides_on_a_table_is_tracked():
     camera, generator = a.Camera(160, 120, fx=140, fy=140, cx=79.5, cy=59.5), np.random.default_rng(4)
     column, row = np.meshgrid(np.arange(160), np.arange(120))
