@@ -1,6 +1,6 @@
 """Raw detection of board points by OpenCV, without checks and ordering."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import cv2
 import numpy as np
@@ -17,6 +17,8 @@ Found = tuple[NDArray[np.intp], NDArray[np.float64]]
 
 #: Images above this size are searched at an integer fraction of their size [px]; corners are refined later.
 _LARGEST = 2000
+#: The same of the first searches for a chessboard, which take long in large images with clutter or noise and no board.
+_LARGEST_AT_FIRST = 1000
 #: Images below this size are enlarged if nothing is found, because squares and discs need about ten pixels [px].
 _SMALLEST, _SMALLEST_OF_DISCS = 400, 1000
 
@@ -37,24 +39,39 @@ def find(target: Target, levels: Grey) -> Found:
 
     All boards but ChArUco and AprilGrid are detected completely or not at all; then n is 0.
     """
-    for attempt in (levels, local_contrast(levels)):
-        for scale in _scales(target, levels):
-            ids, pixels = _find(target, _scaled(attempt, scale))
-            if len(ids):
-                # Both images cover the same area, and pixel centres are integers in both.
-                return ids, (pixels + 0.5) / scale - 0.5
+    for image, scale, search in _attempts(target, levels):
+        ids, pixels = search(target, _scaled(image, scale))
+        if len(ids):
+            # Both images cover the same area, and pixel centres are integers in both.
+            return ids, (pixels + 0.5) / scale - 0.5
     return _NOTHING
+
+
+def _attempts(target: Target, levels: Grey) -> Iterator[tuple[Grey, float, Callable[..., Found]]]:
+    """Images to search, with their scales and searches; in most images a board is found by the first of them."""
+    for image in (levels, local_contrast(levels)):
+        for scale in _scales(target, levels):
+            yield image, scale, _find
+    if isinstance(target, Chessboard):
+        is_small = max(levels.shape) <= _LARGEST_AT_FIRST
+        yield (levels, 2, _by_sectors) if is_small else (levels, _reduction(levels, _LARGEST), _find)
 
 
 def _scales(target: Target, levels: Grey) -> Iterator[float]:
     size = max(levels.shape)
-    if size > _LARGEST and not isinstance(target, Charuco | AprilGrid):
-        yield 1 / int(np.ceil(size / _LARGEST))
+    largest = _LARGEST_AT_FIRST if isinstance(target, Chessboard) else _LARGEST
+    if size > largest and not isinstance(target, Charuco | AprilGrid):
+        yield _reduction(levels, largest)
         return
     yield 1
     if size < (_SMALLEST_OF_DISCS if isinstance(target, Circles | AsymmetricCircles) else _SMALLEST):
         yield 2
         yield 4
+
+
+def _reduction(levels: Grey, largest: int) -> float:
+    """Integer fraction that makes an image at most this large [px]."""
+    return 1 / int(np.ceil(max(levels.shape) / largest))
 
 
 def _scaled(levels: Grey, scale: float) -> Grey:
@@ -67,7 +84,7 @@ def _scaled(levels: Grey, scale: float) -> Grey:
 def _find(target: Target, levels: Grey) -> Found:
     match target:
         case Chessboard():
-            found, corners = _find_chessboard(target, levels)
+            return _find_chessboard(target, levels)
         case Charuco():
             return _find_charuco(target, levels)
         case AprilGrid():
@@ -76,23 +93,33 @@ def _find(target: Target, levels: Grey) -> Found:
             found, corners = _find_circles(target, levels, cv2.CALIB_CB_SYMMETRIC_GRID)
         case AsymmetricCircles():
             found, corners = _find_circles(target, levels, cv2.CALIB_CB_ASYMMETRIC_GRID)
-    return (np.arange(len(corners)), corners.reshape(-1, 2).astype(np.float64)) if found else _NOTHING
+    return _complete(corners) if found else _NOTHING
 
 
-def _find_chessboard(target: Chessboard, levels: Grey) -> tuple[bool, NDArray[np.float64]]:
+def _complete(corners: NDArray[np.integer | np.floating]) -> Found:
+    return np.arange(len(corners)), corners.reshape(-1, 2).astype(np.float64)
+
+
+def _find_chessboard(target: Chessboard, levels: Grey) -> Found:
     """Corners by the sector-based search or else, as that one misses boards bent by a fisheye, by linking dark squares.
 
     The first bears blur and noise better. `CALIB_CB_FAST_CHECK` misses a board now and then, which the image with local
     contrast shows; without it, images with clutter and no board take much longer.
     """
-    flags = cv2.CALIB_CB_ACCURACY | cv2.CALIB_CB_NORMALIZE_IMAGE
-    found, corners = cv2.findChessboardCornersSB(levels, target.grid, flags=flags)
-    if found:
-        return True, np.asarray(corners, np.float64)
+    ids, pixels = _by_sectors(target, levels)
+    if len(ids):
+        return ids, pixels
     flags = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_FAST_CHECK
     found, linked = cv2.findChessboardCorners(levels, target.grid, flags=flags)
     corners = np.asarray(linked, np.float64) if found else np.zeros((0, 2))
-    return found and _alternates(corners.reshape(target.grid[1], target.grid[0], 2), levels), corners
+    is_board = found and _alternates(corners.reshape(target.grid[1], target.grid[0], 2), levels)
+    return _complete(corners) if is_board else _NOTHING
+
+
+def _by_sectors(target: Chessboard, levels: Grey) -> Found:
+    """Corners by sectors, without `CALIB_CB_ACCURACY`: it takes four times as long, and corners are refined later."""
+    found, corners = cv2.findChessboardCornersSB(levels, target.grid, flags=cv2.CALIB_CB_NORMALIZE_IMAGE)
+    return _complete(corners) if found else _NOTHING
 
 
 def _alternates(lattice: NDArray[np.float64], levels: Grey) -> bool:
@@ -123,6 +150,7 @@ def _part_of_chessboard(levels: Grey) -> NDArray[np.float64]:
 
 def is_cut_off(target: Target, levels: Grey) -> bool:
     """True if an image without a detection shows part of a board that continues beyond the border."""
+    levels = _scaled(levels, next(_scales(target, levels)))
     match target:
         case Chessboard():
             corners = _part_of_chessboard(levels)
