@@ -1,5 +1,6 @@
 """Offline sources of shots: recordings and image folders."""
 
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -88,6 +89,11 @@ class FolderShots:
         path = Path(pattern)
         if path.is_dir():
             raise ShotsError(f"images of {sensor}: {path} is a folder: name the images in it, such as '{path}/*.png'")
+        if not path.parent.is_dir() and re.search(r"[*?[]", str(path.parent)):
+            raise ShotsError(
+                f"images of {sensor}: {path.parent}: no such folder; only the name of the images, after the "
+                "last '/', may hold wildcards: * ? ["
+            )
         try:
             files = by_number(path.parent, path.name, rate_hz=1.0, alone=len(self.patterns) == 1)
         except ImageFolderError as error:

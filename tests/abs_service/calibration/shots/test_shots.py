@@ -139,6 +139,15 @@ def test_a_device_that_fails_ends_the_shots_with_its_reason() -> None:
         list(shots)
 
 
+def test_wildcards_of_a_folder_are_refused_unless_they_are_its_name(tmp_path: Path) -> None:
+    folder = tmp_path / "run [1]"
+    folder.mkdir()
+    cv2.imwrite(f"{folder}/left1.png", np.zeros((4, 4), np.uint8))
+    assert len(list(FolderShots({"left": f"{folder}/*.png"}))) == 1
+    with pytest.raises(ShotsError, match=r"run\*: no such folder; only the name of the images, .* may hold wildcards"):
+        list(FolderShots({"left": f"{tmp_path}/run*/left*.png"}))
+
+
 def test_z_distances_without_a_camera_are_refused(recording: Recording) -> None:
     with pytest.raises(ShotsError, match="structured_light/depth: distances along z need the camera model"):
         list(RecordingShots(recording, cameras={"tof": recording.cameras["tof"]}))
