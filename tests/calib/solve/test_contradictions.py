@@ -83,3 +83,11 @@ def test_a_shot_that_is_far_off_from_the_start_is_named() -> None:
     usable, state = start(task({**BOARDS, 4: BOARDS[12]}), lambda _: None)
     assert unlike_the_rest(usable, state).endswith("--skip 4")
     assert unlike_the_rest(*start(task(BOARDS), lambda _: None)) == ""
+
+
+def test_shots_after_which_a_sensor_was_moved_are_named_as_one_group() -> None:
+    later = {shot: moved(T_rb, (0.1, 0, 0)) for shot, T_rb in BOARDS.items() if shot > 12}
+    said = unlike_the_rest(*start(task({**BOARDS, **later}), lambda _: None))
+    assert "(was a sensor moved before shot 13?)" in said
+    assert said.count("px are usual") == 1
+    assert said.endswith("--skip 13-19")
