@@ -133,7 +133,7 @@ class ReplayDevice:
         return not stop.is_set()
 
     def _due(self, stop: threading.Event) -> Iterator[tuple[int, Frame | Truth]]:
-        """Frames and truths of the file, with new host times, each when it is due; some are read before, in spare time."""
+        """Frames and truths with new host times, each when it is due; some are read before that, in spare time."""
         timeline, malformed = _Timeline(self._clock(), self._speed), 0
         ahead: deque[tuple[int, Frame | Truth]] = deque()
         most = len(self.capabilities.streams) + 1  # those of one moment, and its truth
