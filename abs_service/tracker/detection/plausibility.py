@@ -86,14 +86,29 @@ def is_scene(surface: NDArray[np.bool_], measured: NDArray[np.bool_]) -> bool:
     return _spans(columns, surface.shape[1]) or _spans(rows, surface.shape[0])
 
 
-def lines_border(surface: NDArray[np.bool_], measured: NDArray[np.bool_]) -> bool:
-    """True if a surface lies along the image's border like a wall or a floor, and not like a thing that it cuts off.
+def lining(surface: NDArray[np.bool_], measured: NDArray[np.bool_]) -> int:
+    """Length [px] over which a surface lies along the image's border; 0 if it may be a thing that the image cuts off.
+
+    It is that along the border of what is measured, where that is about the image's.
 
     Args:
         surface: its pixels (height, width).
         measured: pixels (height, width) with a return.
     """
-    return _along_border(surface, measured) > LINING * np.sqrt(np.count_nonzero(surface))
+    margin_y, margin_x = (round(SCENE_MARGIN * size) + BELOW_BORDER_PX for size in surface.shape)
+    near = surface.copy()
+    near[margin_y : surface.shape[0] - margin_y, margin_x : surface.shape[1] - margin_x] = False
+    if not near.any():
+        return 0
+    # The ends of the rows have the hull of all that is measured, which takes a hundred times as long.
+    rows = np.flatnonzero(measured.any(axis=1))
+    first, last = measured[rows].argmax(axis=1), surface.shape[1] - 1 - measured[rows, ::-1].argmax(axis=1)
+    ends = np.concatenate([np.stack([first, rows], 1), np.stack([last, rows], 1)]).astype(np.int32)
+    # Surrounded by one pixel, so that the image's border is an edge as well.
+    hull = cv2.fillConvexPoly(np.zeros(np.add(surface.shape, 2), np.uint8), cv2.convexHull(ends + 1), 1)
+    below = cv2.distanceTransform(hull, cv2.DIST_L2, cv2.DIST_MASK_5)[1:-1, 1:-1]
+    length = int(np.count_nonzero(near & (below > BELOW_BORDER_PX - 1) & (below <= BELOW_BORDER_PX)))
+    return length if length > LINING * np.sqrt(np.count_nonzero(surface)) else 0
 
 
 def doubts(detection: InitialDetection, mesh: Mesh, images: Mapping[str, Image], rig: Rig) -> tuple[str, ...]:
@@ -151,28 +166,12 @@ def warnings(detection: InitialDetection) -> tuple[str, ...]:
             f"the object fills {np.mean(inside):.0%} of the image, {inside.sum() / measured.sum():.0%} of all returns, "
             "from side to side: is the region right?",
         )
-    if lines_border(inside, measured):
+    if length := lining(inside, measured):
         return (
-            f"the object lies along {_along_border(inside, measured):.0f} pixels of the image's border, like a wall or "
+            f"the object lies along {length} pixels of the image's border, like a wall or "
             "a floor: is the region right? A seed or a box would tell where the object is",
         )
     return ()
-
-
-def _along_border(surface: NDArray[np.bool_], measured: NDArray[np.bool_]) -> int:
-    """Length [px] over which a surface lies along the border of what is measured, where that is about the image's."""
-    margin_y, margin_x = (round(SCENE_MARGIN * size) + BELOW_BORDER_PX for size in surface.shape)
-    near = surface.copy()
-    near[margin_y : surface.shape[0] - margin_y, margin_x : surface.shape[1] - margin_x] = False
-    if not near.any():
-        return 0
-    rows = np.flatnonzero(measured.any(axis=1))
-    first, last = measured[rows].argmax(axis=1), surface.shape[1] - 1 - measured[rows, ::-1].argmax(axis=1)
-    ends = np.concatenate([np.stack([first, rows], 1), np.stack([last, rows], 1)]).astype(np.int32)
-    # Surrounded by one pixel, so that the image's border is an edge as well.
-    hull = cv2.fillConvexPoly(np.zeros(np.add(surface.shape, 2), np.uint8), cv2.convexHull(ends + 1), 1)
-    below = cv2.distanceTransform(hull, cv2.DIST_L2, cv2.DIST_MASK_5)[1:-1, 1:-1]
-    return int(np.count_nonzero(near & (below > BELOW_BORDER_PX - 1) & (below <= BELOW_BORDER_PX)))
 
 
 def _spans(places: NDArray[np.int64], size: int) -> bool:

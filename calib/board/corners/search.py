@@ -49,7 +49,8 @@ def find(target: Target, levels: Grey) -> Found:
 
 def _attempts(target: Target, levels: Grey) -> Iterator[tuple[Grey, float, Callable[..., Found]]]:
     """Images to search, with their scales and searches; in most images a board is found by the first of them."""
-    for image in (levels, local_contrast(levels)):
+    for enhanced in (np.asarray, local_contrast):  # the second one only if it is needed
+        image = enhanced(levels)
         for scale in _scales(target, levels):
             yield image, scale, _find
     if isinstance(target, Chessboard):

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.detection.depth_view import DepthView, limited
 from abs_service.tracker.detection.initial_detection import DetectionError
-from abs_service.tracker.detection.plausibility import lines_border
+from abs_service.tracker.detection.plausibility import lining
 from abs_service.tracker.detection.segments.depth_segments import deepest_pixel, large_surfaces, surface_at
 from abs_service.tracker.detection.segments.within import Polygon, Restricted, restricted
 from calib.noise.base import NoiseError
@@ -59,7 +59,7 @@ class Settings:
         """Pixels (height, width) of the object in a view of which nothing is known; DetectionError if in doubt."""
         labels, large = self._surfaces(self._above(view))
         largest = labels == large[0]
-        if lines_border(largest, view.measured):
+        if lining(largest, view.measured):
             self._refuse_background(largest, [labels == label for label in large[1:]], view)
         return largest
 
@@ -69,7 +69,7 @@ class Settings:
         medians = {
             float(np.median(view.distance[other])): other
             for other in others
-            if np.count_nonzero(other) >= SPECK * pixels and not lines_border(other, view.measured)
+            if np.count_nonzero(other) >= SPECK * pixels and not lining(other, view.measured)
         }
         if medians and min(medians) < away:
             row, column = deepest_pixel(medians[min(medians)])
