@@ -30,8 +30,8 @@ class Settings:
             So are those that share less than one part in `size_ratio` of their colours with the lost one.
         grow_s: time for which the object must be seen to continue beyond edges of the mesh that something hid at first
             before a new, larger mesh is made [s].
-        misfit_s: time for which the free edges must lie off the object's outline (`status.degraded_rim`,
-            `status.degraded_rim_m`) before a new mesh is made [s].
+        misfit_s: time without TRACKING after which a new mesh is made if the free edges lay off the object's outline at
+            its beginning, and still do (`status.degraded_rim`, `status.degraded_rim_m`) [s].
     """
 
     after_s: Annotated[float, Ge(0)] = 0.5
@@ -57,6 +57,7 @@ class LossMonitor:
         self._lost_ns: int | None = None
         self._tried_ns: int | None = None
         self._off_ns: int | None = None
+        self._is_off = False
         self._good = settings.confirm
         self._event = "found again"
 
@@ -67,7 +68,7 @@ class LossMonitor:
 
     def take_attempt(self, t_ns: int) -> bool:
         """True if an attempt is due at `t_ns` [ns]; it then counts as made."""
-        if self._off_ns is not None and t_ns - self._off_ns >= self._settings.misfit_s * 1e9:
+        if self._is_off and self._off_ns is not None and t_ns - self._off_ns >= self._settings.misfit_s * 1e9:
             self._off_ns = None
             return True
         if self._lost_ns is None or t_ns - self._lost_ns < self._settings.after_s * 1e9:
@@ -83,8 +84,11 @@ class LossMonitor:
 
     def with_hysteresis(self, estimate: Estimate) -> Estimate:
         """The estimate with hysteresis: the first good estimates after a loss are DEGRADED."""
-        off = status.is_misplaced(estimate.fits, estimate.shape, self._limits)
-        self._off_ns = (self._off_ns or estimate.t_host_ns) if off else None
+        self._is_off = status.is_misplaced(estimate.fits, estimate.shape, self._limits)
+        if self._is_off:
+            self._off_ns = self._off_ns or estimate.t_host_ns
+        elif estimate.status == Status.TRACKING:  # a mesh that is jammed lies off the outline in some frames only
+            self._off_ns = None
         if estimate.status == Status.LOST:
             self._lost_ns = estimate.t_host_ns if self._lost_ns is None else self._lost_ns
             self._good, self._event = 0, "found again"

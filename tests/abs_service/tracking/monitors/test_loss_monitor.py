@@ -61,8 +61,19 @@ def test_a_mesh_that_stays_off_its_outline_is_made_anew(rim):
     for k in range(1, 20):
         if monitor.take_attempt(k * FRAME_NS):
             tries.append(k)
-        monitor.with_hysteresis(dataclasses.replace(estimate(k, Status.DEGRADED), fits=off if k != 3 else ()))
+        judged = estimate(k, Status.TRACKING) if k == 3 else dataclasses.replace(estimate(k, Status.DEGRADED), fits=off)
+        monitor.with_hysteresis(judged)
     assert tries == [11, 18]  # 0.2 s after frame 4, and again as long after the next one
+
+
+def test_a_jammed_mesh_that_lies_off_its_outline_in_some_frames_is_made_anew():
+    monitor, tries = LossMonitor(Settings(misfit_s=0.2), LIMITS), []
+    off = (SensorFit("tof", 300, 0, 300, 200, 0.0, 1.0, RimFit(visible=60, inside=30)),)
+    for k in range(1, 14):
+        if monitor.take_attempt(k * FRAME_NS):
+            tries.append(k)
+        monitor.with_hysteresis(dataclasses.replace(estimate(k, Status.DEGRADED), fits=() if k % 3 else off))
+    assert tries == [10]  # 0.2 s after frame 3, beside a frame in which it is off
 
 
 def test_after_a_loss_the_first_good_estimates_are_degraded():
