@@ -71,17 +71,24 @@ def grid_mesh(detection: InitialDetection) -> Mesh:
 
 
 def _grid(pixels: NDArray[np.float32], spacing: float) -> NDArray[np.float64]:
-    """Pixel coordinates (rows, columns, 2) of a grid over the minimum-area rectangle around pixels (k, 2)."""
+    """Pixel coordinates (rows, columns, 2) of a grid over the minimum-area rectangle around pixels (k, 2).
+
+    Its points are the centres of equal cells, so that it ends half a cell inside every side of the rectangle.
+    """
     center, size, angle = cv2.minAreaRect(pixels)
     if size[0] < size[1]:
         size, angle = size[::-1], angle + 90
     angle = np.deg2rad((angle + 90) % 180 - 90)  # the long side points right, so that the grid is not mirrored
     right = np.array([np.cos(angle), np.sin(angle)])
     down = np.array([-np.sin(angle), np.cos(angle)])
-    columns, rows = (np.ceil(np.asarray(size) / spacing).astype(int) + 1).tolist()
-    across = (np.arange(columns) - (columns - 1) / 2) * spacing
-    along = (np.arange(rows) - (rows - 1) / 2) * spacing
+    across, along = (_cell_centers(length, spacing) for length in size)
     return np.asarray(center) + across[None, :, None] * right + along[:, None, None] * down
+
+
+def _cell_centers(length: float, spacing: float) -> NDArray[np.float64]:
+    """Centres (k,) of equal cells of about a length along a side, from the middle of the side [px]."""
+    cells = max(round(length / spacing), 1)
+    return (np.arange(0.5, cells) - 0.5 * cells) * float(length / cells)
 
 
 def _local_planes(

@@ -129,7 +129,7 @@ def test_a_tracker_of_a_rig_file_takes_the_cameras_that_it_is_given():
     depth_m[:, :200] = depth_m[:, 440:] = depth_m[:100] = depth_m[380:] = np.nan
     mosaic = np.full((480, 640), 128, np.uint8)
     estimate = tracker.track(depth_m, time_s=0, image=mosaic)
-    assert (estimate.status, estimate.theta.shape) == ("TRACKING", (3 * 6 * 5,))
+    assert (estimate.status, estimate.theta.shape) == ("TRACKING", (3 * 6 * 6,))
 
 
 def test_a_rig_file_says_where_its_cameras_are(tmp_path):

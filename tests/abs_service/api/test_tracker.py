@@ -64,7 +64,7 @@ def holes(value):
 
 def test_depth_can_be_radial():
     z, radial = (  # a mesh of which no vertex lies on the border of two pixels, where rounding decides which it reads
-        a.Tracker(CAMERA, a.Nurbs(), noise=NOISE, geometry=geometry, vertices=300).track(
+        a.Tracker(CAMERA, a.Nurbs(), noise=NOISE, geometry=geometry, vertices=280).track(
             Sheet(2.0).depth(geometry=geometry), time_s=0
         )
         for geometry in ("z", "radial")

@@ -203,7 +203,8 @@ def test_a_measurement_of_another_distribution_counts(installed, tmp_path) -> No
     off, residuals = printed(installed, SLIDING, rig)
     assert off["warm"] < 5e-4
     assert off["cold"] > 5e-3  # distances alone do not show that a wall slides along itself
-    assert residuals["thermal"] == pytest.approx(1, abs=0.3)
+    # A wave of 3 K is read from the nearest pixels, which adds to its noise by where in them the vertices lie.
+    assert residuals["thermal"] == pytest.approx(1, abs=0.5)
 
 
 def test_a_template_of_another_distribution_finds_its_object(installed) -> None:

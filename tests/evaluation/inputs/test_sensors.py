@@ -10,7 +10,7 @@ from evaluation.inputs import sensors
 @pytest.mark.timeout(600)
 def test_another_sensor_does_no_harm() -> None:
     subsets = (*sensors.QUICK.subsets, ("tof",), ("structured_light", "tof"))
-    found = sensors.run(sensors.Settings(6, 50, subsets), Context(0))  # single ones scatter by a third
+    found = sensors.run(sensors.Settings(12, 50, subsets), Context(0))  # single ones scatter by a third
     assert all(goal.met for goal in found.goals), found.goals
     assert all("of 10 ratios" in goal.name for goal in found.goals)
     errors = {name: values.mean(axis=0) for name, values in found.values["errors_mm"].items()}

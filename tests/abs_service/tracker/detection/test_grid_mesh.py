@@ -63,6 +63,15 @@ def test_the_mesh_is_the_rectangle(turn, tilt):
     assert 0.75 * 300 < len(mesh.vertices) < 1.15 * 300
 
 
+@pytest.mark.parametrize("z", np.linspace(0.85, 1.15, 7))
+def test_the_mesh_ends_half_a_cell_inside_every_side(z):
+    mesh = grid_mesh(InitialDetection(rectangle(placed(z=z)), TOF, 300))
+    on_object = pose.transform(pose.inverse(placed(z=z)), mesh.vertices)[:, :2]
+    margin = np.array([WIDTH, HEIGHT]) / 2 - np.abs(on_object).max(axis=0)
+    cell, pixel = np.sqrt(WIDTH * HEIGHT / 300), z / TOF.fx
+    np.testing.assert_allclose(margin, cell / 2, atol=0.1 * cell + pixel)
+
+
 @pytest.mark.parametrize("vertices", [60, 150, 300, 1000])
 def test_there_are_about_as_many_vertices_as_wanted(vertices):
     mesh = grid_mesh(InitialDetection(rectangle(placed()), TOF, vertices))

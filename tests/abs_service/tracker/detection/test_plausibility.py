@@ -59,5 +59,5 @@ def test_a_mesh_of_two_pieces_is_told_unless_a_file_has_it_so():
     parted = grid_mesh(detect(distance, EVERYWHERE))
     assert mesh_warnings(whole) == ()
     (doubt,) = mesh_warnings(parted)
-    assert doubt.startswith("the mesh has 2 pieces, of 82% and 18% of its vertices: ")
+    assert doubt.startswith("the mesh has 2 pieces, of 78% and 22% of its vertices: ")
     assert mesh_warnings(replace(parted, is_complete=True)) == ()
