@@ -54,8 +54,9 @@ class VertexCovariance:
         by_noise = propagated(near.sparse_jacobian, theta_covariance)
         by_noise += along_normals(optimum.surface, self._mesh_noise.variance)
         by_noise += self._parallax.covariance(optimum, frame)
-        misfit = isotropic(self._misfit.variance(*frame.misfit(optimum.surface)))
-        return by_noise + self._slide.beyond(optimum.surface, by_noise) + misfit
+        across, along = self._misfit.update(*frame.misfit(optimum.surface))
+        by_misfit = isotropic(along) + along_normals(optimum.surface, across - along)
+        return by_noise + self._slide.beyond(optimum.surface, by_noise) + by_misfit
 
 
 def propagated(sparse_jacobian: SparseJacobian, covariance: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -1,39 +1,65 @@
-"""Misfit of the model: what neighbours agree on widens the covariance, what stands alone hardly does."""
+"""Misfit of the model: what neighbours agree on widens the covariance, what stands alone hardly does.
+
+Along the surface it lasts beyond the frame that shows it.
+"""
 
 import numpy as np
+from numpy.typing import NDArray
 
-from abs_service.tracker.posterior.covariance.misfit import Misfit
+from abs_service.tracker.posterior.covariance.misfit import LASTING, Misfit
 from tests.abs_service.tracker.scenes import sheet
 
 MESH = sheet(21, 31)
-MISFIT = Misfit(MESH)
 N = len(MESH.vertices)
 EXACT, SIGMA = np.zeros(N), np.full(N, 1e-3)
 
 
+def variance(distance: NDArray[np.float64], deviation: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Variance (n,) [m²] across the surface, which is not larger than that along it."""
+    across, along = Misfit(MESH).update(distance, deviation)
+    assert np.all(across <= along)
+    return across
+
+
 def test_a_surface_that_is_off_as_a_whole_is_off_by_as_much():
-    np.testing.assert_allclose(MISFIT.variance(np.full(N, -2e-3), EXACT), 4e-6)
+    np.testing.assert_allclose(variance(np.full(N, -2e-3), EXACT), 4e-6)
 
 
 def test_one_vertex_that_is_off_shows_within_two_rings_and_far_less():
     single = np.zeros(N)
     single[10 * 31 + 15] = 2e-3
-    variance = MISFIT.variance(single, EXACT).reshape(21, 31)
-    assert np.count_nonzero(variance) == 19  # two rings of a grid of triangles
-    assert variance.max() < 4e-6 / 49 * 1.01  # the mean over seven, squared
+    shown = variance(single, EXACT).reshape(21, 31)
+    assert np.count_nonzero(shown) == 19  # two rings of a grid of triangles
+    assert shown.max() < 4e-6 / 49 * 1.01  # the mean over seven, squared
 
 
 def test_vertices_that_are_off_to_either_side_are_noise():
     noise = np.random.default_rng(0).uniform(-2e-3, 2e-3, N)
-    assert np.mean(MISFIT.variance(noise, EXACT)) < 4e-6 / 3 / 5
+    assert np.mean(variance(noise, EXACT)) < 4e-6 / 3 / 5
 
 
 def test_where_all_agree_nothing_is_added():
-    np.testing.assert_array_equal(MISFIT.variance(EXACT, EXACT), 0)
+    np.testing.assert_array_equal(variance(EXACT, EXACT), 0)
 
 
 def test_noise_is_no_misfit_and_what_neighbours_share_within_three_deviations_is():
     noise = np.random.default_rng(1).normal(0, SIGMA)
-    assert np.mean(MISFIT.variance(noise, SIGMA)) < 0.01 * 1e-6
-    shared = MISFIT.variance(noise + 2e-3, SIGMA)  # each vertex agrees with its measurement
+    assert np.mean(variance(noise, SIGMA)) < 0.01 * 1e-6
+    shared = variance(noise + 2e-3, SIGMA)  # each vertex agrees with its measurement
     assert 0.5 * 4e-6 < np.mean(shared) < 4e-6
+
+
+def test_a_misfit_of_most_of_the_mesh_fades_along_the_surface_and_ends_across_it_at_once():
+    misfit = Misfit(MESH)
+    misfit.update(np.full(N, 2e-3), EXACT)
+    across, along = misfit.update(EXACT, EXACT)
+    np.testing.assert_array_equal(across, 0)
+    np.testing.assert_allclose(along, LASTING * 4e-6)
+    across, along = misfit.update(np.full(N, 3e-3), EXACT)
+    np.testing.assert_allclose([across, along], 9e-6)
+
+
+def test_a_misfit_of_a_part_ends_with_its_frame():
+    misfit = Misfit(MESH)
+    misfit.update(np.where(np.arange(N) < 0.4 * N, 2e-3, 0.0), EXACT)
+    np.testing.assert_array_equal(misfit.update(EXACT, EXACT), 0)
