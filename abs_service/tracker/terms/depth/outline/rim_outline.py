@@ -22,6 +22,7 @@ from abs_service.tracker.terms.depth.outline.rim import Rim, chain, locate, read
 from abs_service.tracker.terms.depth.outline.rim_classes import LARGEST_GAP_STEPS, RimClass, classify_rim
 from abs_service.tracker.terms.depth.outline.rim_cost import FARTHEST, rim_cost
 from abs_service.tracker.terms.depth.outline.rim_motion import displacement, motion
+from abs_service.tracker.terms.depth.outline.round_outline import is_round, without_turn
 from abs_service.tracker.terms.linearization import Linearization
 from calib.camera import Camera
 
@@ -132,7 +133,7 @@ class RimOutline:
         self._corner = np.zeros(2, np.float32)
         self._beyond = np.zeros(len(rim.outer), np.float32)
         self._ends: Ends = (rim.outer, rim.inner, self._beyond)
-        self._hidden, self._begun = 0, False
+        self._hidden, self._begun, self._is_round = 0, False, False
 
     def observe(
         self,
@@ -149,10 +150,13 @@ class RimOutline:
             _, values, gradients = self._locate(predicted)
             measured = values, gradients, self._inside_at, distance
             self.classes, self._beyond = classify_rim(self._camera, self._rim, predicted, *measured)
-            self._begun = True
         free = np.flatnonzero(self.classes == RimClass.FREE)
         visible = free[~self._is_hidden(free, expected, predicted, window)]
         self._ends = self._rim.outer[visible], self._rim.inner[visible], self._beyond[visible]
+        if not self._begun:
+            edges = self._locate(predicted)[0].astype(np.float64)
+            self._is_round = is_round(self._camera, edges, self._inwards, self._corner)
+            self._begun = True
         self._hidden = len(free) - len(visible)
         beside = np.zeros(distance.shape, np.bool_)
         beside[part] = (seen.free_m[part] > 0) & (self._inwards > -UNJUDGED_DEVIATIONS * self._deviation)
@@ -171,7 +175,8 @@ class RimOutline:
         residual = values / self._deviation
         use = np.flatnonzero(np.abs(residual) < FARTHEST)
         by_place = project_with_jacobian(self._camera, points[use].astype(np.float64))[1]
-        rows = np.einsum("vi,vij->vj", gradients[use] / self._deviation, by_place)
+        told = without_turn(gradients[use], by_place, points[use]) if self._is_round else gradients[use]
+        rows = np.einsum("vi,vij->vj", told / self._deviation, by_place)
         outer, inner, beyond = self._ends
         jacobian = np.zeros((len(use), sparse_jacobian.dimension))
         of_points = sparse_jacobian.group, sparse_jacobian.parameters, sparse_jacobian.local

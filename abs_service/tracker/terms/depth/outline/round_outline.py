@@ -1,0 +1,67 @@
+"""Round outlines: they do not show how far the object has turned in its plane.
+
+An edge tells where it is across the outline only, which a turn of a disc does not change. But the gradients of
+distances from an outline of pixels are up to 20° off its normal, and the squares of these errors would hold the turn to
+a millimetre.
+"""
+
+import numpy as np
+import scipy  # its parts are imported when they are first used
+from numpy.typing import NDArray
+
+from abs_service.tracker.synthesis.perspective import project_with_jacobian
+from abs_service.tracker.terms.base import MIN_RIM
+from calib.camera import Camera
+
+#: An outline is round if the squared cosine between its normals and a turn is smaller, on average. That of an ellipse
+#: with axes of 0.85 to 1 is as large, of a hexagon 0.09; pixels alone make 0.002, and 0.006 if noise frays them.
+LARGEST_COSINE_SQUARED = 0.01
+
+#: Standard deviation of the window in which normals of the outline are found [px].
+SMOOTH_PX = 1.5
+
+
+def is_round(
+    camera: Camera, points: NDArray[np.float64], inwards: NDArray[np.float32], corner: NDArray[np.float32]
+) -> bool:
+    """True if a turn of edges in their plane moves them along the outline.
+
+    Args:
+        camera: the depth camera.
+        points: the free edges (k, 3) [m].
+        inwards: distances inside the outline (rows, columns) [px], NaN where unknown.
+        corner: column and row of their first pixel (2,).
+    """
+    if len(points) < MIN_RIM:
+        return False
+    places, by_place = project_with_jacobian(camera, points)
+    column, row = np.floor(places - corner + 0.5).astype(int).T
+    inside = (row >= 0) & (row < inwards.shape[0]) & (column >= 0) & (column < inwards.shape[1])
+    slopes = [scipy.ndimage.gaussian_filter(inwards, SMOOTH_PX, order=order) for order in ((0, 1), (1, 0))]
+    normals = np.stack([slope[row[inside], column[inside]] for slope in slopes], axis=1).astype(np.float64)
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(float).tiny)
+    cosine = np.vecdot(normals, _turn(points, by_place)[inside])
+    known = np.isfinite(cosine)
+    return bool(np.count_nonzero(known) >= MIN_RIM and np.mean(cosine[known] ** 2) < LARGEST_COSINE_SQUARED)
+
+
+def without_turn(
+    gradients: NDArray[np.float64], by_place: NDArray[np.float64], points: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Image gradients (k, 2) of edges without what they say of a turn of the edges in their plane.
+
+    Args:
+        gradients: of the distances of the edges (k, 2).
+        by_place: derivatives of their places in the image (k, 2, 3) [px/m].
+        points: the edges (k, 3) [m].
+    """
+    along = _turn(points, by_place)
+    return gradients - np.vecdot(gradients, along)[:, None] * along
+
+
+def _turn(points: NDArray[np.float64], by_place: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Directions in the image (k, 2) into which a turn in their plane, about their centre, moves edges (k, 3)."""
+    arms = points - points.mean(axis=0)
+    normal = np.linalg.eigh(arms.T @ arms)[1][:, 0]
+    along = (by_place @ np.cross(normal, arms)[..., None])[..., 0]
+    return np.asarray(along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), np.finfo(float).tiny))
