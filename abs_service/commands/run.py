@@ -32,6 +32,7 @@ from abs_service.supervision import forked, log_lines, metrics, systemd
 from abs_service.supervision.child import Child
 from abs_service.supervision.child_process import ChildProcess, Process, Spawn
 from abs_service.supervision.exit_codes import Exit
+from abs_service.supervision.repeats import Tracebacks
 from abs_service.supervision.rig_view import Display
 from abs_service.supervision.run_session import Renewal, RunSession
 from abs_service.supervision.supervisor import Limits, Supervisor
@@ -198,7 +199,8 @@ def limits(rig: config.ServiceConfig) -> Limits:
 
 def starting(display: Display, arguments: argparse.Namespace) -> Spawn:
     """Starts child processes, which log as this one does."""
-    return partial(spawn, partial(_pass_on, display, logs.on_stderr(arguments)), logs.options(arguments))
+    pass_on = partial(_pass_on, display, logs.on_stderr(arguments), Tracebacks())
+    return partial(spawn, pass_on, logs.options(arguments))
 
 
 def spawn(pass_on: PassOn, log_options: Sequence[str], component: str, arguments: Sequence[str]) -> Process:
@@ -211,14 +213,15 @@ def recording_code(ended: Iterable[Child]) -> Exit:
     return Exit.FAILED if any(child.component == "record" and child.worst_code for child in ended) else Exit.OK
 
 
-def _pass_on(display: Display, as_json: bool, component: str, line: str) -> None:
+def _pass_on(display: Display, as_json: bool, tracebacks: Tracebacks, component: str, written: str) -> None:
     # An error that ends a child is what this process will end with, and say once.
-    if not line or log_lines.is_final(line):
+    if not written or log_lines.is_final(written):
         return
-    if as_json:
-        display.note(line if log_lines.parse(line) else log_lines.line(time.time(), "info", component, line, {}))
-    else:
-        display.note(f"{component}: {line}")
+    for line in tracebacks.take(component, written, time.monotonic_ns()):
+        if as_json:
+            display.note(line if log_lines.parse(line) else log_lines.line(time.time(), "info", component, line, {}))
+        else:
+            display.note(f"{component}: {line}")
 
 
 class _Notes(logging.Handler):

@@ -6,7 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
+from abs_service.supervision import log_lines
 from abs_service.supervision.child_process import NO_PROCESS, Process, ThreadTimes
+
+#: A label of the health of `run` for each process, after which the component's name follows: its state, and why.
+PROCESS = "process."
 
 #: First backoff before a restart [ns].
 FIRST_BACKOFF_NS = 200_000_000
@@ -62,6 +66,11 @@ class Child:
     threads: Mapping[int, ThreadTimes] = field(default_factory=dict, repr=False)
     exits_ns: deque[int] = field(default_factory=deque, repr=False)
 
+    @property
+    def condition(self) -> str:
+        """State and its reason, in words."""
+        return f"{self.state.value}: {self.reason}" if self.reason else self.state.value
+
     def end(self) -> None:
         """Keeps the exit code of a process that was told to end, and kills it if it has not; no effect without one."""
         if self.process is NO_PROCESS:
@@ -73,3 +82,12 @@ class Child:
         counted = 0 if self.exit_code == -signal.SIGTERM else self.exit_code
         self.worst_code = max(self.worst_code, counted if counted >= 0 else 128 - counted)
         self.process = NO_PROCESS
+
+
+def exit_reason(code: int, output_tail: str) -> str:
+    """The end of a process in words: its exit code or signal, and the last line that it wrote."""
+    if code == -signal.SIGKILL:  # nothing that it wrote is the reason
+        return "ended by signal 9: somebody has killed it, or the system for want of memory"
+    how = f"ended by signal {-code}" if code < 0 else f"ended with code {code}"
+    last = log_lines.message(output_tail.strip().rpartition("\n")[2])
+    return f"{how}: {last}" if last else how

@@ -15,7 +15,7 @@ from abs_service.bus.pools import EndedPools
 from abs_service.bus.queues import LatestQueue
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.supervision import rig_state
-from abs_service.supervision.child import Child, State
+from abs_service.supervision.child import PROCESS, Child, State
 from abs_service.supervision.rig_view import Display, RigView
 from abs_service.supervision.supervisor import Supervisor
 from abs_service.tracking.monitors.silence_monitor import SilenceMonitor
@@ -197,6 +197,8 @@ class RunSession:
         self._live.follow(trackers)
         monitors = self._silence_monitors
         self._silence_monitors = {topic: monitors.get(topic) or self._monitor() for topic in map(keys.state, trackers)}
+        for component in renewal.ends:
+            self._health.label(f"{PROCESS}{component}", "")
         for topic in (*renewal.ends, *(monitors.keys() - self._silence_monitors.keys())):
             self._health.report(topic, Level.OK)
         if "capture" not in renewal.components:
@@ -236,14 +238,12 @@ class RunSession:
             self._health.count_up_to({f"restarts.{child.component}": child.restarts})
             starved = child.state is State.RUNNING and child.reason
             level = Level.WARNING if starved else _LEVELS.get(child.state, Level.OK)
-            self._health.report(child.component, level, _condition(child))
+            why = f"{child.component} {child.condition}" if child.reason else ""
+            self._health.report(child.component, level, why)
+            self._health.label(f"{PROCESS}{child.component}", child.condition)
         self._health.count_up_to({"malformed": self._live.malformed, "not_shown": sum(self._inbox.dropped.values())})
         if self._health.due():
             self._bus.report(self._health)
             rivals = self._publishers.trouble
             self._health.report("publishers", Level.ERROR if rivals else Level.OK, rivals)
         self._health.tick()
-
-
-def _condition(child: Child) -> str:
-    return f"{child.component} {child.state.value}: {child.reason}" if child.reason else ""

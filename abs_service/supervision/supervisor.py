@@ -7,10 +7,10 @@ import logging
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from abs_service.supervision import log_lines
-from abs_service.supervision.child import FIRST_BACKOFF_NS, Child, State
+from abs_service.supervision.child import FIRST_BACKOFF_NS, Child, State, exit_reason
 from abs_service.supervision.child_process import NO_PROCESS, Spawn, longest_wait_ns
 from abs_service.supervision.exit_codes import Exit
+from abs_service.supervision.repeats import Repeats, counted
 
 _log = logging.getLogger(__name__)
 
@@ -63,6 +63,7 @@ class Supervisor:
         self._limits = limits or Limits()
         self._leaving: list[Child] = []
         self._polled_ns = clock()
+        self._repeats = Repeats()
 
     def poll(self) -> None:
         """Starts, restarts and gives up children as due."""
@@ -180,7 +181,7 @@ class Supervisor:
             # The host lacks something, which is no failure of the process.
             child.state, child.start_at_ns = State.BACKOFF, now_ns + LONGEST_BACKOFF_NS
             child.reason = f"cannot be started: {error}"
-            _log.warning("%s %s; trying again", child.component, child.reason)
+            self._tell(logging.WARNING, f"{child.component} {child.reason}; trying again")
             return
         started = {"component": child.component, "child": child.process.pid, "restarts": child.restarts}
         _log.info("%s is started", child.component, extra={"fields": started})
@@ -202,7 +203,7 @@ class Supervisor:
         elif code == Exit.USER and child.starts == 1:
             self._give_up(child, now_ns, child.process.output_tail())
         else:
-            self._schedule_restart(child, now_ns, _exit_reason(code, child.process.output_tail()), State.BACKOFF)
+            self._schedule_restart(child, now_ns, exit_reason(code, child.process.output_tail()), State.BACKOFF)
 
     def _treat_silence(self, child: Child, now_ns: int) -> None:
         if self._is_starved(child, now_ns):
@@ -226,13 +227,19 @@ class Supervisor:
         child.exits_ns.append(now_ns)
         child.restarts += 1
         child.state, child.reason, child.process = state, reason, NO_PROCESS
-        _log.warning("%s %s; starting it again", child.component, reason)
+        self._tell(logging.WARNING, f"{child.component} {reason}; starting it again")
 
     def _give_up(self, child: Child, now_ns: int, reason: str) -> None:
         child.start_at_ns = now_ns + self._limits.window_ns
         child.state, child.reason, child.process = State.FAILED, reason, NO_PROCESS
         if child is not self.misconfigured():  # whose message is the last word of the whole run
-            _log.error("%s is given up: %s", child.component, reason)
+            self._tell(logging.ERROR, f"{child.component} is given up: {reason}")
+
+    def _tell(self, level: int, text: str) -> None:
+        """Logs a failure; one that comes again and again ever more rarely, since it may do so for months."""
+        left_out = self._repeats.take(text, self._clock())
+        if left_out is not None:
+            _log.log(level, "%s", counted(text, left_out))
 
     def _finalize(self, child: Child) -> None:
         if child.process.poll() is None:
@@ -240,9 +247,3 @@ class Supervisor:
         if child.state in (State.RUNNING, State.BACKOFF, State.STALLED, State.RENEWED):
             child.state = State.STOPPED
             child.end()
-
-
-def _exit_reason(code: int, output_tail: str) -> str:
-    how = f"ended by signal {-code}" if code < 0 else f"ended with code {code}"
-    last = log_lines.message(output_tail.strip().rpartition("\n")[2])
-    return f"{how}: {last}" if last else how

@@ -11,6 +11,7 @@ Exit code 0: everything works, warnings included; 1: a part reports an error or 
 import argparse
 import json
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,7 @@ from abs_service.bus.security.mutual_tls import NO_SECURITY, MutualTls, NoSecuri
 from abs_service.bus.session import DEFAULT_ENDPOINT, BusError, check_endpoint
 from abs_service.commands.parts import rig_process
 from abs_service.display.terminal.health_words import words
+from abs_service.supervision.child import PROCESS, State
 from abs_service.supervision.exit_codes import Exit
 from drivers.contract.text import printable
 
@@ -48,7 +50,8 @@ def run(arguments: argparse.Namespace) -> int:
         which = "no rig" if name == "*" else f'no rig "{name}"'
         return _nothing(f"{which} answers at {endpoint} within {rig_health.PATIENCE_S:g} s")
     for rig, components in sorted(answers.items()):
-        parts = [_part(component, health) for component, health in sorted(components.items())]
+        parts = [_part(component, health) for component, health in components.items()] + _absent(components)
+        parts.sort(key=lambda part: part["component"])
         print(json.dumps({"rig": rig, "parts": parts}, ensure_ascii=False) if arguments.json else _lines(rig, parts))
     wrong = any(_level(health) in ("error", SILENT) for parts in answers.values() for health in parts.values())
     return Exit.FAILED if wrong else Exit.OK
@@ -85,6 +88,22 @@ def _part(component: str, health: Health | None) -> dict[str, Any]:
         "gauges": dict(health.gauges),
         "labels": dict(health.labels),
     }
+
+
+def _absent(components: Mapping[str, Health | None]) -> list[dict[str, Any]]:
+    """The processes of which `run` alone can tell: they start, or start again, or were given up."""
+    run = components.get("run") or Health()
+    told = {name.removeprefix(PROCESS): text for name, text in run.labels.items() if name.startswith(PROCESS) and text}
+    return [
+        {
+            "component": name,
+            "level": "error" if text.startswith(State.FAILED) else "warning",
+            "state": "",
+            "reason": text,
+        }
+        for name, text in told.items()
+        if name not in components
+    ]
 
 
 def _lines(rig: str, parts: list[dict[str, Any]]) -> str:

@@ -14,6 +14,7 @@ from typing import Self
 from absmsg.v1.health_pb2 import Health
 
 from abs_service.supervision import log_lines
+from abs_service.supervision.repeats import Repeats
 from abs_service.supervision.rig_view import RigView
 from abs_service.tracking.log.tracker_log import EstimateReport
 
@@ -29,6 +30,8 @@ _INFORMATION = "6"
 class JournalDisplay:
     """Writes one entry for every change of a component's level, a tracker's status or a process's state.
 
+    Levels and states that come again and again, as those of a process that never works, are written ever more rarely.
+
     Args:
         send: writes one entry, given as its fields.
     """
@@ -37,7 +40,8 @@ class JournalDisplay:
         self._send = send
         self._rig = ""
         self._told: dict[tuple[str, str], str] = {}
-        self._next_ns = 0
+        self._repeats = Repeats()
+        self._now_ns = self._next_ns = 0
 
     def __enter__(self) -> Self:
         return self
@@ -50,6 +54,7 @@ class JournalDisplay:
         self._rig = view.rig
         if view.now_ns < self._next_ns:
             return
+        self._now_ns = view.now_ns
         self._next_ns = view.now_ns + PERIOD_NS
         for component, received in view.live.received.items():
             level, message = received.health.level, received.health.message
@@ -85,8 +90,10 @@ class JournalDisplay:
     def _tell_change(self, field: str, component: str, value: str, reason: str, priority: str) -> None:
         if self._told.get((field, component)) == value:
             return
-        self._told[field, component] = value
         message = f"{component}: {value}" + (f": {reason}" if reason else "")
+        if field != "ABS_STATUS" and self._repeats.take(message, self._now_ns) is None:
+            return
+        self._told[field, component] = value
         self._entry({"MESSAGE": message, "PRIORITY": priority, "ABS_COMPONENT": component, field: value})
 
     def _entry(self, fields: Mapping[str, str]) -> None:

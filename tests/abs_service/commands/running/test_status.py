@@ -71,6 +71,24 @@ def test_a_part_that_runs_and_says_nothing_is_an_error(rig, endpoint, capsys):
     assert "track/sheet  silent   runs, but sent no health for 1.5 s" in said.out
 
 
+def test_a_process_that_was_given_up_has_a_line(rig, endpoint, capsys):
+    run = rig["run"]
+    run.report("track/hat", Level.ERROR, "track/hat failed: needed more than 5 restarts in 60 s")
+    for name, text in {
+        "sheet": "running",
+        "hat": "failed: needed more than 5 restarts in 60 s",
+        "mat": "",
+        "cap": "backoff",
+    }.items():
+        run.label(f"process.track/{name}", text)
+    code, said = status(endpoint, capsys)
+    assert code == 1
+    assert "track/hat    error    failed: needed more than 5 restarts in 60 s" in said.out
+    assert "track/cap    warning  backoff" in said.out
+    assert "track/mat" not in said.out, "which was removed"
+    assert said.out.count("track/sheet") == 1
+
+
 def test_a_bus_that_capture_hosts_lacks_no_run(open_bus, endpoint, capsys):
     bus = open_bus()
     bus.declare_liveliness("capture")

@@ -1,0 +1,55 @@
+"""Failures that nobody mends are told ever more rarely, and nothing else is."""
+
+import logging
+
+from abs_service.supervision.exit_codes import Exit
+from abs_service.supervision.repeats import MOST, Repeats, Tracebacks
+from tests.abs_service.supervision.fake_processes import S, World, ends, passes
+
+HOURS_S = 2 * 3600
+TRACEBACK = ["Traceback (most recent call last):", '  File "x.py", line 3', "    f()", "    f()", "OSError: no disk"]
+
+
+def test_a_process_that_never_works_fills_no_log(caplog):
+    world = World()
+    world.words = "abs-service: error: trackers.a.template: no file x.obj"
+    supervisor = world.supervisor("capture", "track/a", "track/b", startup_ns=2 * HOURS_S * S)
+    ends(world, supervisor, "track/a", -11)
+    with caplog.at_level(logging.WARNING):
+        while world.now_ns < HOURS_S * S:
+            ends(world, supervisor, "track/a", Exit.USER)
+            passes(world, supervisor, 2)
+    lines = [record.message for record in caplog.records]
+    assert supervisor.children["track/a"].restarts > 300
+    assert 20 < len(lines) < 40, "one of each kind in ten minutes"
+    assert "track/a ended with code 2: abs-service: error: trackers.a.template: no file x.obj" in lines[1]
+    assert "more of these since the last one that was told" in lines[-1]
+    caplog.clear()
+    world.words = "abs-service: error: another reason"
+    ends(world, supervisor, "track/b", -11)
+    ends(world, supervisor, "track/b", Exit.USER)
+    assert len(caplog.records) == 2, "another failure is told at once"
+
+
+def test_what_has_not_come_for_long_is_new():
+    repeats = Repeats()
+    assert [repeats.take(f"x ended: {t}", t * S) for t in (0, 10, 59, 61)] == [0, None, None, 2]
+    assert repeats.take("x ended: 5", 70 * S) is None
+    assert [repeats.take("x ended", t * S) for t in (400, 459, 461)] == [0, None, 1]
+    for number in range(2 * MOST):
+        repeats.take("y" * number, 0)
+
+
+def test_a_traceback_is_told_as_a_whole_and_once():
+    tracebacks = Tracebacks()
+
+    def told(lines, second, component="record"):
+        return [told for line in lines for told in tracebacks.take(component, line, second * S)]
+
+    assert told(["a line", "a line"], 0) == ["a line", "a line"]
+    assert told(TRACEBACK, 1) == TRACEBACK
+    assert told([*TRACEBACK, "after it"], 2) == ["after it"]
+    assert told(TRACEBACK, 3, "capture") == TRACEBACK
+    other = [*TRACEBACK[:-1], "KeyError: 3"]
+    assert told(other, 4) == other
+    assert told(TRACEBACK, 70)[-1] == "OSError: no disk (1 more of these since the last one that was told)"
