@@ -68,12 +68,12 @@ def run(arguments: argparse.Namespace) -> int:
         commands.answer_record(bus, headers, health, recorder.ask)
         process_tuning.freeze_loaded_objects()
         watch = DiskWatch(disk.recordings(rig), disk.estimates(rig), settings.minimum_free_bytes, health, clock)
+        watch.start(lambda: recorder.written, stop)
         while not stop.wait(0.2):
             health.label("tracking", "" if tracking.seen.is_set() else "nothing is tracked yet")
             if health.due():
                 clock.measure()
                 recorder.report()
-                watch.look(recorder.written)
                 bus.report(health)
                 health.tick()
         recorder.stop(DRAIN_S)

@@ -1,6 +1,8 @@
 """Monitors the disk: deletes old recordings and forecasts the time until it is full."""
 
+import logging
 import shutil
+import threading
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -10,8 +12,14 @@ from abs_service.bus.stamps import WallClock
 from abs_service.recording.disk import forecast
 from abs_service.recording.disk.retention import Ages, Retention
 
-#: Time between two looks [ns].
+_log = logging.getLogger(__name__)
+
+#: Time between two looks at the rate of recording [s].
+LOOK_S = 1.0
+#: Time between two looks at the files [ns].
 PERIOD_NS = 10_000_000_000
+#: Least pause after it, by the time that it took.
+PAUSE_FACTOR = 20
 #: Room below which health warns [s].
 WARN_S = 3600.0
 
@@ -47,8 +55,26 @@ class DiskWatch:
         self._ages = Ages(clock.wall(0)), Ages(clock.wall(0))
         self._next_ns = 0
 
+    def start(self, written: Callable[[], tuple[int, int]], stop: threading.Event) -> None:
+        """Looks again and again, in a thread: 100,000 recordings take seconds, and a disk may not answer.
+
+        Args:
+            written: see `look`.
+            stop: ends it.
+        """
+
+        def follow() -> None:
+            while not stop.wait(LOOK_S):
+                try:
+                    self.look(written())
+                except Exception as error:  # our own mistake, which must not end retention without a word
+                    _log.exception("the disk is not watched")
+                    self._health.report("retention", Level.ERROR, f"{type(error).__name__}: {error}")
+
+        threading.Thread(target=follow, name="disk watch", daemon=True).start()
+
     def look(self, written: tuple[int, int]) -> None:
-        """Does both every ten seconds.
+        """Does both every ten seconds, less often where it takes long.
 
         Args:
             written: bytes so far, to all recordings and to all files of estimates.
@@ -57,12 +83,13 @@ class DiskWatch:
         rates = [meter.add(now_ns, total) for meter, total in zip(self._meters, written, strict=True)]
         if now_ns < self._next_ns:
             return
-        self._next_ns = now_ns + PERIOD_NS
         self._delete(now_ns)
         try:
             self._forecast(*rates)
         except OSError:  # no folder; the recorder says so
             self._health.label("forecast", "")
+        after_ns = self._clock.monotonic()
+        self._next_ns = max(now_ns + PERIOD_NS, after_ns + PAUSE_FACTOR * (after_ns - now_ns))
 
     def _delete(self, now_ns: int) -> None:
         warning = ""

@@ -3,6 +3,7 @@
 import os
 import re
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,9 +16,9 @@ KEEP = ".keep"
 
 @dataclass(frozen=True, slots=True)
 class Kept:
-    """A file of the recorder: its path, size [bytes] and time of its last change [ns since the epoch]."""
+    """A file of the recorder: its name, size [bytes] and time of its last change [ns since the epoch]."""
 
-    path: Path
+    name: str
     size: int
     mtime_ns: int
 
@@ -36,8 +37,8 @@ class Ages:
         self._wall_ns = wall_ns
         self._changed_ns: dict[str, int] | None = None  # by name, CLOCK_MONOTONIC [ns]
 
-    def of(self, files: Iterable[Kept], now_ns: int) -> dict[Path, int]:
-        """Times since the last change of all files that there are [ns].
+    def of(self, files: Iterable[Kept], now_ns: int) -> dict[str, int]:
+        """Times since the last change of all files that there are, by name [ns].
 
         Args:
             files: they.
@@ -45,14 +46,14 @@ class Ages:
         """
         before, self._changed_ns, ages = self._changed_ns, {}, {}
         for file in files:
-            name = file.path.name.removesuffix(ACTIVE)
+            name = file.name.removesuffix(ACTIVE)
             changed_ns = now_ns
             if before is None:
                 changed_ns = min(file.mtime_ns - self._wall_ns, now_ns)
-            elif name == file.path.name:
+            elif name == file.name:
                 changed_ns = before.get(name, now_ns)
             self._changed_ns[name] = changed_ns
-            ages[file.path] = now_ns - changed_ns
+            ages[file.name] = now_ns - changed_ns
         return ages
 
 
@@ -84,22 +85,23 @@ class Retention:
             rf"{re.escape(self.kind)}(\.recovered)?\.mcap(\.broken|\.active)?"
         )
         try:
-            names = set(os.listdir(self.directory))
+            with os.scandir(self.directory) as entries:
+                named = {entry.name: entry for entry in entries if entry.name.startswith(self.name)}
         except OSError:
             return []
         found: list[Kept] = []
-        for name in names:
-            path = self.directory / name
-            if pattern.fullmatch(name) and name + KEEP not in names and path.is_file():
-                about = path.stat()
-                found.append(Kept(path, about.st_size, about.st_mtime_ns))
-        return sorted(found, key=lambda file: (file.mtime_ns, file.path))
+        for name, entry in named.items():
+            with suppress(FileNotFoundError):  # it is deleted at this moment
+                if pattern.fullmatch(name) and name + KEEP not in named and entry.is_file():
+                    about = entry.stat()
+                    found.append(Kept(name, about.st_size, about.st_mtime_ns))
+        return sorted(found, key=lambda file: (file.mtime_ns, file.name))
 
     def growth(self, rate: float) -> Growth:
         """Growth of the recordings at a recording rate [bytes/s]."""
         return Growth(rate, sum(file.size for file in self.files()), self.retain_s, self.retain_bytes)
 
-    def apply(self, ages: Callable[[Iterable[Kept]], dict[Path, int]]) -> tuple[list[Path], list[OSError]]:
+    def apply(self, ages: Callable[[Iterable[Kept]], dict[str, int]]) -> tuple[list[Path], list[OSError]]:
         """Deletes the files beyond the limits.
 
         Args:
@@ -114,14 +116,15 @@ class Retention:
             return deleted, failures
         files = self.files()
         excess, age_ns = sum(file.size for file in files) - self.retain_bytes, ages(files)
-        for file in sorted(files, key=lambda file: -age_ns[file.path]):
-            if file.path.suffix == ACTIVE or (excess <= 0 and age_ns[file.path] <= self.retain_s * 1e9):
+        for file in sorted(files, key=lambda file: -age_ns[file.name]):
+            if file.name.endswith(ACTIVE) or (excess <= 0 and age_ns[file.name] <= self.retain_s * 1e9):
                 continue
+            path = self.directory / file.name
             try:
-                file.path.unlink(missing_ok=True)
+                path.unlink(missing_ok=True)
             except OSError as error:
                 failures.append(error)
                 continue
             excess -= file.size
-            deleted.append(file.path)
+            deleted.append(path)
         return deleted, failures

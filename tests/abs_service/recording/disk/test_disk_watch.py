@@ -2,19 +2,21 @@
 
 import math
 import os
+import threading
 
 import pytest
 from absmsg.v1.health_pb2 import Health as HealthMessage
 
 from abs_service.bus.health import Health
 from abs_service.bus.stamps import HeaderFactory, WallClock
-from abs_service.recording.disk import forecast
+from abs_service.recording.disk import disk_watch, forecast
 from abs_service.recording.disk.disk_watch import DiskWatch
 from abs_service.recording.disk.forecast import Growth
 from abs_service.recording.disk.retention import Retention
 from abs_service.recording.recording_file import ESTIMATES
 from tests.abs_service.bus.loopback import LoopbackBus, health_now
 from tests.abs_service.recording.disk.test_retention import DAY_NS, NOW_NS, put, take
+from tests.waiting import eventually
 
 MB = 1_000_000
 
@@ -175,3 +177,35 @@ def test_without_a_folder_there_is_no_forecast(tmp_path):
     gone = Retention(tmp_path / "gone", "demo", "", 1.0, 1.0)
     watch.watch = DiskWatch(gone, gone, 0, watch.health, watch.clock)
     assert watch.pass_seconds(30).labels["forecast"] == ""
+
+
+def test_a_folder_that_takes_long_to_read_is_read_less_often(tmp_path):
+    watch, looks = Watch(tmp_path, 1), []
+
+    def slow(folder):
+        looks.append(watch.now_ns)
+        watch.now_ns += 3 * 10**9
+        return 1
+
+    kept = Retention(tmp_path, "demo", "", 1.0, 1.0)
+    watch.watch = DiskWatch(kept, kept, 0, watch.health, watch.clock, slow)
+    watch.pass_seconds(130)
+    assert [t_ns // 10**9 for t_ns in looks] == [1, 64, 127]
+
+
+def test_whoever_waits_for_the_disk_is_not_the_recorder_and_mistakes_of_ours_are_said(tmp_path, monkeypatch):
+    monkeypatch.setattr(disk_watch, "LOOK_S", 0.001)
+    watch, stop, looks = Watch(tmp_path, 1), threading.Event(), []
+
+    def look(written):
+        looks.append(written)
+        if len(looks) == 1:
+            raise ZeroDivisionError("ours")
+        stop.wait()
+
+    monkeypatch.setattr(watch.watch, "look", look)
+    watch.watch.start(lambda: (5, 7), stop)
+    assert eventually(lambda: len(looks) == 2)
+    stop.set()
+    assert looks == [(5, 7), (5, 7)]
+    assert health_now(watch.health, watch.bus).message == "ZeroDivisionError: ours"
