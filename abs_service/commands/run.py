@@ -25,7 +25,7 @@ from abs_service.bus.session import Role
 from abs_service.bus.stamps import WallClock
 from abs_service.commands.parts import logs, rig_process
 from abs_service.commands.parts.rig_in_memory import RigInMemory, in_memory
-from abs_service.commands.running import view
+from abs_service.commands.running import settled_file, view
 from abs_service.display.terminal import choice
 from abs_service.recording.disk import folder
 from abs_service.supervision import forked, log_lines, metrics, systemd
@@ -133,15 +133,12 @@ def read_again(arguments: argparse.Namespace) -> config.ServiceConfig:
     """The configuration that the rig file has now, checked, and overridden by the command line.
 
     Raises:
-        RefusedError: no file was given.
         ConfigError: it cannot be used.
         CheckError: something that it names does not exist or cannot be made.
         FolderError: its folder of recordings cannot be used.
     """
     from abs_service.commands import check  # noqa: PLC0415 - needs all parts of trackers, which this process has not
 
-    if not arguments.config:
-        raise RefusedError("it is the demo rig, which no file describes")
     rig = effective(rig_process.load_config(arguments), arguments)
     check.describe(rig, str(arguments.config))
     if rig.record.enabled:
@@ -153,9 +150,14 @@ def renewal(file: RigInMemory, arguments: argparse.Namespace, page: Sequence[str
     """Lets the file have the configuration that the rig file has now; returns what follows for the processes.
 
     Raises:
-        RefusedError: it cannot be taken over.
+        RefusedError: it cannot be taken over, or no file was given.
     """
-    changes = file.exchange(partial(read_again, arguments))
+    if not arguments.config:
+        raise RefusedError("it is the demo rig, which no file describes")
+    read = partial(settled_file.read, arguments.config, partial(read_again, arguments), file.lacks_some)
+    changes = file.exchange(read)
+    for component in changes.ends:
+        logging.getLogger(__name__).warning("%s ends: %s has it no longer", component, arguments.config)
     return Renewal(file.rig.record.directory, children(file.rig, file.path, page), changes.components, changes.ends)
 
 

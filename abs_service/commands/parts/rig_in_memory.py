@@ -41,6 +41,10 @@ class RigInMemory:
         os.truncate(self._stream.fileno(), len(content))
         self.rig = rig
 
+    def lacks_some(self, new: config.ServiceConfig) -> bool:
+        """True if another configuration lacks some of the processes that this one has."""
+        return bool(changes.between(self.rig, new).ends)
+
     def exchange(self, read: Callable[[], config.ServiceConfig]) -> changes.Changes:
         """Takes over a configuration, which `read` reads, if it can be used without an end of the rig.
 
