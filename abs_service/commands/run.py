@@ -13,7 +13,7 @@ import argparse
 import logging
 import os
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from functools import partial
 from pathlib import Path
@@ -33,7 +33,7 @@ from abs_service.supervision.child import Child
 from abs_service.supervision.child_process import ChildProcess, Process, Spawn
 from abs_service.supervision.exit_codes import Exit
 from abs_service.supervision.repeats import Tracebacks
-from abs_service.supervision.rig_view import Display
+from abs_service.supervision.rig_view import Display, RigView
 from abs_service.supervision.run_session import Renewal, RunSession
 from abs_service.supervision.supervisor import Limits, Supervisor
 from abs_service.wire.commands import RefusedError
@@ -96,14 +96,15 @@ def run(arguments: argparse.Namespace) -> int:
         finally:
             notifier.stopping()
             session.stop()
-        lost = display.close(session.view())
+        last = session.view()
+        lost = display.close(last)
     refused = supervisor.misconfigured()
     if refused is not None:
         # The child has read a temporary file of ours.
         reason = log_lines.final_error(refused.reason)
         raise ChildError(reason.replace(str(file.path), str(arguments.config or "demo.toml")))
     missing = Exit.FAILED if lost else Exit.OK
-    return supervisor.exit_code() or recording_code(supervisor.children.values()) or missing
+    return supervisor.exit_code() or recording_code(last) or missing
 
 
 def effective(rig: config.ServiceConfig, arguments: argparse.Namespace) -> config.ServiceConfig:
@@ -210,9 +211,10 @@ def spawn(pass_on: PassOn, log_options: Sequence[str], component: str, arguments
     return ChildProcess(component, [*arguments, *log_options], pass_on)
 
 
-def recording_code(ended: Iterable[Child]) -> Exit:
-    """FAILED if the recorder says that something is missing, though all else went well."""
-    return Exit.FAILED if any(child.component == "record" and child.worst_code for child in ended) else Exit.OK
+def recording_code(view: RigView) -> Exit:
+    """FAILED if a recorder has said, at its end or before, that something is missing, though all else went well."""
+    worst = any(child.component == "record" and child.worst_code for child in view.children)
+    return Exit.FAILED if worst or view.live.counters("record")["failures"] else Exit.OK
 
 
 def _pass_on(display: Display, as_json: bool, tracebacks: Tracebacks, component: str, written: str) -> None:

@@ -18,7 +18,7 @@ from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.commands import run
 from abs_service.display.terminal.lines import PlainDisplay
 from abs_service.display.terminal.output import Output
-from abs_service.supervision.child import Child, State
+from abs_service.supervision.child import Child
 from abs_service.supervision.exit_codes import Exit
 from abs_service.supervision.run_session import Renewal, RunSession
 from abs_service.supervision.supervisor import Limits, Supervisor
@@ -94,13 +94,6 @@ def test_a_rig_has_one_process_per_tracker_and_stops_its_recorder_last(tmp_path)
     ]
     off = rig.model_copy(update={"record": rig.record.model_copy(update={"enabled": False})})
     assert "record" not in [child.component for child in run.children(off, tmp_path / "x.toml")]
-
-
-@pytest.mark.parametrize(("code", "expected"), [(0, Exit.OK), (1, Exit.FAILED), (137, Exit.FAILED)])
-def test_a_run_says_by_its_exit_code_whether_the_recording_is_complete(code, expected):
-    ended = Child("record", (), 0, State.STOPPED, worst_code=code)
-    assert run.recording_code([ended]) is expected
-    assert run.recording_code([]) is Exit.OK
 
 
 class Bench:
