@@ -25,6 +25,8 @@ from abs_service.supervision import parent_watchdog, standard_files
 #: Makes processes that the fork server forks.
 CONTEXT = multiprocessing.get_context("forkserver")
 
+#: Limit of open files that a rig asks for: each restart of a process costs the others two or three until they end.
+FILES = 65_536
 #: Longest temporary folder in which the path of the fork server's socket, 39 bytes longer, has the 107 that unix(7)
 #: permits [bytes].
 LONGEST_PARENT = 64
@@ -39,6 +41,7 @@ def preload(module: str) -> None:
 
     Should it die, this process becomes the parent of its children: prctl(2), PR_SET_CHILD_SUBREAPER.
     """
+    standard_files.allow_files(FILES)
     ctypes.CDLL(None).prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
     os.environ[_FOLDER] = folder = standard_files.temporary_folder("abs-service-", LONGEST_PARENT)
     # Of one that multiprocessing makes for itself, it complains when somebody else has deleted it.

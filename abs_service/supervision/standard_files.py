@@ -40,14 +40,17 @@ def check_folder() -> None:
         raise StartError("the working directory was deleted; change to another one")
 
 
-def allow_files() -> None:
-    """Raises the limit of open files of this process and its children to `FILES`, if it is lower and can be raised.
+def allow_files(wanted: int = FILES) -> None:
+    """Raises the limit of open files of this process and its children, if it is lower and can be raised.
+
+    Args:
+        wanted: the limit; as much of it as is allowed.
 
     Raises:
         StartError: it stays below `FEWEST_FILES`.
     """
     limit, highest = resource.getrlimit(resource.RLIMIT_NOFILE)
-    files = FILES if highest == resource.RLIM_INFINITY else min(FILES, highest)
+    files = wanted if highest == resource.RLIM_INFINITY else min(wanted, highest)
     if limit != resource.RLIM_INFINITY and limit < files:
         resource.setrlimit(resource.RLIMIT_NOFILE, (files, highest))
     if files < FEWEST_FILES:

@@ -68,6 +68,13 @@ def test_a_low_limit_of_open_files_is_raised_if_it_can_be():
     assert (code, output) == (0, b"1024\n")
 
 
+def test_a_rig_may_open_more_files_since_each_restart_of_a_process_costs_some():
+    program = "from abs_service.supervision import forked as f, standard_files as s; s.allow_files(f.FILES)"
+    shown = f"{program}; import resource as r; print(r.getrlimit(r.RLIMIT_NOFILE)[0])"
+    code, output, _ = shell(f'ulimit -S -n 1024; ulimit -H -n 5000; {sys.executable} -c "{shown}"')
+    assert (code, output) == (0, b"5000\n")
+
+
 NO_ROOM = ImportError("libopenblas.so: failed to map segment from shared object")
 
 
