@@ -16,6 +16,7 @@ from contextlib import contextmanager
 from functools import partial
 from importlib import import_module
 from types import ModuleType
+from typing import Any
 
 import abs_service
 from abs_service.supervision import kernel_cache, parent_watchdog, standard_files
@@ -101,11 +102,17 @@ def program() -> None:
     others = [one for one in threading.enumerate() if one is not threading.main_thread() and not one.daemon]
     for thread in others:
         thread.join(max(0.0, deadline_s - time.monotonic()))
-    if stuck := [thread.name for thread in others if thread.is_alive()]:
+    if stuck := [thread.name for thread in others if thread.is_alive()] + _stuck_processes():
         print(f"abs-service: left behind, since they do not end: {', '.join(stuck)}", file=sys.stderr, flush=True)
         sys.stdout.flush()
         os._exit(code)
     sys.exit(code)
+
+
+def _stuck_processes() -> list[str]:
+    """Names of child processes that not even SIGKILL has ended, since they wait for a disk or a driver."""
+    multiprocessing: Any = sys.modules.get("multiprocessing")  # would wait for them when the interpreter ends
+    return [process.name for process in multiprocessing.active_children()] if multiprocessing else []
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -11,6 +11,7 @@ from abs_service.bus.contract import Bus, Sample
 from abs_service.bus.health import Health, Level
 from abs_service.bus.queues import BoundedQueue
 from abs_service.bus.stamps import WallClock
+from abs_service.recording.disk.stall import DiskStall
 from abs_service.recording.losses import Losses
 from abs_service.recording.recorder_settings import RecorderSettings
 from abs_service.recording.recording_file import free_path, open_for_writing
@@ -85,6 +86,7 @@ class Recorder:
         self._failed = ""
         self._is_short_of_space = False
         self._losses = Losses(health)
+        self.stall = DiskStall(health, clock.monotonic, lambda: self._queue.size)
         self._finished = (0, 0)
         self.failures = 0
         self.written = (0, 0)  # bytes to all recordings, and to all files of estimates
@@ -127,6 +129,7 @@ class Recorder:
 
     def _run(self) -> None:
         while not self._queue.is_drained:
+            self.stall.alive()
             if not self._queue.size and not self._pre_roll.is_open:
                 self._stopping.wait(IDLE_S)
                 continue
@@ -201,6 +204,7 @@ class Recorder:
         look_ns = min(flush_ns, int(LOOK_S * 1e9))
         next_flush_ns, next_look_ns = started_ns + flush_ns, started_ns + look_ns
         while True:
+            self.stall.alive()
             sample = self._queue.take(max(0.0, (next_look_ns - self._clock.monotonic()) / 1e9))
             if sample is not None:
                 self._writer.write(take, sample)

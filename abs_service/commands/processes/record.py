@@ -70,6 +70,7 @@ def run(arguments: argparse.Namespace) -> int:
         watch = DiskWatch(disk.recordings(rig), disk.estimates(rig), settings.minimum_free_bytes, health, clock)
         watch.start(lambda: recorder.written, stop)
         while not stop.wait(0.2):
+            recorder.stall.report()
             health.label("tracking", "" if tracking.seen.is_set() else "nothing is tracked yet")
             if health.due():
                 clock.measure()

@@ -2,10 +2,15 @@
 
 import errno
 import tempfile
+import threading
+from collections.abc import Iterator
 from pathlib import Path
 
 #: What is wrong with a disk, not with a configuration: recording begins when it is over.
 _OF_THE_DISK = frozenset({errno.EROFS, errno.EIO, errno.ENOSPC, errno.EDQUOT, errno.ESTALE})
+
+#: Time that the disk has to answer [s].
+PATIENCE_S = 2.0
 
 
 class FolderError(Exception):
@@ -16,9 +21,19 @@ def check(directory: Path) -> None:
     """Makes the folder, and a file in it that is gone at once.
 
     Raises:
-        FolderError: the configuration or the folder's permissions have to be changed. A disk that is full, broken or
-            mounted to be read only is none of that: the recorder reports it, and all else goes on.
+        FolderError: the configuration or the folder's permissions have to be changed. A disk that is full, broken,
+            mounted to be read only, or does not answer is none of that: the recorder reports it, and all else goes on.
     """
+    found: list[FolderError] = []
+    # Nothing can end a call that waits for the disk, of a server that is gone, say.
+    thread = threading.Thread(target=lambda: found.extend(_mistakes(directory)), name="check folder", daemon=True)
+    thread.start()
+    thread.join(PATIENCE_S)
+    if found:
+        raise found[0]
+
+
+def _mistakes(directory: Path) -> Iterator[FolderError]:
     action = "made"
     try:
         directory.mkdir(parents=True, exist_ok=True)
@@ -26,4 +41,4 @@ def check(directory: Path) -> None:
         tempfile.TemporaryFile(dir=directory).close()
     except OSError as error:
         if error.errno not in _OF_THE_DISK:
-            raise FolderError(f'record.directory = "{directory}": cannot be {action}: {error.strerror}') from None
+            yield FolderError(f'record.directory = "{directory}": cannot be {action}: {error.strerror}')

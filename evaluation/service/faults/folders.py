@@ -119,6 +119,16 @@ FAULTS = (
         "tests/abs_service/recording/disk/test_recorder_disk.py",
     ),
     Elsewhere(
+        "the disk does not answer",
+        "tracking goes on; in health within 2 s; what memory does not hold is counted; `run` starts and ends in time",
+        "tests/abs_service/recording/disk/test_stall.py",
+    ),
+    Elsewhere(
+        "a folder with 100,000 recordings",
+        "recording goes on while old ones are looked for",
+        "tests/abs_service/recording/disk/test_disk_watch.py",
+    ),
+    Elsewhere(
         "truncated or flipped bytes in a recording",
         "recovery skips bad chunks only and counts them",
         "tests/abs_service/recording/test_recovery.py",

@@ -1,5 +1,6 @@
 """Commands return the exit codes that docs/reference/command-line.md lists."""
 
+import multiprocessing
 import os
 import re
 import signal
@@ -121,3 +122,15 @@ def test_a_terminal_that_is_closed_ends_in_order_unless_nohup_is_used(ignored, t
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
     done = subprocess.run([sys.executable, "-c", program], env=environment, check=False)
     assert done.returncode == 10 + told
+
+
+def test_a_process_that_not_even_sigkill_ends_does_not_keep_this_one(monkeypatch, capsys):
+    record = Mock()
+    record.name = "record"
+    monkeypatch.setattr(multiprocessing, "active_children", lambda: [record])
+    monkeypatch.setattr(cli, "main", lambda: Exit.FAILED)
+    monkeypatch.setattr(os, "_exit", Mock(side_effect=SystemExit("at once")))
+    monkeypatch.setattr(sys, "argv", ["abs-service", "check"])
+    with pytest.raises(SystemExit, match="at once"):
+        cli.program()
+    assert "left behind, since they do not end: record" in capsys.readouterr().err

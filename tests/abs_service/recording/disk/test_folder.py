@@ -1,5 +1,7 @@
 import errno
+import io
 import tempfile
+import threading
 
 import pytest
 
@@ -31,3 +33,11 @@ def test_a_disk_that_has_a_problem_does_not_keep_a_rig_from_tracking(number, tmp
     monkeypatch.setattr(tempfile, "TemporaryFile", refuse)
     folder.check(tmp_path)
     assert tried == [tmp_path]
+
+
+def test_a_disk_that_does_not_answer_does_not_keep_a_rig_from_tracking(tmp_path, monkeypatch):
+    answers = threading.Event()
+    monkeypatch.setattr(folder, "PATIENCE_S", 0.01)
+    monkeypatch.setattr(tempfile, "TemporaryFile", lambda dir: answers.wait() and io.BytesIO())  # noqa: A006 - the library's name
+    folder.check(tmp_path)
+    answers.set()
