@@ -103,8 +103,7 @@ def run(arguments: argparse.Namespace) -> int:
         # The child has read a temporary file of ours.
         reason = log_lines.final_error(refused.reason)
         raise ChildError(reason.replace(str(file.path), str(arguments.config or "demo.toml")))
-    missing = Exit.FAILED if lost else Exit.OK
-    return supervisor.exit_code() or recording_code(last) or missing
+    return supervisor.exit_code() or recording_code(last) or (Exit.FAILED if lost else Exit.OK)
 
 
 def effective(rig: config.ServiceConfig, arguments: argparse.Namespace) -> config.ServiceConfig:
