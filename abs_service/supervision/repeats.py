@@ -4,7 +4,9 @@ import re
 import threading
 from dataclasses import dataclass
 
-#: Time after which the same text is told again, at first and at most: it doubles each time [ns].
+#: The same text is told so many times as it comes.
+AT_ONCE = 5
+#: Time after which it is told again then, at first and at most: it doubles each time [ns].
 FIRST_NS, LONGEST_NS = 60_000_000_000, 600_000_000_000
 #: Texts that are remembered.
 MOST = 1000
@@ -19,7 +21,8 @@ _TRACEBACK = "Traceback (most recent call last):"
 @dataclass
 class _Told:
     t_ns: int
-    pause_ns: int = FIRST_NS
+    times: int = 1
+    pause_ns: int = 0
     left_out: int = 0
 
 
@@ -40,17 +43,18 @@ class Repeats:
         key = _NUMBERS.sub("0", text)
         with self._lock:
             last = self._told.get(key)
-            passed_ns = now_ns - last.t_ns if last else 0
-            if last and passed_ns < last.pause_ns:
+            # What has not come for long is new.
+            if last is None or now_ns - last.t_ns > 2 * max(last.pause_ns, FIRST_NS):
+                if len(self._told) >= MOST:
+                    self._told.clear()
+                self._told[key] = _Told(now_ns)
+                return last.left_out if last else 0
+            if now_ns - last.t_ns < last.pause_ns:
                 last.left_out += 1
                 return None
-            if len(self._told) >= MOST:
-                self._told.clear()
-            # What has not come for long is new.
-            again = last is not None and passed_ns <= 2 * last.pause_ns
-            pause_ns = min(2 * last.pause_ns, LONGEST_NS) if last and again else FIRST_NS
-            self._told[key] = _Told(now_ns, pause_ns)
-            return last.left_out if last else 0
+            longer_ns = min(max(2 * last.pause_ns, FIRST_NS), LONGEST_NS)
+            self._told[key] = _Told(now_ns, last.times + 1, longer_ns if last.times + 1 >= AT_ONCE else 0)
+            return last.left_out
 
 
 def counted(text: str, left_out: int) -> str:

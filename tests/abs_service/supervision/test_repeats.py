@@ -31,25 +31,27 @@ def test_a_process_that_never_works_fills_no_log(caplog):
     assert len(caplog.records) == 2, "another failure is told at once"
 
 
-def test_what_has_not_come_for_long_is_new():
+def test_the_first_are_told_and_what_has_not_come_for_long_is_new():
     repeats = Repeats()
-    assert [repeats.take(f"x ended: {t}", t * S) for t in (0, 10, 59, 61)] == [0, None, None, 2]
-    assert repeats.take("x ended: 5", 70 * S) is None
-    assert [repeats.take("x ended", t * S) for t in (400, 459, 461)] == [0, None, 1]
+    assert [repeats.take(f"x ended: {t}", t * S) for t in range(7)] == [0, 0, 0, 0, 0, None, None]
+    assert [repeats.take("x ended: 5", t * S) for t in (63, 65, 70, 180, 190)] == [None, 3, None, None, 2]
+    assert repeats.take("x ended: 5", (190 + 2 * 240 + 1) * S) == 0
+    assert repeats.take("y ended: 5", 0) == 0
     for number in range(2 * MOST):
         repeats.take("y" * number, 0)
 
 
-def test_a_traceback_is_told_as_a_whole_and_once():
+def test_a_traceback_is_told_as_a_whole_and_ever_more_rarely():
     tracebacks = Tracebacks()
 
     def told(lines, second, component="record"):
         return [told for line in lines for told in tracebacks.take(component, line, second * S)]
 
     assert told(["a line", "a line"], 0) == ["a line", "a line"]
-    assert told(TRACEBACK, 1) == TRACEBACK
-    assert told([*TRACEBACK, "after it"], 2) == ["after it"]
-    assert told(TRACEBACK, 3, "capture") == TRACEBACK
+    for second in range(5):
+        assert told(TRACEBACK, second) == TRACEBACK
+    assert told([*TRACEBACK, "after it"], 6) == ["after it"]
+    assert told(TRACEBACK, 7, "capture") == TRACEBACK
     other = [*TRACEBACK[:-1], "KeyError: 3"]
-    assert told(other, 4) == other
+    assert told(other, 8) == other
     assert told(TRACEBACK, 70)[-1] == "OSError: no disk (1 more of these since the last one that was told)"
