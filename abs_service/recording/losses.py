@@ -7,6 +7,9 @@ from abs_service.bus.contract import Sample
 from abs_service.bus.health import Health, Level
 from abs_service.bus.sequence_gaps import SequenceGaps
 
+#: Reports, one a second, after which the disk is fast enough again.
+CALM_REPORTS = 10
+
 
 class Losses:
     """Counts and reports losses.
@@ -19,7 +22,8 @@ class Losses:
         self._health = health
         self._gaps = SequenceGaps()
         self._lost = 0  # at the last report
-        self._slow_drops = self._failure_drops = 0
+        self._dropped = self._slow_drops = 0
+        self._calm = CALM_REPORTS  # reports in a row without a drop
 
     def arrive(self, sample: Sample) -> None:
         """Takes each message in the order of arrival."""
@@ -39,10 +43,11 @@ class Losses:
         new = self._lost - before
         message = f"{new} images were lost on their way to the recorder" if new else ""
         self._health.report("losses", Level.WARNING if new else Level.OK, message)
-        total = sum(dropped.values())
+        new, self._dropped = sum(dropped.values()) - self._dropped, sum(dropped.values())
         if failed:
-            self._failure_drops = total - self._slow_drops
             return
-        self._slow_drops = total - self._failure_drops
-        message = f"the disk is too slow: {self._slow_drops} messages dropped" if self._slow_drops else ""
-        self._health.report("queue", Level.WARNING if message else Level.OK, message)
+        self._slow_drops += new
+        self._calm = 0 if new else self._calm + 1
+        slow = self._calm < CALM_REPORTS
+        message = f"the disk is too slow: {self._slow_drops} messages dropped" if slow else ""
+        self._health.report("queue", Level.WARNING if slow else Level.OK, message)
