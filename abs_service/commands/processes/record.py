@@ -9,6 +9,7 @@ recording failed at any time (docs/reference/reliability.md).
 
 import argparse
 import errno
+import logging
 import os
 import shutil
 import threading
@@ -30,6 +31,8 @@ from abs_service.wire import commands
 from drivers.encoding import encoded_image
 from drivers.encoding.encoded_image import ImageCodec
 from drivers.encoding.mcap_file import Compression
+
+_log = logging.getLogger(__name__)
 
 #: Time to drain the queue at the end [s].
 DRAIN_S = 2.5
@@ -56,7 +59,7 @@ def run(arguments: argparse.Namespace) -> int:
         bus.declare_liveliness("record")
         trigger = _trigger(rig, clock)
         # In parallel: it may take minutes.
-        threading.Thread(target=_recover_leftovers, args=(settings, health), daemon=True).start()
+        threading.Thread(target=recover_leftovers, args=(settings, health), daemon=True).start()
         recorder = Recorder(bus, settings, health, clock, trigger=trigger)
         os.nice(NICE)  # this thread and those that it starts from now on: not those that receive
         tracking = FirstTracking(bus, rig.trackers)
@@ -119,7 +122,8 @@ def _trigger(rig: config.ServiceConfig, clock: WallClock) -> Trigger:
     return trigger
 
 
-def _recover_leftovers(settings: RecorderSettings, health: Health) -> None:
+def recover_leftovers(settings: RecorderSettings, health: Health) -> None:
+    """Recovers what recorders before this one have left; health and log say what came of it."""
     remove_interrupted(settings.directory)
     for path in leftovers(settings.directory):
         try:
@@ -127,8 +131,9 @@ def _recover_leftovers(settings: RecorderSettings, health: Health) -> None:
                 # Recording goes first: the copy must not take the room that it needs.
                 raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
             report = recover(path)
-        except RecoveryError:
-            continue  # another recorder's file, or one that holds nothing
+        except RecoveryError as error:  # another recorder's file, or one that holds nothing
+            _log.warning("not recovered: %s", error)
+            continue
         except OSError as error:
             health.report("recovery", Level.WARNING, f"{path} cannot be recovered: {error.strerror}")
             continue

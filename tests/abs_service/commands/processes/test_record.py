@@ -1,0 +1,20 @@
+"""A recorder that starts says what it cannot recover."""
+
+import logging
+
+from abs_service.bus.health import Health
+from abs_service.bus.stamps import HeaderFactory, WallClock
+from abs_service.commands.processes import record
+from abs_service.recording.recorder_settings import RecorderSettings
+from tests.abs_service.bus.loopback import LoopbackBus
+
+
+def test_an_unfinished_recording_that_holds_nothing_is_told(tmp_path, caplog):
+    health = Health(LoopbackBus(), "record", HeaderFactory("demo", WallClock()))
+    (tmp_path / "a.mcap.active").write_bytes(b"no recording")
+    settings = RecorderSettings(tmp_path, "demo", "", minimum_free_bytes=0)
+    with caplog.at_level(logging.WARNING):
+        record.recover_leftovers(settings, health)
+    assert [record.getMessage() for record in caplog.records] == [
+        f"not recovered: {tmp_path}/a.mcap.active: holds no MCAP record"
+    ]
