@@ -40,6 +40,7 @@ class Child:
         reason: of the state, in plain words.
         restarts: how often it was started again after a failure.
         starts: how often it was started.
+        lacks: it cannot be started, because the host lacks something, such as open files.
         process: the running one; `NO_PROCESS` if there is none.
         exit_code: of its last end.
         worst_code: the highest with which it ended by itself or because it was told; 128 + N for signal N that ended it
@@ -54,6 +55,7 @@ class Child:
     reason: str = ""
     restarts: int = 0
     starts: int = 0
+    lacks: bool = False
     exit_code: int = 0
     worst_code: int = 0
     process: Process = field(default=NO_PROCESS, repr=False)

@@ -179,13 +179,13 @@ class Supervisor:
             child.process = self._spawn(child.component, child.arguments)
         except (OSError, EOFError, RuntimeError, MemoryError) as error:  # RuntimeError: too many threads
             # The host lacks something, which is no failure of the process.
-            child.state, child.start_at_ns = State.BACKOFF, now_ns + LONGEST_BACKOFF_NS
+            child.state, child.lacks, child.start_at_ns = State.BACKOFF, True, now_ns + LONGEST_BACKOFF_NS
             child.reason = f"cannot be started: {error}"
             self._tell(logging.WARNING, f"{child.component} {child.reason}; trying again")
             return
         started = {"component": child.component, "child": child.process.pid, "restarts": child.restarts}
         _log.info("%s is started", child.component, extra={"fields": started})
-        child.state, child.reason, child.starts = State.RUNNING, "", child.starts + 1
+        child.state, child.reason, child.lacks, child.starts = State.RUNNING, "", False, child.starts + 1
         child.started_ns, child.heard_ns, child.threads = now_ns, now_ns, {}
         child.deadline_ns = child.overdue_ns = now_ns + self._limits.startup_ns
 
