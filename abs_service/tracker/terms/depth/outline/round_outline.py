@@ -46,7 +46,7 @@ def is_round(
 
 
 def without_turn(
-    gradients: NDArray[np.float64], by_place: NDArray[np.float64], points: NDArray[np.float64]
+    gradients: NDArray[np.float64], by_place: NDArray[np.float64], points: NDArray[np.floating]
 ) -> NDArray[np.float64]:
     """Image gradients (k, 2) of edges without what they say of a turn of the edges in their plane.
 
@@ -59,7 +59,7 @@ def without_turn(
     return gradients - np.vecdot(gradients, along)[:, None] * along
 
 
-def _turn(points: NDArray[np.float64], by_place: NDArray[np.float64]) -> NDArray[np.float64]:
+def _turn(points: NDArray[np.floating], by_place: NDArray[np.float64]) -> NDArray[np.float64]:
     """Directions in the image (k, 2) into which a turn in their plane, about their centre, moves edges (k, 3)."""
     arms = points - points.mean(axis=0)
     normal = np.linalg.eigh(arms.T @ arms)[1][:, 0]
