@@ -56,9 +56,9 @@ class FramePosterior:
         """The cost near theta (dim,)."""
         surface, sparse_jacobian = self.model.deform(theta[None]), self.model.sparse_jacobian(theta)
         terms = self.objective.linearize(surface, sparse_jacobian)
-        sensed = [source.parts() for term in terms for source in term.sources()]
+        sensed = [source for term in terms for source in term.sources()]
         priors = self._priors(surface, sparse_jacobian, theta)
-        quadratic = priors + gauss_newton([part for source in sensed for part in source], self.dimension)
+        quadratic = priors + gauss_newton(sensed, self.dimension)
         return LinearizedCost(theta, quadratic, priors.curvature, sensed, sparse_jacobian)
 
     def optimum(self, theta: NDArray[np.float64], known: LinearizedCost | None) -> Optimum:

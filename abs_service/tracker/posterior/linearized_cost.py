@@ -10,8 +10,8 @@ from abs_service.tracker.models.base import SparseJacobian
 from abs_service.tracker.posterior.curvature import Quadratic
 from abs_service.tracker.terms.linearization import Part
 
-#: Residuals and derivatives of the sensors, by the source of their errors, each in parts.
-Sensed = Sequence[Sequence[Part]]
+#: Residuals and derivatives of the sensors, by the source of their errors.
+Sensed = Sequence[Part]
 
 #: A linearisation holds within this many nats per parameter: the length of the last step of a descent, and half the
 #: step that the noise of a frame causes.
@@ -44,4 +44,4 @@ class LinearizedCost:
     def sensed_at(self, theta: NDArray[np.float64]) -> Sensed:
         """Residuals and derivatives of the sensors, the residuals extrapolated to theta (dim,)."""
         step = theta - self.theta
-        return [[part.moved(step) for part in source] for source in self.sensed]
+        return [source.moved(step) for source in self.sensed]

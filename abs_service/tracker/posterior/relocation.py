@@ -1,5 +1,6 @@
 """Relocation: coarse fit of the mesh to points of a lost object, as the start of a search."""
 
+from collections.abc import Sequence
 from itertools import product
 
 import numpy as np
@@ -10,7 +11,8 @@ from abs_service.tracker.models.base import DeformationModel, SparseJacobian
 from abs_service.tracker.posterior.curvature import gauss_newton
 from abs_service.tracker.posterior.priors.shape_prior import ShapePrior
 from abs_service.tracker.posterior.priors.stretch_prior import StretchPrior
-from abs_service.tracker.terms.linearization import Linearization, Part
+from abs_service.tracker.terms.grouped import GroupedLinearization
+from abs_service.tracker.terms.linearization import Linearization
 from calib.pose import nearest_rotation
 
 #: Steps of the coarse fit, σ of the distances between vertices and points [m], and σ of the relative edge stretch.
@@ -86,7 +88,7 @@ def _towards(
     return Linearization(residual.reshape(-1), jacobian.reshape(-1, sparse_jacobian.dimension))
 
 
-def _stepped(theta: NDArray[np.float64], rows: list[Part]) -> NDArray[np.float64]:
+def _stepped(theta: NDArray[np.float64], rows: Sequence[Linearization | GroupedLinearization]) -> NDArray[np.float64]:
     """Theta after a damped Gauss–Newton step; damping covers parameters without influence."""
     quadratic = gauss_newton(rows, len(theta))
     damping = 1e-3 * np.trace(quadratic.curvature) / len(theta)

@@ -1,44 +1,17 @@
-"""Kernels of the chain rule: derivatives with respect to points, times those of the points with respect to theta."""
+"""Kernels of the chain rule: derivatives with respect to points, times those of the points with respect to theta.
+
+Residuals of one point are added up before they meet its Jacobian D (3, k), which is much larger than their rows. Points
+of a group that follow each other share one product of matrices: a library needs ten times as long for thousands of
+products of 3 × 3 by 3 × k.
+"""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from calib.jit import kernel
 
-
-@kernel
-def count_points(points: NDArray[np.int64], group: NDArray[np.int32], start: NDArray[np.int64]) -> None:
-    """First index of each group's residuals in sorted order, and their total, into zeros (groups + 1,)."""
-    for m in range(points.size):
-        start[group[points[m]] + 1] += 1
-    for g in range(1, start.size):
-        start[g] += start[g - 1]
-
-
-@kernel
-def apply_chain_rule(
-    residual: NDArray[np.float64],
-    rows: NDArray[np.float64],
-    points: NDArray[np.int64],
-    group: NDArray[np.int32],
-    local: NDArray[np.float64],
-    place: NDArray[np.int64],
-    sorted_residual: NDArray[np.float64],
-    jacobian: NDArray[np.float64],
-    sorted_points: NDArray[np.int64],
-) -> None:
-    """Rows times the Jacobians of their points, sorted by group; `place` is the first index of each group.
-
-    A library needs ten times as long for thousands of products of 1 × 3 by 3 × k matrices.
-    """
-    for m in range(points.size):
-        v = points[m]
-        to = place[group[v]]
-        place[group[v]] += 1
-        sorted_residual[to], sorted_points[to] = residual[m], v
-        x, y, z = rows[m, 0], rows[m, 1], rows[m, 2]
-        for d in range(local.shape[2]):
-            jacobian[to, d] = x * local[v, 0, d] + y * local[v, 1, d] + z * local[v, 2, d]
+#: Share of its trace below which what is left of a point's matrix is rounding.
+_ROUNDING = 1e-15
 
 
 @kernel
@@ -61,11 +34,154 @@ def transpose_times(
     local: NDArray[np.float64],
     result: NDArray[np.float64],
 ) -> None:
-    """Transposed Jacobian of the points times values at the points (n, 3, k), into zeros (dim, k)."""
+    """Adds the transposed Jacobian of the points times values at the points (n, 3, k) to a matrix (dim, k)."""
+    own, first = np.empty(local.shape[2]), 0
+    while first < group.size:
+        last = first + 1
+        while last < group.size and group[last] == group[first]:
+            last += 1
+        for k in range(result.shape[1]):
+            own[:] = 0.0
+            for v in range(first, last):
+                x, y, z = at_points[v, 0, k], at_points[v, 1, k], at_points[v, 2, k]
+                for d in range(own.size):
+                    own[d] += x * local[v, 0, d] + y * local[v, 1, d] + z * local[v, 2, d]
+            for d in range(own.size):
+                result[parameters[group[first], d], k] += own[d]
+        first = last
+
+
+@kernel
+def sum_squares(
+    rows: NDArray[np.float64], points: NDArray[np.int64], weights: NDArray[np.float64], squares: NDArray[np.float64]
+) -> None:
+    """Adds rowᵀ weight row (3, 3) of every residual to that of its point (n, 3, 3)."""
+    for m in range(points.size):
+        square = squares[points[m]]
+        for i in range(3):
+            for j in range(3):
+                square[i, j] += weights[m] * rows[m, i] * rows[m, j]
+
+
+@kernel
+def add_squares(
+    squares: NDArray[np.float64],
+    group: NDArray[np.int32],
+    parameters: NDArray[np.int64],
+    local: NDArray[np.float64],
+    total: NDArray[np.float64],
+) -> None:
+    """Adds DᵀMD of points with matrices M (n, 3, 3), symmetric and not negative, to a matrix (dim, dim).
+
+    M is CᵀC with as many rows C as its rank, by a Cholesky decomposition with pivots, and DᵀMD the square of CD.
+    """
+    n, k, half, first = group.size, local.shape[2], local.shape[2] // 2, 0
+    while first < n:
+        last = first + 1
+        while last < n and group[last] == group[first]:
+            last += 1
+        left, right, count = np.empty((3 * (last - first), half)), np.empty((3 * (last - first), k - half)), 0
+        for v in range(first, last):
+            rest, least = squares[v].copy(), _ROUNDING * (squares[v, 0, 0] + squares[v, 1, 1] + squares[v, 2, 2])
+            for _ in range(3):
+                p = 0 if rest[0, 0] >= max(rest[1, 1], rest[2, 2]) else (1 if rest[1, 1] >= rest[2, 2] else 2)
+                if not rest[p, p] > least:
+                    break
+                root = np.sqrt(rest[p, p])
+                x, y, z = rest[p, 0] / root, rest[p, 1] / root, rest[p, 2] / root
+                row = x, y, z
+                for i in range(3):
+                    for j in range(3):
+                        rest[i, j] -= row[i] * row[j]
+                for d in range(half):
+                    left[count, d] = x * local[v, 0, d] + y * local[v, 1, d] + z * local[v, 2, d]
+                for d in range(half, k):
+                    right[count, d - half] = x * local[v, 0, d] + y * local[v, 1, d] + z * local[v, 2, d]
+                count += 1
+        add_products(left[:count], right[:count], parameters[group[first]], total)
+        first = last
+
+
+@kernel
+def add_products(
+    left: NDArray[np.float64], right: NDArray[np.float64], own: NDArray[np.int64], total: NDArray[np.float64]
+) -> None:
+    """Adds the square of (left, right) to the rows and columns `own` of a matrix; one block of four is mirrored."""
+    half = left.shape[1]
+    upper, across, lower = np.dot(left.T, left), np.dot(left.T, right), np.dot(right.T, right)
+    for i in range(half):
+        line = total[own[i]]
+        for j in range(half):
+            line[own[j]] += upper[i, j]
+        for j in range(half, own.size):
+            line[own[j]] += across[i, j - half]
+    for i in range(half, own.size):
+        line = total[own[i]]
+        for j in range(half):
+            line[own[j]] += across[j, i - half]
+        for j in range(half, own.size):
+            line[own[j]] += lower[i - half, j - half]
+
+
+@kernel
+def extrapolate(
+    residual: NDArray[np.float64],
+    rows: NDArray[np.float64],
+    points: NDArray[np.int64],
+    group: NDArray[np.int32],
+    parameters: NDArray[np.int64],
+    local: NDArray[np.float64],
+    by: NDArray[np.float64],
+    result: NDArray[np.float64],
+) -> None:
+    """Residuals plus rows times what a step (dim,) of theta moves their points by."""
+    moved, step = np.empty((group.size, 3)), np.empty(local.shape[2])
     for v in range(group.size):
-        own = parameters[group[v]]
+        if v == 0 or group[v] != group[v - 1]:
+            for d in range(step.size):
+                step[d] = by[parameters[group[v], d]]
+        for i in range(3):
+            total = 0.0
+            for d in range(step.size):
+                total += local[v, i, d] * step[d]
+            moved[v, i] = total
+    for m in range(points.size):
+        by_point = moved[points[m]]
+        result[m] = residual[m] + rows[m, 0] * by_point[0] + rows[m, 1] * by_point[1] + rows[m, 2] * by_point[2]
+
+
+@kernel
+def quadratic_forms(
+    rows: NDArray[np.float64], points: NDArray[np.int64], matrices: NDArray[np.float64], result: NDArray[np.float64]
+) -> None:
+    """Products row matrix rowᵀ (m,) of rows (m, 3) with the matrices of their points (n, 3, 3)."""
+    for m in range(points.size):
+        matrix, total = matrices[points[m]], 0.0
+        for i in range(3):
+            for j in range(3):
+                total += rows[m, i] * matrix[i, j] * rows[m, j]
+        result[m] = total
+
+
+@kernel
+def add_scores(
+    clusters: NDArray[np.int64],
+    residual: NDArray[np.float64],
+    rows: NDArray[np.float64],
+    points: NDArray[np.int64],
+    group: NDArray[np.int32],
+    parameters: NDArray[np.int64],
+    local: NDArray[np.float64],
+    scores: NDArray[np.float64],
+) -> None:
+    """Adds residual row D of every residual to the row of `scores` (…, dim) that its cluster (m,) names."""
+    x = y = z = 0.0
+    for m in range(points.size):
+        x, y, z = x + residual[m] * rows[m, 0], y + residual[m] * rows[m, 1], z + residual[m] * rows[m, 2]
+        v = points[m]
+        if m + 1 < points.size and points[m + 1] == v and clusters[m + 1] == clusters[m]:
+            continue  # another channel of the same point
+        score, own = scores[clusters[m]], parameters[group[v]]
         for d in range(own.size):
-            total = result[own[d]]
-            for i in range(3):
-                for k in range(total.size):
-                    total[k] += local[v, i, d] * at_points[v, i, k]
+            score[own[d]] += x * local[v, 0, d] + y * local[v, 1, d] + z * local[v, 2, d]
+        x = y = z = 0.0

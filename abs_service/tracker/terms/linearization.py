@@ -1,6 +1,6 @@
 """Linearised residuals: each depends on one point of the surface, each point on a few parameters."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
@@ -8,11 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.models.base import SparseJacobian
-from abs_service.tracker.terms.chain_rule import apply_chain_rule, count_points, sum_at_points, transpose_times
-from abs_service.tracker.terms.grouped import GroupedLinearization, add_scores
+from abs_service.tracker.terms import chain_rule
+from abs_service.tracker.terms.grouped import GroupedLinearization
 
 #: Residuals, rows and points of no measurement.
 NO_ROWS = np.zeros(0), np.zeros((0, 3)), np.zeros(0, np.int64)
+
+#: Covariance (n, 3, 3) of the points of a sparse Jacobian, from that of theta.
+AtPoints = Callable[[SparseJacobian], NDArray[np.float64]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -22,20 +25,16 @@ class Linearization:
     Attributes:
         residual: (m,).
         jacobian: (m, dim).
-        positions: of the points that they belong to (m, 3) [m]; empty (0, 3) if they belong to none.
+        places: of the points that they belong to (m, 3) [m]; empty (0, 3) if they belong to none.
         shared: sum of the derivatives (s, dim) of the residuals that share an error, times that error's deviation.
     """
 
     residual: NDArray[np.float64]
     jacobian: NDArray[np.float64]
-    positions: NDArray[np.floating] = field(default_factory=lambda: np.zeros((0, 3)))
+    places: NDArray[np.floating] = field(default_factory=lambda: np.zeros((0, 3)))
     shared: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
 
-    def parts(self) -> list["Part"]:
-        """A list of this linearisation alone."""
-        return [self]
-
-    def sources(self) -> list["Linear"]:
+    def sources(self) -> list["Part"]:
         """A list of this linearisation alone."""
         return [self]
 
@@ -47,6 +46,10 @@ class Linearization:
         """Jᵀ times values (m, k) of the residuals (dimension, k)."""
         return self.jacobian.T @ values if len(values) else np.zeros((dimension, values.shape[1]))
 
+    def shared_gradients(self) -> NDArray[np.float64]:
+        """Sums of derivatives (s, dim), see `shared`."""
+        return self.shared
+
     def add_gradient(self, total: NDArray[np.float64]) -> None:
         """Adds Jᵀr to a gradient (dim,)."""
         total += self.jacobian.T @ self.residual
@@ -55,19 +58,14 @@ class Linearization:
         """Adds JᵀJ to a matrix (dim, dim)."""
         total += self.jacobian.T @ self.jacobian  # of one matrix: half the products
 
-    def add_square(self, weights: NDArray[np.float64], total: NDArray[np.float64]) -> None:
-        """Adds Jᵀ diag(weights) J, of weights (m,), not negative, to a matrix (dim, dim)."""
-        weighted = self.jacobian * np.sqrt(weights)[:, None]
-        total += weighted.T @ weighted
-
-    def leverage(self, covariance: NDArray[np.float64]) -> NDArray[np.float64]:
-        """diag(J Σ Jᵀ) (m,) of a covariance Σ (dim, dim)."""
+    def leverage(self, covariance: NDArray[np.float64], at_points: AtPoints) -> NDArray[np.float64]:
+        """diag(J Σ Jᵀ) (m,) of a covariance Σ (dim, dim) of theta, or of what that is at the points."""
         return np.vecdot(self.jacobian @ covariance, self.jacobian)
 
     def add_scores(self, clusters: NDArray[np.int64], scores: NDArray[np.float64]) -> None:
         """Adds the score Jᵀr of every residual to that of its cluster (m,), one of the rows of `scores` (…, dim)."""
-        every = np.arange(scores.shape[1])[None]
-        add_scores(clusters, self.residual, self.jacobian, every, np.array([0, len(clusters)]), scores)
+        is_member = np.arange(len(scores))[:, None] == clusters
+        scores += is_member.astype(np.float64) @ (self.residual[:, None] * self.jacobian)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -92,47 +90,54 @@ class PointLinearization:
 
     @property
     def jacobian(self) -> NDArray[np.float64]:
-        """Dense Jacobian (m, dim) with respect to theta, in the order of the residuals."""
-        order = np.argsort(self.sparse_jacobian.group[self.points], kind="stable")
-        result = np.empty((len(order), self.sparse_jacobian.dimension))
-        result[order] = stack(self.parts(), self.sparse_jacobian.dimension).jacobian
-        return result
+        """Dense Jacobian (m, dim) with respect to theta."""
+        return np.einsum("mi,mid->md", self.rows, self.sparse_jacobian.dense[self.points])
 
-    def transposed_times(self, values: NDArray[np.float64], dimension: int) -> NDArray[np.float64]:
-        """Jᵀ times values (m, k) of the residuals (dimension, k), matrix-free."""
-        sparse_jacobian = self.sparse_jacobian
-        at_points, result = (
-            np.zeros((len(sparse_jacobian.local), 3, values.shape[1])),
-            np.zeros((dimension, values.shape[1])),
-        )
-        sum_at_points(self.rows, self.points, values, at_points)
-        transpose_times(at_points, sparse_jacobian.group, sparse_jacobian.parameters, sparse_jacobian.local, result)
-        return result
+    @property
+    def places(self) -> NDArray[np.floating]:
+        """Positions of the points that the residuals belong to (m, 3) [m]."""
+        return self.positions[self.points]
 
-    def sources(self) -> list["Linear"]:
+    def sources(self) -> list["Part"]:
         """A list of this linearisation alone."""
         return [self]
 
-    def parts(self) -> list["Part"]:
-        """A linearisation with respect to theta by the chain rule, sorted by the group of the points."""
-        sparse_jacobian = self.sparse_jacobian
-        start = np.zeros(len(sparse_jacobian.parameters) + 1, np.int64)
-        count_points(self.points, sparse_jacobian.group, start)
-        m = len(self.residual)
-        residual, jacobian, points = (
-            np.empty(m),
-            np.empty((m, sparse_jacobian.local.shape[2])),
-            np.empty(m, self.points.dtype),
-        )
-        of_points = sparse_jacobian.group, sparse_jacobian.local
-        apply_chain_rule(
-            self.residual, self.rows, self.points, *of_points, start[:-1].copy(), residual, jacobian, points
-        )
-        shared = (
-            self.transposed_times(self.shared, sparse_jacobian.dimension).T if self.shared.shape[1] else self.shared
-        )
-        positions = self.positions[points]
-        return [GroupedLinearization(residual, jacobian, sparse_jacobian.parameters, start, positions, shared)]
+    def moved(self, by: NDArray[np.float64]) -> "PointLinearization":
+        """Linearisation with its residuals extrapolated to first order by a step (dim,) of theta."""
+        residual = np.empty_like(self.residual)
+        chain_rule.extrapolate(self.residual, self.rows, self.points, *self._chain, by, residual)
+        return replace(self, residual=residual)
+
+    def transposed_times(self, values: NDArray[np.float64], dimension: int) -> NDArray[np.float64]:
+        """Jᵀ times values (m, k) of the residuals (dimension, k), matrix-free."""
+        result = np.zeros((dimension, values.shape[1]))
+        at_points = np.zeros((len(self.sparse_jacobian.local), 3, values.shape[1]))
+        chain_rule.sum_at_points(self.rows, self.points, values, at_points)
+        chain_rule.transpose_times(at_points, *self._chain, result)
+        return result
+
+    def shared_gradients(self) -> NDArray[np.float64]:
+        """Sum of the derivatives (s, dim) of the residuals that share an error, times that error's deviation."""
+        return self.transposed_times(self.shared, self.sparse_jacobian.dimension).T
+
+    def add_gradient(self, total: NDArray[np.float64]) -> None:
+        """Adds Jᵀr to a gradient (dim,)."""
+        total += self.transposed_times(self.residual[:, None], len(total))[:, 0]
+
+    def leverage(self, covariance: NDArray[np.float64], at_points: AtPoints) -> NDArray[np.float64]:
+        """diag(J Σ Jᵀ) (m,) of a covariance Σ (dim, dim) of theta, or of what that is at the points."""
+        result = np.empty(len(self.residual))
+        chain_rule.quadratic_forms(self.rows, self.points, at_points(self.sparse_jacobian), result)
+        return result
+
+    def add_scores(self, clusters: NDArray[np.int64], scores: NDArray[np.float64]) -> None:
+        """Adds the score Jᵀr of every residual to that of its cluster (m,), one of the rows of `scores` (…, dim)."""
+        chain_rule.add_scores(clusters, self.residual, self.rows, self.points, *self._chain, scores)
+
+    @property
+    def _chain(self) -> tuple[NDArray[np.int32], NDArray[np.int64], NDArray[np.float64]]:
+        """Arguments of the kernels of `chain_rule`."""
+        return self.sparse_jacobian.group, self.sparse_jacobian.parameters, self.sparse_jacobian.local
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -163,11 +168,7 @@ class Together:
         split_values = zip(self.all, np.split(values, ends))
         return np.sum([part.transposed_times(own, dimension) for part, own in split_values], axis=0)
 
-    def parts(self) -> list["Part"]:
-        """Parts of all linearisations."""
-        return [part for linear in self.all for part in linear.parts()]
-
-    def sources(self) -> list["Linear"]:
+    def sources(self) -> list["Part"]:
         """The linearisations, whose residuals have errors of different origin."""
         return list(self.all)
 
@@ -194,20 +195,34 @@ class Linear(Protocol):
         """
         ...
 
-    def parts(self) -> list["Part"]:
-        """The same residuals in any order, grouped by the parameters that they depend on."""
-        ...
-
-    def sources(self) -> list["Linear"]:
+    def sources(self) -> list["Part"]:
         """The linearisations that this one consists of, by the origin of their errors; always as many."""
         ...
 
 
-#: What linearisations consist of.
-Part = Linearization | GroupedLinearization
+#: What linearisations of measurements consist of.
+Part = Linearization | PointLinearization
 
 
-def stack(parts: Sequence[Linear | Part], dimension: int) -> Linearization:
+def add_squares(parts: Sequence[Part], weights: Sequence[NDArray[np.float64]], total: NDArray[np.float64]) -> None:
+    """Adds Jᵀ diag(weights) J, of weights (m,) of every part, not negative, to a matrix (dim, dim).
+
+    What different sensors measure of the same points is added up at the points first.
+    """
+    at_points: dict[SparseJacobian, NDArray[np.float64]] = {}
+    for part, own in zip(parts, weights, strict=True):
+        if isinstance(part, PointLinearization):
+            samples = part.sparse_jacobian
+            squares = at_points.setdefault(samples, np.zeros((len(samples.local), 3, 3)))
+            chain_rule.sum_squares(part.rows, part.points, own, squares)
+        else:
+            weighted = part.jacobian * np.sqrt(own)[:, None]
+            total += weighted.T @ weighted  # of one matrix: half the products
+    for samples, squares in at_points.items():
+        chain_rule.add_squares(squares, samples.group, samples.parameters, samples.local, total)
+
+
+def stack(parts: Sequence[Linear | GroupedLinearization], dimension: int) -> Linearization:
     """Vertically stacked residuals and Jacobians with respect to all parameters."""
     rows = (part.dense(dimension) if isinstance(part, GroupedLinearization) else part.jacobian for part in parts)
     return Linearization(

@@ -11,8 +11,6 @@ the border of a cluster: if it falls off exponentially with the distance, the ef
 1 + 4 (D − 1), which multiplies the squared residuals of the sandwich (`sandwich`).
 """
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -57,32 +55,25 @@ class DesignEffects:
         """
         if len(self._sums) != len(sensed):  # a sensor came or went
             self._sums = np.zeros((len(sensed), 2))
-        for source, (parts, shares) in enumerate(zip(sensed, leverage)):
-            new = self._squares(inverse, parts, shares)
+        for source, (part, share) in enumerate(zip(sensed, leverage)):
+            new = self._squares(inverse, part, share)
             begun = self._sums[source, 1] > 0
             self._sums[source] += (MEMORY if begun else 1.0) * (new - self._sums[source])
         clustered, independent = self._sums.T
         within = clustered / np.where(independent > 0, independent, 1.0)
         return 1 + BEYOND * np.maximum(within - 1, 0.0)
 
-    def _squares(
-        self,
-        inverse: NDArray[np.float64],
-        parts: Sequence[Part],
-        leverage: Sequence[NDArray[np.float64]],
-    ) -> NDArray[np.float64]:
+    def _squares(self, inverse: NDArray[np.float64], part: Part, leverage: NDArray[np.float64]) -> NDArray[np.float64]:
         """Squared lengths of the scores, added up within clusters, and one by one (2,)."""
-        numbers, total = np.full(CLUSTERS, -1, np.int64), 0.0
-        placed = []
-        for part, share in zip(parts, leverage):
-            if len(part.residual) and len(part.positions) == len(part.residual):
-                placed.append((part, np.empty(len(part.residual), np.int64)))
-                _find_clusters(part.positions, 1 / self._side_m, numbers, placed[-1][1])
-                total += float(np.vdot(part.residual**2, share))  # the squared length of a score is r² h
+        places = part.places
+        if not len(places):
+            return np.zeros(2)
+        numbers, clusters = np.full(CLUSTERS, -1, np.int64), np.empty(len(places), np.int64)
+        _find_clusters(places, 1 / self._side_m, numbers, clusters)
         scores = np.zeros((numbers.max() + 1, len(inverse)))
-        for part, clusters in placed:
-            part.add_scores(clusters, scores)
-        return np.array([float(np.vdot(scores @ inverse, scores)), total])
+        part.add_scores(clusters, scores)
+        # The squared length of a single score is r² h.
+        return np.array([np.vdot(scores @ inverse, scores), np.vdot(part.residual**2, leverage)], np.float64)
 
 
 @kernel

@@ -9,23 +9,27 @@ that each residual loses to the fit (HC2 of MacKinnon and White, J. Econometrics
 exact, r² / (1 − h) is 1 on average and the sandwich equals Σ.
 """
 
+import functools
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from abs_service.tracker.posterior.covariance.vertex_covariance import propagated
 from abs_service.tracker.posterior.linearized_cost import Sensed
+from abs_service.tracker.terms.linearization import add_squares
 
 #: Lower bound of 1 − h; below it, rounding errors dominate.
 LEAST_KEPT = 1e-6
 
-#: A value of each residual (m,), by source, in parts.
-PerResidual = Sequence[Sequence[NDArray[np.float64]]]
+#: A value of each residual (m,), by source.
+PerResidual = Sequence[NDArray[np.float64]]
 
 
 def leverages(inverse: NDArray[np.float64], sensed: Sensed) -> PerResidual:
     """Leverage h = diag(J Σ Jᵀ) of every residual, from Σ (dim, dim)."""
-    return [[part.leverage(inverse) for part in parts] for parts in sensed]
+    at_points = functools.cache(lambda samples: propagated(samples, inverse))  # sensors that measure the same points
+    return [source.leverage(inverse, at_points) for source in sensed]
 
 
 def gradient_covariance(
@@ -39,16 +43,15 @@ def gradient_covariance(
         leverage: h.
         effects: design effect D (sources,) of the residuals of every source, see `design_effect`.
     """
-    result = priors.copy()
-    for parts, shares, effect in zip(sensed, leverage, effects):
-        for part, share in zip(parts, shares):
-            part.add_square(part.residual**2 * (effect / np.maximum(1 - share, LEAST_KEPT)), result)
+    result, each = priors.copy(), zip(sensed, leverage, effects)
+    weights = [source.residual**2 * (effect / np.maximum(1 - h, LEAST_KEPT)) for source, h, effect in each]
+    add_squares(sensed, weights, result)
     return result
 
 
 def shared_covariance(sensed: Sensed, dimension: int) -> NDArray[np.float64]:
     """Covariance (dim, dim) of the gradient by errors that many residuals share, the same in all frames."""
     result = np.zeros((dimension, dimension))
-    for part in (part for parts in sensed for part in parts if len(part.shared)):
-        result += part.shared.T @ part.shared
+    for gradients in (source.shared_gradients() for source in sensed if source.shared.size):
+        result += gradients.T @ gradients
     return result

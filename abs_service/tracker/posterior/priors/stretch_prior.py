@@ -7,7 +7,7 @@ from abs_service.tracker.mesh import Mesh, edge_lengths
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.posterior.priors.edge_runs import EdgeRuns
 from abs_service.tracker.terms.grouped import GroupedLinearization
-from abs_service.tracker.terms.linearization import Linearization, Part
+from abs_service.tracker.terms.linearization import Linearization
 from calib.jit import kernel
 
 
@@ -39,7 +39,9 @@ class StretchPrior:
         """Negative log-density (population,) of the edge lengths, up to a constant."""
         return self._runs.sum_squares(surface.vertices, 0.5 * self._inverse_deviation**2)
 
-    def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> list[Part]:
+    def linearize(
+        self, surface: Surface, sparse_jacobian: SparseJacobian
+    ) -> list[GroupedLinearization | Linearization]:
         """The edges' normalised residuals of a population of one; those between groups of vertices in one part."""
         start = np.zeros(len(sparse_jacobian.parameters) + 2, np.int64)
         _count_edges(self._edges, sparse_jacobian.group, start)

@@ -24,7 +24,7 @@ def test_a_linearisation_serves_a_near_optimum_and_is_made_anew_for_a_far_one():
     assert frame.optimum(theta + small, at).linearized is at
     np.testing.assert_array_equal(frame.optimum(theta + large, at).linearized.theta, theta + large)
     sources = at.sensed, at.sensed_at(theta + small)
-    before, after = (stack([part for parts in source for part in parts], len(theta)) for source in sources)
+    before, after = (stack(source, len(theta)) for source in sources)
     np.testing.assert_array_equal(after.jacobian, before.jacobian)
     np.testing.assert_allclose(after.residual, before.residual + before.jacobian @ small, atol=1e-9)
 

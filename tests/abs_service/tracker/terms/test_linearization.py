@@ -1,5 +1,7 @@
 """Residuals and their derivatives are those of the cost, on surfaces that are smooth enough for derivatives."""
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ from abs_service.tracker.models.base import SparseJacobian
 from abs_service.tracker.models.nurbs import Settings
 from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.objectives import euclidean, likelihood
+from abs_service.tracker.posterior.covariance.sandwich import leverages
 from abs_service.tracker.posterior.priors.change_metric import ChangeMetric
 from abs_service.tracker.posterior.priors.motion_prior import MotionPrior
 from abs_service.tracker.posterior.priors.settings import Settings as PriorSettings
@@ -17,7 +20,7 @@ from abs_service.tracker.posterior.priors.stretch_prior import StretchPrior
 from abs_service.tracker.terms.base import Bounds
 from abs_service.tracker.terms.depth.depth import DepthTerm
 from abs_service.tracker.terms.gradients import depth_rows
-from abs_service.tracker.terms.linearization import Linearization, PointLinearization, stack
+from abs_service.tracker.terms.linearization import Linearization, PointLinearization, add_squares, stack
 from calib.camera import Camera
 from calib.noise.gaussian_polynomial import GaussianPolynomial
 from calib.rig import Rig, Sensor
@@ -62,25 +65,52 @@ def test_depth_residuals_are_normalised_differences():
     np.testing.assert_allclose(linear.jacobian[:, 5], -gap / SIGMA**2, rtol=0.02)
 
 
-@given(st.integers(0, 2**32 - 1), st.integers(0, 20))
-def test_the_chain_rule_is_a_product_of_matrices(seed, count):
-    generator = np.random.default_rng(seed)
+def drawn(generator: np.random.Generator, count: int) -> PointLinearization:
+    """So many residuals of nine points in some order, in groups of four out of seven parameters."""
     group = np.sort(generator.integers(0, 3, 9)).astype(np.int32)
     parameters = np.stack([generator.permutation(7)[:4] for _ in range(3)])
     sparse_jacobian = SparseJacobian(generator.standard_normal((9, 3, 4)), group, parameters, 7)
     points, rows = generator.integers(0, 9, count), generator.standard_normal((count, 3))
-    expected = np.einsum("mi,mid->md", rows, sparse_jacobian.dense[points])
-    positions = generator.standard_normal((9, 3))
-    shared = generator.standard_normal((count, 2))
-    linear = PointLinearization(generator.standard_normal(count), rows, points, sparse_jacobian, positions, shared)
-    np.testing.assert_allclose(linear.jacobian, expected, rtol=0, atol=1e-12)
-    parts, order = stack(linear.parts(), 7), np.argsort(group[points], kind="stable")
-    np.testing.assert_array_equal(parts.residual, linear.residual[order])
-    np.testing.assert_allclose(parts.jacobian, expected[order], rtol=0, atol=1e-12)
-    placed = np.concatenate([np.zeros((0, 3)), *(part.positions for part in linear.parts())])
-    np.testing.assert_array_equal(placed, positions[points][order])
-    (part,) = linear.parts()
-    np.testing.assert_allclose(part.shared, shared.T @ expected, rtol=0, atol=1e-12)
+    rows[generator.random(count) < 0.3, 0] = 0.0
+    positions, shared = generator.standard_normal((9, 3)), generator.standard_normal((count, 2))
+    return PointLinearization(generator.standard_normal(count), rows, points, sparse_jacobian, positions, shared)
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(0, 20))
+def test_residuals_of_points_are_those_of_their_dense_jacobian(seed, count):
+    generator = np.random.default_rng(seed)
+    linear = drawn(generator, count)
+    expected = np.stack([row @ linear.sparse_jacobian.dense[v] for row, v in zip(linear.rows, linear.points)] or [[]])
+    dense = Linearization(linear.residual, expected.reshape(count, 7))
+    np.testing.assert_allclose(linear.jacobian, dense.jacobian, rtol=0, atol=1e-12)
+    np.testing.assert_array_equal(linear.places, linear.positions[linear.points])
+    np.testing.assert_allclose(linear.shared_gradients(), linear.shared.T @ dense.jacobian, rtol=0, atol=1e-12)
+    step, clusters, half = generator.standard_normal(7), generator.integers(0, 3, count), generator.random((7, 7))
+    np.testing.assert_allclose(linear.moved(step).residual, dense.moved(step).residual, rtol=0, atol=1e-12)
+    by_cluster = [linear.residual[clusters == c] @ dense.jacobian[clusters == c] for c in range(3)]
+    for part in (linear, dense):
+        gradient, scores = np.ones(7), np.ones((3, 7))
+        part.add_gradient(gradient)
+        part.add_scores(clusters, scores)
+        np.testing.assert_allclose(gradient, 1 + dense.jacobian.T @ linear.residual, rtol=0, atol=1e-12)
+        np.testing.assert_allclose(scores, 1 + np.array(by_cluster), rtol=0, atol=1e-12)
+    found, leverage = leverages(half + half.T, [linear, dense])
+    np.testing.assert_allclose(
+        found, np.einsum("md,de,me->m", dense.jacobian, half + half.T, dense.jacobian), atol=1e-11
+    )
+    np.testing.assert_allclose(found, leverage, rtol=0, atol=1e-11)
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(0, 20), st.integers(0, 20))
+def test_squares_of_sensors_that_measure_the_same_points_are_added_up(seed, count, other):
+    """Also of points with one row or with two, whose matrices are singular."""
+    generator = np.random.default_rng(seed)
+    one, two = drawn(generator, count), drawn(generator, other)
+    parts = [one, replace(two, sparse_jacobian=one.sparse_jacobian), two, Linearization(np.ones(3), np.eye(3, 7))]
+    weights, total = [generator.random(len(part.residual)) for part in parts], np.ones((7, 7))
+    add_squares(parts, weights, total)
+    products = ((part.jacobian.T * own) @ part.jacobian for part, own in zip(parts, weights))
+    np.testing.assert_allclose(total, 1 + sum(products), rtol=0, atol=1e-12)
 
 
 def test_grazing_views_do_not_explode():

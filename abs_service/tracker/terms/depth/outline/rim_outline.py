@@ -182,7 +182,7 @@ class RimOutline:
         of_points = sparse_jacobian.group, sparse_jacobian.parameters, sparse_jacobian.local
         chain(rows, outer[use], inner[use], beyond[use], *of_points, jacobian)
         shared = shared_by_side(jacobian, residual[use], gradients[use])
-        return Linearization(residual[use], jacobian, positions=points[use], shared=shared)
+        return Linearization(residual[use], jacobian, places=points[use], shared=shared)
 
     def fit(self, surface: Surface) -> RimFit:
         """Agreement of the edges of a population of one with the outline."""

@@ -13,7 +13,7 @@ SEEDS = st.integers(0, 2**32 - 1)
 
 def sandwich(inverse: np.ndarray, residual: np.ndarray, rows: np.ndarray) -> np.ndarray:
     """Covariance of the solutions, of independent residuals."""
-    curvature, sensed = np.asarray(np.linalg.inv(inverse), np.float64), [[Linearization(residual, rows)]]
+    curvature, sensed = np.asarray(np.linalg.inv(inverse), np.float64), [Linearization(residual, rows)]
     leverage = leverages(inverse, sensed)
     return inverse @ gradient_covariance(curvature - rows.T @ rows, sensed, leverage, np.ones(1)) @ inverse
 
