@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from abs_service.pairing.images import DepthImage
 from abs_service.tracker.mesh import Mesh
+from abs_service.tracker.synthesis.perspective import project_with_jacobian
 from calib.camera import Camera
 from calib.jit import kernel
 from calib.noise.base import DepthNoise
@@ -89,7 +90,7 @@ class HeightSensor:
         Of others, they are those of any pixel near the rest of the mesh.
         """
         camera, reach = self._camera, self._reach
-        column, row = np.floor(camera.project(vertices).T + 0.5)
+        column, row = np.floor(project_with_jacobian(camera, vertices)[0].T + 0.5)
         seen = (column >= reach) & (column < camera.width - reach) & (row >= reach) & (row < camera.height - reach)
         any_row, any_column = (row[seen][0], column[seen][0]) if seen.any() else (reach, reach)
         row, column = np.where(seen, row, any_row), np.where(seen, column, any_column)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from abs_service.tracker.posterior.curvature import solved, whitened
 from abs_service.tracker.posterior.optimum import Optimum
 from abs_service.tracker.posterior.priors.motion_prediction import MotionPrediction
+from abs_service.tracker.terms.median import median
 
 #: Share of the widest motion prior's precision that keeps `single_frame_deviation` finite, and number of vertices it
 #: probes.
@@ -28,7 +29,7 @@ def single_frame_deviation(optimum: Optimum, prediction: MotionPrediction) -> fl
     rows = np.zeros((PROBES, 3, len(alone)))
     np.put_along_axis(rows, derivatives.parameters[derivatives.group[some]][:, None], derivatives.local[some], axis=2)
     white = whitened(alone, rows.reshape(-1, len(alone)).T)
-    return float(np.sqrt(np.median(np.einsum("ij,ij->j", white, white).reshape(PROBES, 3).sum(axis=1))))
+    return float(np.sqrt(median(np.einsum("ij,ij->j", white, white).reshape(PROBES, 3).sum(axis=1))))
 
 
 def unobserved_motion(

@@ -14,6 +14,7 @@ from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.synthesis.window import Bordered, corner, within
 from abs_service.tracker.terms.base import Bounds
 from abs_service.tracker.terms.depth.depth_cost import distances, median_inlier_cost, settle, write_constants
+from abs_service.tracker.terms.median import median
 from calib.jit import kernel
 from calib.noise.base import DepthNoise
 from calib.noise.texture import corrected_distances, write_pixels, write_texture
@@ -150,7 +151,7 @@ class TexelsOnDemand:
         top, left = corner(self._window)
         some = ((rows + top + 1) * self._texture.shape[1] + columns + left + 1).astype(np.int32)
         texture = self.at(some[None])
-        self._agreeing = float(np.median(texture[some, 6])) + 0.5 if len(some) else 0.0
+        self._agreeing = median(texture[some, 6]) + 0.5 if len(some) else 0.0
         self._missing = missing_texel(self._agreeing)
         self._masked, self._free_m = unusable.masked, unusable.free_m
         return self._agreeing

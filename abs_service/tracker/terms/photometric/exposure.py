@@ -3,6 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from abs_service.tracker.terms.median import median
+
 #: Values between which a colour is neither noise nor saturated [8-bit levels].
 DARKEST, BRIGHTEST = 16.0, 250.0
 
@@ -39,5 +41,5 @@ def gains(measured: NDArray[np.floating], expected: NDArray[np.floating]) -> NDA
 
 def _gain(ratios: NDArray[np.floating]) -> float:
     """Median of ratios; 1 if it is no exposure."""
-    ratio = float(np.median(ratios))
+    ratio = median(ratios)
     return ratio if LEAST <= ratio <= MOST else 1.0

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.terms.depth.outline.rim import by_side
+from abs_service.tracker.terms.median import median
 
 #: Edges that face one side of the image are judged together if there are so many of them.
 LEAST_OF_A_SIDE = 8
@@ -52,14 +53,14 @@ def motion(away: NDArray[np.float64], directions: NDArray[np.float64], places: N
     rows = np.stack([right, down, down * x - right * y], axis=1)
     (along, across, turn), *_ = np.linalg.lstsq(rows, away)
     left = away - rows @ (along, across, turn)
-    length = float(np.median(np.hypot(along - turn * y, across + turn * x)))
+    length = median(np.hypot(along - turn * y, across + turn * x))
     explained = left @ left < (1 - LEAST_EXPLAINED) * (away @ away)
     return length if explained and length > LEAST_PX else 0.0
 
 
 def _typical(away: NDArray[np.float64]) -> float:
     """Median of the edges of a side; NaN if there are too few."""
-    return float(np.median(away)) if len(away) >= LEAST_OF_A_SIDE else np.nan
+    return median(away) if len(away) >= LEAST_OF_A_SIDE else np.nan
 
 
 def _slide(one: float, other: float) -> float:

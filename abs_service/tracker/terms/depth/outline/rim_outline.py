@@ -187,7 +187,8 @@ class RimOutline:
     def fit(self, surface: Surface) -> RimFit:
         """Agreement of the edges of a population of one with the outline."""
         points = self._locate(surface)[0].astype(np.float64)
-        away = self._inside_at(points)
+        places = project_with_jacobian(self._camera, points)[0]
+        away = self._inside(places)
         known = ~np.isnan(away)
         pixel_m = np.linalg.norm(points - self._camera.center, axis=1) / self._camera.fx
         covered = np.flatnonzero(self.classes == RimClass.OCCLUDED)
@@ -196,19 +197,19 @@ class RimOutline:
             visible=int(np.count_nonzero(known)),
             outside=int(np.count_nonzero(away < -self._far)),
             inside=int(np.count_nonzero(away > self._far)),
-            off_m=self._displacement(surface, points, away, pixel_m) if known.any() else 0.0,
+            off_m=self._displacement(surface, places, away, pixel_m) if known.any() else 0.0,
             occluded=self._hidden + int(np.count_nonzero(~known)),
             covered=len(covered),
             uncovered=int(np.count_nonzero(beyond > 0)),
         )
 
     def _displacement(
-        self, surface: Surface, points: NDArray[np.float64], away: NDArray[np.float64], pixel_m: NDArray[np.float64]
+        self, surface: Surface, places: NDArray[np.float64], away: NDArray[np.float64], pixel_m: NDArray[np.float64]
     ) -> float:
-        """The larger of `displacement` and `motion` [m], of free edges (k, 3) at known distances (k,) [px]."""
+        """The larger of `displacement` and `motion` [m], of free edges at places (k, 2) and distances (k,) [px]."""
         inner = surface.vertices[0].T[self._ends[1]].astype(np.float64)
-        places, known = self._camera.project(points), ~np.isnan(away)
-        directions = (places - self._camera.project(inner))[known]
+        known = ~np.isnan(away)
+        directions = (places - project_with_jacobian(self._camera, inner)[0])[known]
         # Outside, distances are known up to there; how much farther, nothing tells.
         off_m = np.where(np.abs(away) > self._far, np.maximum(away, -self._far), 0.0) * pixel_m
         moved = motion(np.clip(away[known], -self._bound, self._bound), directions, places[known])
@@ -222,8 +223,12 @@ class RimOutline:
 
     def _inside_at(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Distance inside the outline (k,) of points (k, 3) [px]: −∞ far outside, NaN if unknown."""
-        away, last = np.empty(len(points)), np.array([self._camera.width, self._camera.height], np.float64)
-        read(self._inwards, self._corner, project_with_jacobian(self._camera, points)[0], last, away)
+        return self._inside(project_with_jacobian(self._camera, points)[0])
+
+    def _inside(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
+        """`_inside_at` of points at places in the image (k, 2) [px]."""
+        away, last = np.empty(len(places)), np.array([self._camera.width, self._camera.height], np.float64)
+        read(self._inwards, self._corner, places, last, away)
         return away
 
     @property

@@ -1,0 +1,10 @@
+"""Median of a few hundred numbers, of which a frame needs a dozen."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def median(values: NDArray[np.floating]) -> float:
+    """Median of known values (k,), at least one; `numpy.median`, which looks for unknown ones, takes thrice as long."""
+    middle = (values.size - 1) // 2, values.size // 2
+    return float(np.partition(values, middle)[list(middle)].mean())
