@@ -101,12 +101,13 @@ class SparseView:
         self._gradients = gradients
         self._hidden = np.zeros(len(attributes), np.bool_)
         self._rendered: tuple[Surface | None, NDArray[np.float32]] = (None, np.zeros((0, 0), np.float32))
+        self._seen: tuple[Surface, Synthesis] | None = None
         self._optics = *optics(camera), camera.field_radius**2, camera.height, camera.width
         self._sample = gradients.sampler(camera.lens)
 
     def look(self, predicted: Surface) -> None:
         """Marks the vertices that face away or are self-occluded in the predicted mesh."""
-        self._hidden = np.zeros(predicted.vertices.shape[2], np.bool_)
+        self._hidden, self._seen = np.zeros(predicted.vertices.shape[2], np.bool_), None
         self._gradients.look(predicted)
         seen = self.synthesize(predicted)
         stride = self.camera.width + 2
@@ -114,16 +115,23 @@ class SparseView:
         inside = seen.pixel[0] > 0
         front = np.where(inside, self._front(predicted, (row - 1) * inside, (column - 1) * inside), np.float32(np.inf))
         facing = np.einsum("in,in->n", predicted.normals[0], self._sight(predicted)) < 0
-        self._hidden = ~facing | (front < seen.distance[0] - HIDING_M)
+        self._hidden, self._seen = ~facing | (front < seen.distance[0] - HIDING_M), None
 
     def synthesize(self, surface: Surface) -> Synthesis:
-        """Synthesises a population of deformed meshes; occluded vertices are ignored."""
+        """Synthesises a population of deformed meshes; occluded vertices are ignored.
+
+        The result for the last population is cached.
+        """
+        if self._seen is not None and self._seen[0] is surface:
+            return self._seen[1]
         population, _, n = surface.vertices.shape
         pixel = np.empty((population, n), np.int32)
         distance = np.empty((population, n), np.float32)
         steps = self._gradients.steps(population, n)
         self._sample(surface.vertices, surface.normals, self._hidden, *self._optics, pixel, distance, steps)
-        return Synthesis(pixel, distance, self._gradients.at_centers(self._attributes, steps))
+        seen = Synthesis(pixel, distance, self._gradients.at_centers(self._attributes, steps))
+        self._seen = surface, seen
+        return seen
 
     def attribute_gradients(self, surface: Surface) -> NDArray[np.float32]:
         """Gradients for the predicted surface, see `look`."""
