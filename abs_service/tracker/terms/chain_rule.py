@@ -76,27 +76,30 @@ def add_squares(
     M is CᵀC with as many rows C as its rank, by a Cholesky decomposition with pivots, and DᵀMD the square of CD.
     """
     n, k, half, first = group.size, local.shape[2], local.shape[2] // 2, 0
+    rest, row = np.empty((3, 3)), np.empty(3)
     while first < n:
         last = first + 1
         while last < n and group[last] == group[first]:
             last += 1
         left, right, count = np.empty((3 * (last - first), half)), np.empty((3 * (last - first), k - half)), 0
         for v in range(first, last):
-            rest, least = squares[v].copy(), _ROUNDING * (squares[v, 0, 0] + squares[v, 1, 1] + squares[v, 2, 2])
+            rest[:] = squares[v]
+            least = _ROUNDING * (rest[0, 0] + rest[1, 1] + rest[2, 2])
             for _ in range(3):
                 p = 0 if rest[0, 0] >= max(rest[1, 1], rest[2, 2]) else (1 if rest[1, 1] >= rest[2, 2] else 2)
                 if not rest[p, p] > least:
                     break
-                root = np.sqrt(rest[p, p])
-                x, y, z = rest[p, 0] / root, rest[p, 1] / root, rest[p, 2] / root
-                row = x, y, z
+                inverse = 1 / np.sqrt(rest[p, p])
+                for i in range(3):
+                    row[i] = rest[p, i] * inverse
                 for i in range(3):
                     for j in range(3):
                         rest[i, j] -= row[i] * row[j]
+                x, y, z = row
                 for d in range(half):
                     left[count, d] = x * local[v, 0, d] + y * local[v, 1, d] + z * local[v, 2, d]
-                for d in range(half, k):
-                    right[count, d - half] = x * local[v, 0, d] + y * local[v, 1, d] + z * local[v, 2, d]
+                for d in range(k - half):
+                    right[count, d] = x * local[v, 0, half + d] + y * local[v, 1, half + d] + z * local[v, 2, half + d]
                 count += 1
         add_products(left[:count], right[:count], parameters[group[first]], total)
         first = last
