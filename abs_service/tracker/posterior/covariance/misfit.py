@@ -6,9 +6,9 @@ to the same side; noise and an outlier of the sensor stand alone. So the signed 
 and its neighbours. What the squares of these means have beyond three of their deviations by noise, averaged once more,
 is added to the covariance of the vertices in all directions.
 
-Across the surface, this ends with the frame in which distances agree again. Along it, the mesh may have moved
-meanwhile, as over wrinkles that wander, and distances that agree again do not show it. So a misfit of most of the mesh
-fades there, as its mean, because the mesh slides as a whole.
+Across the surface, this ends with the frame in which distances agree again. Along it, the mesh may have moved while most
+of it missed, as over wrinkles that wander, and distances of which more agree again do not show it. So there the variance
+is at least a running mean, over mesh and frames, until hardly any vertex misses.
 """
 
 import numpy as np
@@ -18,8 +18,12 @@ from numpy.typing import NDArray
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.terms.base import INLIER_DEVIATIONS
 
-#: Share of the variance along the surface that is left in the next frame: half of it after 14 frames.
-LASTING = 0.95
+#: Share of the vertices that miss the measurements above which the mesh may slide, and below which it fits again.
+MOST, HARDLY_ANY = 0.5, 0.1
+
+#: Weight of a new frame in the running mean along the surface: if the misfit is larger, as a single frame may be, and if
+#: it is smaller, so that half is left after 14 frames.
+RISE, FALL = 0.2, 0.05
 
 
 class Misfit:
@@ -49,6 +53,8 @@ class Misfit:
         noise = self._squared @ deviation**2
         excess = np.maximum((self._mean @ distance) ** 2 - INLIER_DEVIATIONS**2 * noise, 0.0)
         across = self._mean @ excess
-        of_most = float(across.mean()) if np.median(excess) > 0 else 0.0
-        self._along = max(of_most, LASTING * self._along)
+        missing = np.count_nonzero(excess) / len(excess)
+        of_most = float(across.mean()) if missing > MOST else 0.0
+        kept = self._along if missing > HARDLY_ANY else 0.0
+        self._along = kept + (RISE if of_most > kept else FALL) * (of_most - kept)
         return across, np.maximum(across, self._along)

@@ -4,9 +4,10 @@ Along the surface it lasts beyond the frame that shows it.
 """
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
-from abs_service.tracker.posterior.covariance.misfit import LASTING, Misfit
+from abs_service.tracker.posterior.covariance.misfit import Misfit
 from tests.abs_service.tracker.scenes import sheet
 
 MESH = sheet(21, 31)
@@ -49,17 +50,28 @@ def test_noise_is_no_misfit_and_what_neighbours_share_within_three_deviations_is
     assert 0.5 * 4e-6 < np.mean(shared) < 4e-6
 
 
-def test_a_misfit_of_most_of_the_mesh_fades_along_the_surface_and_ends_across_it_at_once():
+def frames(*shares: float) -> NDArray[np.float64]:
+    """Variances across the surface and along it (frames, 2) [m²], means over the mesh of which such shares are off."""
+    misfit, by_place = Misfit(MESH), np.arange(N) / N
+    return np.array([np.mean(misfit.update(np.where(by_place < share, 2e-3, 0), EXACT), axis=1) for share in shares])
+
+
+def test_a_lasting_misfit_of_most_of_the_mesh_fades_along_the_surface_and_ends_across_it_at_once():
+    found = frames(*[1.0] * 40, *[0.2] * 15)
+    np.testing.assert_allclose(found[:40], 4e-6, rtol=1e-3)
+    assert found[40, 0] < 0.25 * 4e-6 < 0.9 * 4e-6 < found[40, 1]
+    assert 0.4 * 4e-6 < found[54, 1] < 0.6 * 4e-6
+    assert np.all(np.diff(found[40:, 1]) < 0)
+
+
+@pytest.mark.parametrize("shares", [[1.0] * 40 + [0.0], [0.4] * 40 + [0.0], [1.0] * 40 + [0.05]])
+def test_nothing_lasts_once_hardly_any_vertex_misses_nor_from_a_misfit_of_a_part(shares):
+    across, along = frames(*shares)[-1]
+    assert across == along < 0.06 * 4e-6
+
+
+def test_a_single_frame_counts_for_a_fifth():
     misfit = Misfit(MESH)
     misfit.update(np.full(N, 2e-3), EXACT)
-    across, along = misfit.update(EXACT, EXACT)
-    np.testing.assert_array_equal(across, 0)
-    np.testing.assert_allclose(along, LASTING * 4e-6)
-    across, along = misfit.update(np.full(N, 3e-3), EXACT)
-    np.testing.assert_allclose([across, along], 9e-6)
-
-
-def test_a_misfit_of_a_part_ends_with_its_frame():
-    misfit = Misfit(MESH)
-    misfit.update(np.where(np.arange(N) < 0.4 * N, 2e-3, 0.0), EXACT)
-    np.testing.assert_array_equal(misfit.update(EXACT, EXACT), 0)
+    along = misfit.update(np.where(np.arange(N) < 0.2 * N, 2e-3, 0), EXACT)[1]
+    assert along[-1] == pytest.approx(0.2 * 0.95 * 4e-6)
