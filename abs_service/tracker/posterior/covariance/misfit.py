@@ -6,9 +6,9 @@ to the same side; noise and an outlier of the sensor stand alone. So the signed 
 and its neighbours. What the squares of these means have beyond three of their deviations by noise, averaged once more,
 is added to the covariance of the vertices in all directions.
 
-Across the surface, this ends with the frame in which distances agree again. Along it, the mesh may have moved while most
-of it missed, as over wrinkles that wander, and distances of which more agree again do not show it. So there the variance
-is at least a running mean, over mesh and frames, until hardly any vertex misses.
+Across the surface, this ends with the frame in which distances agree again. Along it, the mesh may have moved while
+most of it missed, as over wrinkles that wander, and distances of which more agree again do not show it. So there the
+variance is at least a running mean, over mesh and frames, until hardly any vertex misses.
 """
 
 import numpy as np
@@ -21,8 +21,8 @@ from abs_service.tracker.terms.base import INLIER_DEVIATIONS
 #: Share of the vertices that miss the measurements above which the mesh may slide, and below which it fits again.
 MOST, HARDLY_ANY = 0.5, 0.1
 
-#: Weight of a new frame in the running mean along the surface: if the misfit is larger, as a single frame may be, and if
-#: it is smaller, so that half is left after 14 frames.
+#: Weight of a new frame in the running mean along the surface: if its misfit is larger, as that of a single frame may
+#: be, and if it is smaller, so that half is left after 14 frames.
 RISE, FALL = 0.2, 0.05
 
 
