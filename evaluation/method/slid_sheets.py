@@ -1,11 +1,12 @@
-"""Sequences of a sheet that is slid along itself: by a jump, by little in every frame, or past the end of the view."""
+"""Sequences of a sheet that moves along itself: by jumps, slowly, past the end of the view, or in wrinkles."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from evaluation.scenes.bent_sheet import INTERVAL_S, SheetFrame, SheetScene, SheetState, swing
+from evaluation.scenes.bent_sheet import CAMERA, INTERVAL_S, SheetFrame, SheetScene, SheetState, swing
+from evaluation.scenes.curtain import Curtain
 from evaluation.scenes.surfaces import Wall
 
 #: Frame of the slide, and number of frames after it.
@@ -30,6 +31,12 @@ CUT_STEP_M = 5e-3
 #: First columns of the stripes without return that interrupt a sheet, their width [px], and how far it is drawn under
 #: them in a frame [m].
 STRIPES, STRIPE_PX, STRIPED_STEP_M = (72, 99), 5, 1e-3
+
+#: Where a plate is, its radius [m], and by how much it turns in a frame [rad].
+PLATE_AT_M, PLATE_RADIUS_M, PLATE_STEP = 0.6, 0.09, np.deg2rad(2)
+
+#: Phases of the wrinkles of three curtains in the first frame [rad], and the noise of their distances [m].
+CURTAINS, CURTAIN_SIGMA = (0.0, 2.0, 4.0), 2e-3
 
 #: Distances beyond are no returns in the scene without a background [m].
 FARTHEST_M = 1.3
@@ -81,6 +88,11 @@ class Cut:
         return SheetState(0.0, (0.0, 0.0, 0.0), (right + self.step_m * t / INTERVAL_S, down, 1.0))
 
 
+def spin(t: float) -> SheetState:
+    """A flat sheet that turns in its plane about its centre, on the line of sight."""
+    return SheetState(0.0, (0.0, 0.0, float(PLATE_STEP * t / INTERVAL_S)), (0.0, 0.0, PLATE_AT_M))
+
+
 def sequences(slides_m: Sequence[float]) -> Iterator[SlidSheet]:
     """All sequences, with slides of some lengths [m]."""
     for by in slides_m:
@@ -101,6 +113,9 @@ def sequences(slides_m: Sequence[float]) -> Iterator[SlidSheet]:
     for behind, measured in (("a wall", _as_it_is), ("no return", _without_background)):
         name = f"is drawn under stripes without return, {behind} behind"
         yield name, SheetScene(name, Cut((0.0, 0.0), STRIPED_STEP_M)), lambda frame, of=measured: _striped(of(frame))
+    yield "a round plate turns", SheetScene("plate", spin), _plate
+    for number, begin in enumerate(CURTAINS):
+        yield f"a curtain, {number + 1}", SheetScene("curtain", Curtain(begin), sigma=CURTAIN_SIGMA), _as_it_is
 
 
 def _as_it_is(frame: SheetFrame) -> SheetFrame:
@@ -125,6 +140,13 @@ def _without_corners(frame: SheetFrame) -> SheetFrame:
     for (share, depth), away in zip(BLIND_CORNERS, (down, 1 - down), strict=True):
         blind |= sideways[None] / share + away[:, None] / depth < 1
     return replace(frame, distance=np.where(blind, np.float32(np.nan), frame.distance))
+
+
+def _plate(frame: SheetFrame) -> SheetFrame:
+    """Without what is farther from the centre of the sheet than the plate's radius, on the line of sight."""
+    x, y, _ = np.moveaxis(CAMERA.rays() / CAMERA.rays()[..., 2:] * PLATE_AT_M, -1, 0)
+    on = frame.sheet & (np.hypot(x, y) < PLATE_RADIUS_M)
+    return replace(frame, distance=np.where(on, frame.distance, np.float32(np.nan)), sheet=on)
 
 
 def _striped(frame: SheetFrame) -> SheetFrame:

@@ -14,6 +14,9 @@ and the simulator's ray casting.
   of it or into it by 5 mm a frame. Added on 2026-11-26, before columns without return and in a hexagon's corner.
 - **Stripes.** A flat sheet is drawn along itself by 1 mm a frame under two stripes without return that stay where they
   are, as the shadow of a projector. Added on 2026-11-26, before its first run.
+- **Turns.** A round plate, cut from a flat sheet, turns in its plane by 2° a frame; no edge shows it.
+- **Curtain.** Wrinkles wander along a sheet and swell, before a wall: the material moves less than the surface. Plate
+  and curtain were added on 2026-11-27, after such sequences of another renderer had been wrong and were mended.
 - **Coverage.** Share of the vertices' material points inside their 95 % regions, by quarters of a sequence, of a sheet,
   a rigid board and a hanging strip: with colour and without, with the outline and without.
 
@@ -36,7 +39,7 @@ from abs_service.tracking.plan import ModelSettings
 from evaluation.coverage import inside_region
 from evaluation.experiment import Context, Findings, at_least, at_most
 from evaluation.method.slid_sheets import FRAMES_AFTER, SLIDE_FRAME, sequences
-from evaluation.scenes.bent_sheet import CAMERA, SheetFrame, SheetState, render_frames
+from evaluation.scenes.bent_sheet import CAMERA, SheetFrame, render_frames
 from evaluation.sequences import TrackedSequence, demo_plan, demo_rig, expose, simulate, track
 
 TITLE = "Trust: sheets that slide along themselves, and coverage over time"
@@ -108,18 +111,12 @@ def follow(frames: Sequence[SheetFrame], sigma: float) -> Followed:
     for frame in frames:
         found = tracker.track(frame.distance, time_s=frame.t_ns * 1e-9, mask=frame.sheet)
         if found.mesh_version != version:
-            version, material = found.mesh_version, _material(found.vertices, frame.state)
+            version, material = found.mesh_version, frame.state.material(found.vertices)
         off = np.linalg.norm(found.vertices - frame.state.points(material), axis=1)
         error.append(np.median(off))
         claimed.append(np.sqrt(np.median(np.trace(found.vertex_covariance, axis1=1, axis2=2))))
         tracking.append(found.status == a.Status.TRACKING)
     return Followed(np.array(error), np.array(claimed), np.array(tracking))
-
-
-def _material(vertices: NDArray[np.floating], state: SheetState) -> NDArray[np.float64]:
-    """Places (n, 2) [m] on the sheet of vertices (n, 3) [m] of a mesh that was just made, of a flat sheet."""
-    middle, right, down = state.points(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]))
-    return (vertices - middle) @ np.stack([right - middle, down - middle], axis=1)
 
 
 def run(settings: Settings, context: Context) -> Findings:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 import scipy  # its parts are imported when they are first used
@@ -35,9 +36,21 @@ def places(columns: int, rows: int) -> NDArray[np.float64]:
     return np.stack(np.meshgrid(*sides), axis=-1)
 
 
+class State(Protocol):
+    """A sheet at one state."""
+
+    def points(self, material: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Positions (…, 3) [m] of material points (…, 2) [m]."""
+        ...
+
+    def material(self, points: NDArray[np.floating]) -> NDArray[np.float64]:
+        """Places (n, 2) [m] on the sheet of points on it (n, 3) [m]."""
+        ...
+
+
 @dataclass(frozen=True, slots=True)
 class SheetState:
-    """The sheet at one state.
+    """The sheet, bent to an arc.
 
     Attributes:
         angle: by how much the normals of its two short sides differ [rad]; positive ends bend towards the camera.
@@ -61,9 +74,14 @@ class SheetState:
             bent.shape
         ) + np.array(self.center)
 
+    def material(self, points: NDArray[np.floating]) -> NDArray[np.float64]:
+        """Places (n, 2) [m] of points (n, 3) [m]; of a flat sheet only."""
+        middle, right, down = self.points(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]))
+        return (points - middle) @ np.stack([right - middle, down - middle], axis=1)
+
 
 #: The sheet by the time [s].
-SheetMotion = Callable[[float], SheetState]
+SheetMotion = Callable[[float], State]
 
 
 def swing(t: float) -> SheetState:
@@ -111,7 +129,7 @@ class SheetFrame:
     distance: NDArray[np.float32]
     sheet: NDArray[np.bool_]
     hole: NDArray[np.bool_]
-    state: SheetState
+    state: State
 
     @property
     def cloud(self) -> NDArray[np.float64]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from abs_service.tracking.log.truth import closest_points
 from evaluation.method.peers.competitors import SheetTracker
-from evaluation.scenes.bent_sheet import SIDE, SheetFrame, SheetState, places
+from evaluation.scenes.bent_sheet import SIDE, SheetFrame, State, places
 
 #: A tracker whose vertices are on average farther than this from their material, in so many frames in a row, has lost
 #: the object [m]; five frames are a sixth of a second.
@@ -29,7 +29,7 @@ class TrackedRun:
     """
 
     at: NDArray[np.float64]
-    states: Sequence[SheetState]
+    states: Sequence[State]
     vertices: Sequence[NDArray[np.floating]]
     cpu_ms: NDArray[np.float64]
 

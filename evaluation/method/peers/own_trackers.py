@@ -24,10 +24,9 @@ from abs_service.tracker.synthesis import sparse
 from abs_service.tracking.monitors import loss_monitor
 from abs_service.tracking.plan import OptimizerSettings, Plan
 from abs_service.tracking.session import TrackingSession
-from calib import pose
 from calib.noise.constant import Constant
 from calib.rig import Rig, Sensor
-from evaluation.scenes.bent_sheet import CAMERA, SIDE, SIZE, SheetFrame, SheetState, places
+from evaluation.scenes.bent_sheet import CAMERA, SIDE, SIZE, SheetFrame, State, places
 
 #: What the template adds to the defaults: where nine of ten vertices agree with their measurements as a rule, three of
 #: ten that do not are a loss; the sheet is looked for in the next frame, and stays the same sheet.
@@ -76,7 +75,7 @@ class Template:
     """
 
     setup: Setup
-    first: SheetState
+    first: State
 
     @property
     def board(self) -> tuple[float, float]:
@@ -86,13 +85,17 @@ class Template:
     def build(self, detection: InitialDetection) -> DeformationModel:
         """The model, in the first pose."""
         if self.setup.model == "flexpad":
-            turned = Sheet(pose.from_rotation_vector(self.first.turn, self.first.center), *SIZE)
-            settings = flexpad.Settings()
+            middle, right, down = self.first.points(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]))
+            T_ro = np.eye(4)
+            T_ro[:3] = np.stack(
+                [right - middle, down - middle, np.cross(right - middle, down - middle), middle], axis=1
+            )
+            turned, settings = Sheet(T_ro, *SIZE), flexpad.Settings()
             return flexpad.FlexPad(turned, SIDE**2, settings.minimum_radius_m, settings.bend_deviation)
         return self.setup.surface.of_mesh(replace(template(self.first), pixel_deviation=detection.deviation))
 
 
-def template(state: SheetState) -> Mesh:
+def template(state: State) -> Mesh:
     """The sheet as a mesh of 20 × 20 vertices; its chart is the places on the flat sheet."""
     grid = places(SIDE, SIDE)
     faces = triangles(np.arange(SIDE**2).reshape(SIDE, SIDE)).astype(np.int32)

@@ -7,7 +7,17 @@ import pytest
 
 from evaluation.method.slid_sheets import FARTHEST_M, SLIDE_FRAME, Slide, creep, sequences
 from evaluation.method.trust import Followed, follow
-from evaluation.scenes.bent_sheet import INTERVAL_S, SheetMotion, SheetScene, SheetState, render_frames, swing
+from evaluation.scenes.bent_sheet import (
+    INTERVAL_S,
+    SIZE,
+    SheetMotion,
+    SheetScene,
+    SheetState,
+    places,
+    render_frames,
+    swing,
+)
+from evaluation.scenes.curtain import Curtain
 
 
 def test_a_frame_is_wrong_if_it_claims_tracking_beyond_three_deviations_and_five_millimetres():
@@ -67,3 +77,21 @@ def test_a_sheet_that_is_drawn_under_stripes_without_return_is_not_held_by_them(
     found = follow([measured(frame) for frame in frames], scene.sigma)
     assert found.error_m[-1] < 0.01, name  # it is drawn by 25 mm
     assert found.tracking.all()
+
+
+def test_a_round_plate_is_not_tracked_by_distances_alone():
+    _, scene, measured = next(one for one in sequences(()) if one[0] == "a round plate turns")
+    found = follow([measured(one) for one in render_frames(scene, range(20), np.random.default_rng(5))], scene.sigma)
+    assert found.error_m[-1] > 0.03
+    assert np.count_nonzero(found.tracking) <= 2  # of the first, in which the plate has hardly turned
+    assert not found.wrong.any()
+
+
+def test_a_curtain_keeps_its_lengths_and_its_material_is_found_again():
+    state = Curtain(0.5)(0.3)
+    grid = places(61, 41)
+    points = state.points(grid)
+    steps = np.linalg.norm(np.diff(points, axis=1), axis=-1)
+    np.testing.assert_allclose(steps.sum(axis=1), SIZE[0], rtol=2e-3)  # chords of 5 mm
+    assert np.ptp(points[..., 2]) > 0.02
+    np.testing.assert_allclose(state.material(points[20]), grid[20], atol=1e-3)
