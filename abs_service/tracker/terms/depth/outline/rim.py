@@ -5,9 +5,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from abs_service.pairing.images import Window
 from abs_service.tracker.mesh import Mesh, edges_of
+from abs_service.tracker.synthesis.perspective import project_with_jacobian
 from abs_service.tracker.synthesis.projection import project
+from abs_service.tracker.synthesis.window import corner
+from calib.camera import Camera
 from calib.jit import kernel
+
+#: A vertex of the rim is hidden if the mesh's own surface lies so far in front of it [m].
+HIDDEN_BEHIND_M = 0.01
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -88,6 +95,17 @@ def read(
         column, row = int(np.floor(u - corner[0] + 0.5)), int(np.floor(v - corner[1] + 0.5))
         inside = row >= 0 and row < image.shape[0] and column >= 0 and column < image.shape[1]
         values[k] = image[row, column] if inside else -np.inf
+
+
+def is_behind(
+    camera: Camera, points: NDArray[np.float64], surface: NDArray[np.float32], window: Window
+) -> NDArray[np.bool_]:
+    """True for points (k, 3) [m] that a surface hides, whose distances in a window are known (rows, columns) [m]."""
+    in_front, last = np.empty(len(points)), np.array([camera.width, camera.height], np.float64)
+    first = np.array(corner(window)[::-1], np.float32)
+    read(surface, first, project_with_jacobian(camera, points)[0], last, in_front)
+    behind = in_front < np.linalg.norm(points - camera.center, axis=1) - HIDDEN_BEHIND_M
+    return behind & (in_front > -np.inf)
 
 
 @kernel

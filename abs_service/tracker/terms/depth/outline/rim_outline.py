@@ -18,7 +18,7 @@ from abs_service.tracker.synthesis.window import WHOLE, corner
 from abs_service.tracker.terms.base import RimFit
 from abs_service.tracker.terms.depth.classification.outline_distance import inwards
 from abs_service.tracker.terms.depth.classification.visibility import Visibility
-from abs_service.tracker.terms.depth.outline.rim import Rim, chain, locate, read, shared_by_side
+from abs_service.tracker.terms.depth.outline.rim import Rim, chain, is_behind, locate, read, shared_by_side
 from abs_service.tracker.terms.depth.outline.rim_classes import LARGEST_GAP_STEPS, RimClass, classify_rim
 from abs_service.tracker.terms.depth.outline.rim_cost import FARTHEST, rim_cost
 from abs_service.tracker.terms.depth.outline.rim_motion import displacement, motion
@@ -28,9 +28,6 @@ from calib.camera import Camera
 
 #: Beside the object, pixels nearer to it than so many deviations are not held against a vertex: the rim is there.
 UNJUDGED_DEVIATIONS = 3.0
-
-#: An outer vertex is hidden if the mesh's own surface lies so far in front of it [m].
-HIDDEN_BEHIND_M = 0.01
 
 #: A free edge is off the outline if it is farther from it than so many pixels, and than the bound of its cost.
 OFF_PX = 3.0
@@ -151,7 +148,8 @@ class RimOutline:
             measured = values, gradients, self._inside_at, distance
             self.classes, self._beyond = classify_rim(self._camera, self._rim, predicted, *measured)
         free = np.flatnonzero(self.classes == RimClass.FREE)
-        visible = free[~self._is_hidden(free, expected, predicted, window)]
+        ends = predicted.vertices[0].T[self._rim.outer[free]].astype(np.float64)
+        visible = free[~is_behind(self._camera, ends, expected, window)]
         self._ends = self._rim.outer[visible], self._rim.inner[visible], self._beyond[visible]
         if not self._begun:
             edges = self._locate(predicted)[0].astype(np.float64)
@@ -242,14 +240,3 @@ class RimOutline:
         points, values, gradients = np.empty((1, 3, k), np.float32), np.empty(k), np.empty((k, 2))
         locate(surface.vertices, *self._arguments, points, values, gradients)
         return points[0].T, values, gradients
-
-    def _is_hidden(
-        self, which: NDArray[np.intp], expected: NDArray[np.float32], predicted: Surface, window: Window
-    ) -> NDArray[np.bool_]:
-        """True for outer vertices (m,) that lie behind the predicted surface (rows, columns) [m]."""
-        points = predicted.vertices[0].T[self._rim.outer[which]].astype(np.float64)
-        in_front, last = np.empty(len(which)), np.array([self._camera.width, self._camera.height], np.float64)
-        first = np.array(corner(window)[::-1], np.float32)
-        read(expected, first, project_with_jacobian(self._camera, points)[0], last, in_front)
-        behind = in_front < np.linalg.norm(points - self._camera.center, axis=1) - HIDDEN_BEHIND_M
-        return behind & (in_front > -np.inf)
