@@ -13,7 +13,7 @@ from abs_service.tracker.terms.median import median
 
 #: Share of the widest motion prior's precision that keeps `single_frame_deviation` finite, and number of vertices it
 #: probes.
-KEPT_PRIOR, PROBES = 1e-3, 24
+KEPT_PRIOR, PROBES = 1e-4, 24
 
 
 def single_frame_deviation(optimum: Optimum, prediction: MotionPrediction) -> float:
