@@ -19,6 +19,7 @@ from calib.solve.bundle.adjustment import Adjustment, NotSolvedError
 from calib.solve.bundle.parameters.layout import POSE
 from calib.solve.solution import Solution
 from calib.solve.validation.contradictions import Contradiction, contradictions
+from calib.solve.validation.free_shape import free_shape
 from calib.solve.validation.steadiness import Change, changes_of_place
 
 #: Minimum number of common shots of two sensors.
@@ -102,7 +103,7 @@ def _change(stored: Stored, views: Views, pair: tuple[str, str]) -> PairChange:
         float(np.sqrt(np.sum(np.square(spread)))),
         float(change @ np.linalg.solve(covariance, change)),
         tuple(contradicting),
-        tuple(changes_of_place(solution, NEEDED_PX)),
+        tuple(changes_of_place(free_shape(solution), NEEDED_PX)),
     )
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg
+from scipy import linalg, sparse
 
 from calib.solve.bundle import robust
 from calib.solve.bundle.equations import Equations
@@ -50,8 +50,21 @@ class PoseInformation:
 
 def pose_information(equations: Equations, residuals: NDArray[np.float64]) -> PoseInformation:
     """Information and scores of the poses at the minimum; `residuals` (n,) are normalised."""
-    count = equations.layout.board_start
     jacobian = equations.jacobian(np.zeros(equations.layout.size))
+    return information_of(jacobian, equations.layout.board_start, equations, residuals)
+
+
+def information_of(
+    jacobian: sparse.csr_array, count: int, equations: Equations, residuals: NDArray[np.float64]
+) -> PoseInformation:
+    """Information and scores of the poses on the first parameters, with all board poses eliminated.
+
+    Args:
+        jacobian: of normalised residuals and priors by these parameters, then those of the board poses.
+        count: number of the first parameters.
+        equations: whose residuals these are.
+        residuals: normalised, at the minimum (n,).
+    """
     curvature = (jacobian.T @ jacobian).toarray()
     boards = -linalg.solve(curvature[count:, count:], curvature[count:, :count], assume_a="pos")
     reduced = jacobian @ np.concatenate([np.eye(count), boards])

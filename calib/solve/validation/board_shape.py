@@ -5,7 +5,7 @@ error is follows from one Gauss-Newton step with its column added to the equatio
 the distinct poses (a sandwich estimator, as in `calib.solve.bundle.uncertainty`).
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -92,12 +92,14 @@ def _estimates(solution: Solution, distance: float) -> Iterator[ShapeError]:
     if len(set(clusters.tolist())) < MIN_POSES:
         return
     jacobian = equations.jacobian(np.zeros(equations.layout.size))
-    columns = _columns(equations, jacobian.toarray())
+    columns = shape_columns(equations, jacobian.toarray(), _displacements)
     curvature = (jacobian.T @ jacobian).toarray()
     sizes = np.sqrt(np.diag(curvature))
     curvature = curvature / np.outer(sizes, sizes) + DAMPING * np.eye(len(sizes))
-    taken = linalg.solve(curvature, jacobian.T @ columns / sizes[:, None], assume_a="pos") / sizes[:, None]
-    own = (columns - jacobian @ taken)[: len(clusters)]
+    taken = (
+        linalg.solve(curvature, jacobian[: len(clusters)].T @ columns / sizes[:, None], assume_a="pos") / sizes[:, None]
+    )
+    own = columns - (jacobian @ taken)[: len(clusters)]
     pulls, efficiency = robust.influence(adjustment.residuals[: len(clusters)]), robust.efficiency(adjustment.residuals)
     for number, (column, changes) in enumerate(zip(own.T, taken.T, strict=True)):
         information = np.bincount(clusters, column**2)
@@ -109,21 +111,33 @@ def _estimates(solution: Solution, distance: float) -> Iterator[ShapeError]:
         yield ShapeError(number == 0, size, sigma, _effect(solution, -changes * size, distance))
 
 
-def _columns(equations: Equations, jacobian: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Derivatives of the residuals with respect to a stretch, and three bends of the board (n, 4); see `Equations`."""
+def shape_columns(
+    equations: Equations,
+    jacobian: NDArray[np.float64],
+    displacements: Callable[[NDArray[np.float64]], NDArray[np.float64]],
+) -> NDArray[np.float64]:
+    """Derivatives of the residuals with respect to displacements of the board's points (n, m).
+
+    Args:
+        equations: see there.
+        jacobian: of the equations, dense.
+        displacements: of points of the board (k, 3) in its frame (k, m, 3) [m].
+    """
     layout = equations.layout
-    columns = np.zeros((jacobian.shape[0], 4))
     turns = np.stack([equations.base.boards[shot][:3, :3] for shot in layout.shots])
+    found = []
     for group, rows in zip(equations.groups, equations.slices(), strict=True):
+        count = displacements(np.zeros((1, 3))).shape[1]
         if not isinstance(group.measured, Corners) or group.shots.ndim > 1:
+            found.append(np.zeros((rows.stop - rows.start, count)))
             continue
         shots = group.shots[group.views_of_rows]
         own = jacobian[rows]
         starts = layout.board_start + 6 * shots + 3
         by_place = np.stack([own[np.arange(len(shots)), starts + axis] for axis in range(3)], axis=1)
-        displaced = np.repeat(_displacements(group.measured.points_b), 2, axis=0)
-        columns[rows] = np.einsum("ni,nij,nkj->nk", by_place, turns[shots], displaced)
-    return columns
+        displaced = np.repeat(displacements(group.measured.points_b), 2, axis=0)
+        found.append(np.einsum("ni,nij,nkj->nk", by_place, turns[shots], displaced))
+    return np.concatenate(found)
 
 
 def _displacements(points: NDArray[np.float64]) -> NDArray[np.float64]:

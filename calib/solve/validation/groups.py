@@ -1,31 +1,35 @@
-"""Shots in two groups of which each has a principal point of its own: two cameras, turned, mirrored or cropped images.
+"""Shots in two groups with optics of their own: two cameras, zoomed, turned, mirrored or cropped images.
 
 Such a set is explained by something in between, with small residuals. Each distinct pose pulls the solution with its
-own score (see `calib.solve.bundle.uncertainty`); two groups are those whose principal points, one for each, explain
-these scores best. Errors of lens and board pull the poses apart as well, but not into two heaps.
+own score (see `calib.solve.bundle.uncertainty`); two groups are those whose principal points or focal lengths, one for
+each, explain these scores best. Errors of lens and board pull the poses apart as well, but not into two heaps.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg
 
-from calib.solve.solution import Solution
-from calib.solve.validation.steadiness import HARMLESS, along, disagreement, once, optics
+from calib.solve.validation.free_shape import FreeShape, Members, along, disagreement, once, without
+from calib.solve.validation.steadiness import HARMLESS, from_middle_px, of_focal, optics
 
 #: Minimum number of distinct poses, as any few fall into two groups, and of those in the smaller group.
 POSES, LEAST = 12, 3
 
 #: Minimum gain of a pose in squared deviations, as the poses disagree within their groups. Real sets of one camera have
-#: 2.2 at most, those of two cameras 23 and more, and 4 to 6 those whose principal points are 1.5 % of the width apart.
-GAIN = 3.0
+#: 3.5 at most, 2.0 for focal lengths; where those of a third of the images differ by 3 %, that is 7 to 70.
+GAIN = 4.0
+
+#: Largest ratio of the disagreement about focal lengths within two groups to that of all; even ones have 0.25.
+ALIKE = 1 / 6
+
+#: Focal lengths that are known to no better than this [1] leave principal points open.
+KNOWN = 0.02
 
 #: Random first groups, steps from each, and the largest ratio of what is known of two directions.
 STARTS, STEPS, CONDITION = 30, 40, 1e9
 
 Array = NDArray[np.float64]
-Members = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -35,7 +39,7 @@ class Groups:
     Attributes:
         sensor: its name.
         shots: those of the smaller group.
-        shift: of its principal point from that of the others (2,) [px].
+        shift: of its principal point from that of the others (2,) [px], or, relative, of its focal length (1,).
     """
 
     sensor: str
@@ -44,46 +48,82 @@ class Groups:
 
     def __str__(self) -> str:
         """One sentence for people."""
-        across, down = self.shift.tolist()
         shots = ",".join(map(str, self.shots))
+        advice = f"Look at both groups, and leave one out: --skip {shots}"
+        if len(self.shift) == 1:
+            return (
+                f"{self.sensor}: shots {shots} have a focal length of their own, {self.shift[0]:+.1%} from that of the "
+                "others: were these images zoomed, refocused, cropped or resized? Switch autofocus, zoom and image "
+                f"stabilisation off. {advice}"
+            )
+        across, down = self.shift.tolist()
         return (
             f"{self.sensor}: shots {shots} have a principal point of their own, ({across:+.1f}, {down:+.1f}) px from "
             "that of the others: are these images of two cameras, or were some turned by 180°, mirrored, cropped, "
-            f"stretched or stabilised, or taken in motion? Look at both groups, and leave one out: --skip {shots}"
+            f"stretched or stabilised, or taken in motion? {advice}"
         )
 
 
-def groups(solution: Solution, needed_px: float) -> list[Groups]:
-    """Sensors with two groups of shots, whose principal points are at least half of `needed_px` [px] apart."""
-    found, of_shots = [], solution.adjustment.equations.poses
-    for name, directions in optics(solution):
-        split = _split(solution, directions[:, 1:])
-        if split is None or np.linalg.norm(split[1]) < HARMLESS * needed_px:
+def groups(free: FreeShape, needed_px: float) -> list[Groups]:
+    """Sensors with two groups of shots, whose optics shift corners by at least half of `needed_px` [px]."""
+    found, of_shots = [], free.solution.adjustment.equations.poses
+    sigmas = {each.name: each.sigma / each.value for each in free.solution.parameters if each.name.endswith(".fx")}
+    for name, directions in optics(free):
+        if sigmas[f"{name}.fx"] > KNOWN:
             continue
-        members, shift = split
-        chosen = np.isin(of_shots, np.unique(of_shots)[members])
-        shots = [shot for shot, is_chosen in zip(solution.adjustment.layout.shots, chosen, strict=True) if is_chosen]
-        found.append(Groups(name, tuple(sorted(shots)), shift))
+        # Focal lengths, or principal points: what explains more.
+        split = max((_split(free, part) for part in (directions[:, :1], directions[:, 1:])), key=lambda each: each.gain)
+        scale = 1.0 if len(split.change) == 2 else from_middle_px(free.solution, name)
+        if split.gain < GAIN or split.is_uneven or np.linalg.norm(split.change) * scale < HARMLESS * needed_px:
+            continue
+        chosen = np.isin(of_shots, np.unique(of_shots)[split.members])
+        shots = [
+            shot for shot, is_chosen in zip(free.solution.adjustment.layout.shots, chosen, strict=True) if is_chosen
+        ]
+        # Scores are derivatives of what is predicted minus what is measured.
+        found.append(Groups(name, tuple(sorted(shots)), -split.change))
     return found
 
 
-def _split(solution: Solution, directions: Array) -> tuple[Members, Array] | None:
-    """Smaller group of poses, and its change (m,) along directions (k, m) from the others; None without groups."""
-    information, scores = once(solution.adjustment.pose_information)
+@dataclass(frozen=True)
+class _Split:
+    """The two groups that explain most.
+
+    Attributes:
+        gain: squared deviations that they explain of each pose, as the poses disagree within them; 0 with too few.
+        members: poses of the smaller group (poses,).
+        change: of these from the others, along the directions that were asked for (m,).
+        is_uneven: True if focal lengths differ within the groups, too.
+    """
+
+    gain: float
+    members: Members
+    change: Array
+    is_uneven: bool = False
+
+
+def _split(free: FreeShape, directions: Array) -> _Split:
+    """Groups of poses that differ along directions (k, m)."""
+    information, scores = once(free.poses)
     count = len(scores)
     if count < POSES:
-        return None
-    lower, own, whole = along(directions, information, solution.adjustment.pose_information.prior)
+        return _Split(0.0, np.zeros(count, np.bool_), np.zeros(directions.shape[1]))
+    lower, own, whole = along(directions, information, free.poses.prior)
     pulls = scores @ directions
     random = np.random.default_rng(0)
     first = [random.random(count) < share for share in np.resize((0.25, 0.5, 0.75), STARTS)]
     gain, members, change = max((_grown(guess, own, whole, pulls) for guess in first), key=lambda each: each[0])
-    others = -linalg.solve_triangular(lower, whole[members].sum(axis=0) @ change, lower=True, trans=1)
-    changes = others + np.outer(members, directions @ change)
-    within = scores - (information @ changes[:, :, None])[:, :, 0]
-    if gain < GAIN * count * disagreement(information, within):
-        return None
-    return (members, change) if 2 * members.sum() <= count else (~members, -change)
+    within = without(information, scores, lower, whole, members, directions, change)
+    gain /= count * disagreement(information, within)
+    is_uneven = False
+    if len(change) == 1:
+        before, after = (
+            of_focal(information, free.poses.prior, each, directions[:, 0])[0] for each in (scores, within)
+        )
+        is_uneven = after > ALIKE * before
+    if 2 * members.sum() > count:
+        members, change = ~members, -change
+    return _Split(gain, members, change, is_uneven)
 
 
 def _grown(members: Members, own: Array, whole: Array, pulls: Array) -> tuple[float, Members, Array]:

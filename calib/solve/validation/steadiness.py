@@ -15,10 +15,9 @@ from numpy.typing import NDArray
 from scipy import linalg, stats
 
 from calib import pose
-from calib.solve.bundle import robust
 from calib.solve.bundle.parameters.layout import POSE, turned
-from calib.solve.bundle.uncertainty import PoseInformation
 from calib.solve.solution import Solution
+from calib.solve.validation.free_shape import FreeShape, along, disagreement, once, without
 
 #: Minimum number of distinct poses before and after a change.
 LEAST = 4
@@ -36,8 +35,12 @@ CERTAIN = 1 - 1e-5
 #: Changes below this share of the required accuracy of projections are harmless.
 HARMLESS = 0.5
 
-#: Ratio of the disagreement about the focal length to that about all parameters, from which on it is not steady.
-UNSTEADY = 2.5
+#: Squared deviations that a split explains of each pose, as the poses disagree; real sets have 1.0 at most.
+GAIN = 2.0
+
+#: Ratio of the disagreement about the focal length to that about all parameters, from which on it is not steady: real
+#: sets have 2.1 at most. Beyond the largest deviation the shots say nothing of the focal length.
+UNSTEADY, LARGEST = 3.0, 0.1
 
 #: Share of the information, by which what some poses do not show at all is kept from dividing by zero.
 _UNSEEN = 1e-9
@@ -62,111 +65,86 @@ class Change:
     shift_px: float
 
 
-def changes_of_optics(solution: Solution, needed_px: float) -> list[Change]:
+def changes_of_optics(free: FreeShape, needed_px: float) -> list[Change]:
     """Sensors whose focal length or principal point changed, by at least half of `needed_px` [px] in the image."""
     found = []
-    for name, directions in optics(solution):
-        if split := _split(solution, directions):
+    for name, directions in optics(free):
+        if split := _split(free, directions):
             shot, values = split
-            shift = _rms(values[0] * _from_middle(solution, name) + values[1:])
+            shift = _rms(values[0] * _from_middle(free.solution, name) + values[1:])
             found.append(Change(name, shot, values, shift))
     return [one for one in found if one.shift_px > HARMLESS * needed_px]
 
 
-def changes_of_place(solution: Solution, needed_px: float) -> list[Change]:
+def changes_of_place(free: FreeShape, needed_px: float) -> list[Change]:
     """Sensors that moved relative to the reference, by at least half of `needed_px` [px] in the image."""
-    layout, found = solution.adjustment.layout, []
-    for name, free in layout.free_parameters.items():
-        if free.moves and not free.free_running:
-            directions = np.eye(layout.board_start)[:, layout.columns(name, POSE)]
-            if split := _split(solution, directions):
+    layout, found = free.solution.adjustment.layout, []
+    for name, own in layout.free_parameters.items():
+        if own.moves and not own.free_running:
+            directions = np.eye(free.size)[:, layout.columns(name, POSE)]
+            if split := _split(free, directions):
                 shot, values = split
-                found.append(Change(name, shot, values, _rms(_moved(solution, name, values))))
+                found.append(Change(name, shot, values, _rms(_moved(free.solution, name, values))))
     return [one for one in found if one.shift_px > HARMLESS * needed_px]
 
 
-def focal_scatter(solution: Solution, needed_px: float) -> dict[str, float]:
+def focal_scatter(free: FreeShape, needed_px: float) -> dict[str, float]:
     """Deviation of the focal length from shot to shot [1], of the sensors in which it is not steady."""
     found = {}
-    for name, directions in optics(solution):
-        information, scores = once(solution.adjustment.pose_information)
+    for name, directions in optics(free):
+        information, scores = once(free.poses)
         if len(scores) < 2 * LEAST:
             continue
-        taken = linalg.inv(information.sum(axis=0) + solution.adjustment.pose_information.prior)
-        own = information - information @ taken @ information
-        focal = directions[:, 0]
-        weights = np.maximum(focal @ own @ focal, 1e-12)
-        ratio = float(np.mean((scores @ focal) ** 2 / weights)) / disagreement(own, scores)
-        estimates = scores @ focal / weights
-        middle = np.average(estimates, weights=weights)
-        excess = float(np.sum(weights * (estimates - middle) ** 2)) - (len(scores) - 1)
-        variance = excess / (weights.sum() - float(np.sum(weights**2)) / weights.sum())
-        deviation = float(np.sqrt(max(variance, 0.0)))
-        if ratio > UNSTEADY and deviation * _rms(_from_middle(solution, name)) > HARMLESS * needed_px:
+        ratio, deviation = of_focal(information, free.poses.prior, scores, directions[:, 0])
+        harm = deviation * from_middle_px(free.solution, name)
+        if ratio > UNSTEADY and deviation < LARGEST and harm > HARMLESS * needed_px:
             found[name] = deviation
     return found
 
 
-def disagreement(information: Array, scores: Array) -> float:
-    """Mean squared score of the poses, in deviations that noise alone would have."""
-    found = []
-    for own, score in zip(information, scores, strict=True):
-        sizes, axes = np.linalg.eigh(own)
-        known = sizes > 1e-6 * sizes[-1]
-        found.append(np.mean((axes.T @ score)[known] ** 2 / sizes[known]))
-    return max(float(np.mean(found)), 1.0)
+def of_focal(information: Array, prior: Array, scores: Array, focal: Array) -> tuple[float, float]:
+    """Disagreement of poses about the focal length, a direction (k,), to that about all else, and its deviation [1]."""
+    taken = linalg.inv(information.sum(axis=0) + prior)
+    own = information - information @ taken @ information
+    weights = np.maximum(focal @ own @ focal, 1e-12)
+    ratio = float(np.mean((scores @ focal) ** 2 / weights)) / disagreement(own, scores)
+    estimates = scores @ focal / weights
+    middle = np.average(estimates, weights=weights)
+    excess = float(np.sum(weights * (estimates - middle) ** 2)) - (len(scores) - 1)
+    variance = excess / (weights.sum() - float(np.sum(weights**2)) / weights.sum())
+    return ratio, float(np.sqrt(max(variance, 0.0)))
 
 
-def optics(solution: Solution) -> Iterator[tuple[str, Array]]:
+def optics(free: FreeShape) -> Iterator[tuple[str, Array]]:
     """Sensors with a free focal length, and directions (k, 1 to 3) of it (relative) and of cx and cy."""
-    layout = solution.adjustment.layout
-    for name, free in layout.free_parameters.items():
-        if {"fx", "cx", "cy"} <= {*free.intrinsics}:
-            directions = np.zeros((layout.board_start, 3))
+    layout = free.solution.adjustment.layout
+    for name, own in layout.free_parameters.items():
+        if {"fx", "cx", "cy"} <= {*own.intrinsics}:
+            directions = np.zeros((free.size, 3))
             for key, column in (("fx", 0), ("fy", 0), ("cx", 1), ("cy", 2)):
-                if key in free.intrinsics:
-                    size = getattr(solution.cameras[name], key) if column == 0 else 1.0
+                if key in own.intrinsics:
+                    size = getattr(free.solution.cameras[name], key) if column == 0 else 1.0
                     directions[layout.columns(name, [key]), column] = size
             yield name, directions
 
 
-def once(poses: PoseInformation) -> tuple[Array, Array]:
-    """Information (poses, k, k) and scores (poses, k), as if every distinct pose had been seen once."""
-    return poses.information / poses.repeats[:, None, None], poses.scores / poses.repeats[:, None] / poses.efficiency
-
-
-def along(directions: Array, information: Array, prior: Array) -> tuple[Array, Array, Array]:
-    """Information of poses along directions.
-
-    Args:
-        directions: (k, m).
-        information: of poses (poses, k, k), to which a prior (k, k) adds.
-
-    Returns:
-        Root of all information, lower triangle (k, k); information of each pose along the directions (poses, m, m), and
-        what all poses know of it already, divided by the root (poses, k, m).
-    """
-    lower = linalg.cholesky(information.sum(axis=0) + prior, lower=True)
-    whole = linalg.solve_triangular(lower, np.eye(len(lower)), lower=True) @ information @ directions
-    return lower, directions.T @ information @ directions, whole
-
-
-def _split(solution: Solution, directions: Array) -> tuple[int, Array] | None:
+def _split(free: FreeShape, directions: Array) -> tuple[int, Array] | None:
     """First shot after a change along directions (k, m), and its size (m,); None if there is none."""
-    adjustment = solution.adjustment
+    adjustment = free.solution.adjustment
     numbers, first = np.unique(adjustment.equations.poses, return_index=True)
     if len(numbers) < 2 * LEAST:
         return None
     order = np.argsort(first)
-    information, scores = (part[order] for part in once(adjustment.pose_information))
-    _, own, whole = along(directions, information, adjustment.pose_information.prior)
+    information, scores = (part[order] for part in once(free.poses))
+    lower, own, whole = along(directions, information, free.poses.prior)
     pulls = scores @ directions
     best = _best(own, whole, pulls)
-    noise = robust.covariance_inflation(adjustment.residuals)
-    is_certain = np.any(np.abs(best.size) > DEVIATIONS * np.sqrt(noise) * best.sigma)
-    if not is_certain or best.misfit < noise * stats.chi2.ppf(CERTAIN, directions.shape[1]):
-        return None
     after = np.arange(len(own)) >= best.first
+    is_certain = np.any(np.abs(best.size) > DEVIATIONS * np.sqrt(free.inflation) * best.sigma)
+    least = free.inflation * stats.chi2.ppf(CERTAIN, directions.shape[1])
+    left = disagreement(information, without(information, scores, lower, whole, after, directions, -best.size))
+    if not is_certain or best.misfit < max(least, GAIN * len(own) * left):
+        return None
     unchanged = pulls + after[:, None] * (own @ best.size) - whole.transpose(0, 2, 1) @ whole[after].sum(0) @ best.size
     random, rivals = np.random.default_rng(0), 0
     for _ in range(ORDERS):
@@ -209,6 +187,11 @@ def _from_middle(solution: Solution, name: str) -> Array:
     """Places of all corners of a sensor relative to its principal point (n, 2) [px]."""
     pixels = np.concatenate([view.pixels for view in solution.task.corners if view.sensor == name])
     return pixels - (solution.cameras[name].cx, solution.cameras[name].cy)
+
+
+def from_middle_px(solution: Solution, name: str) -> float:
+    """Root mean square distance of a sensor's corners from its principal point [px]."""
+    return _rms(_from_middle(solution, name))
 
 
 def _moved(solution: Solution, name: str, values: Array) -> Array:

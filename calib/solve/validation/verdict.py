@@ -11,6 +11,7 @@ from calib.solve.validation import projection_uncertainty
 from calib.solve.validation.board_shape import ShapeError, shape_errors
 from calib.solve.validation.contradictions import Contradiction, Scatter, contradictions, scatter
 from calib.solve.validation.cross_validation import Agreement, TooFewToSplitError, cross_validate
+from calib.solve.validation.free_shape import free_shape
 from calib.solve.validation.groups import groups
 from calib.solve.validation.projection_uncertainty import UncertaintyMap
 from calib.solve.validation.steadiness import Change, changes_of_optics, changes_of_place, focal_scatter
@@ -97,17 +98,18 @@ def assess(
 
 def _unlike(solution: Solution, shape: Sequence[ShapeError], needed_px: float) -> tuple[list[str], list[Contradiction]]:
     """Reasons to doubt that all shots show the described board and one rig, and shots that contradict the others."""
-    moved = changes_of_place(solution, needed_px)
+    free = free_shape(solution)
+    moved = changes_of_place(free, needed_px)
     # What happened to a sensor looks as if its image changed, and a wrong board as if every shot had another lens.
-    refocused = [] if moved else changes_of_optics(solution, needed_px)
+    refocused = [] if moved else changes_of_optics(free, needed_px)
     contradicting = [] if moved else contradictions(solution)
     scattered = [] if moved else _scattered(solution, contradicting)
     if scattered:
         contradicting = []  # without a rest, nothing contradicts it
     misprinted = [str(one) for one in shape if one.stretch]
     is_explained = moved or refocused or misprinted or scattered or contradicting
-    mixed = [] if is_explained or shape else groups(solution, needed_px)
-    focus = {} if is_explained or mixed else focal_scatter(solution, needed_px)
+    mixed = [] if is_explained or shape else groups(free, needed_px)
+    focus = {} if is_explained or mixed else focal_scatter(free, needed_px)
     reasons = [*map(_of_place, moved), *(_of_optics(one, len(solution.task.sensors)) for one in refocused)]
     reasons += [*misprinted, *map(str, mixed), *(_of_focus(*each) for each in focus.items())]
     return [*reasons, *scattered, *_contradicting(contradicting)], contradicting

@@ -12,6 +12,7 @@ from calib.board.views import CornerView
 from calib.solve.bundle.tasks import SensorTask, Task
 from calib.solve.calibrate import calibrate
 from calib.solve.solution import Solution
+from calib.solve.validation.free_shape import free_shape
 from calib.solve.validation.steadiness import changes_of_optics, changes_of_place, focal_scatter
 from calib.solve.validation.verdict import assess
 from tests.calib.solve import board_views
@@ -40,13 +41,13 @@ def solved(seen: Sequence[CornerView]) -> Solution:
 
 def test_a_camera_that_stays_as_it_is_has_no_change() -> None:
     solution = solved(views())
-    assert not changes_of_optics(solution, 1.0)
-    assert not focal_scatter(solution, 1.0)
+    assert not changes_of_optics(free_shape(solution), 1.0)
+    assert not focal_scatter(free_shape(solution), 1.0)
 
 
 def test_a_camera_that_focuses_half_way_is_named_with_the_shot() -> None:
     solution = solved(zoomed(lambda shot: 0.985 if shot >= 12 else 1.0))
-    (found,) = changes_of_optics(solution, 1.0)
+    (found,) = changes_of_optics(free_shape(solution), 1.0)
     assert found.sensor == "color"
     assert found.shot == pytest.approx(12, abs=2)
     assert found.values[0] == pytest.approx(-0.015, abs=0.003)
@@ -58,7 +59,7 @@ def test_a_camera_that_focuses_half_way_is_named_with_the_shot() -> None:
 def test_an_image_that_is_shifted_by_a_stabiliser_half_way_is_named() -> None:
     seen = [replace(view, pixels=view.pixels - (5, 3)) if view.shot >= 12 else view for view in views()]
     inside = [view for view in seen if view.pixels.min() > 0]
-    (found,) = changes_of_optics(solved(inside), 1.0)
+    (found,) = changes_of_optics(free_shape(solved(inside)), 1.0)
     assert found.shot == pytest.approx(12, abs=3)
     assert found.values[1:] == pytest.approx([-5, -3], abs=1.5)
 
@@ -67,7 +68,7 @@ def test_a_camera_that_focuses_in_every_shot_is_named() -> None:
     generator = np.random.default_rng(4)
     factors = 0.97 + 0.015 * generator.uniform(-1.7, 1.7, 24)
     solution = solved(zoomed(lambda shot: float(factors[shot])))
-    assert focal_scatter(solution, 1.0)["color"] == pytest.approx(0.015, abs=0.006)
+    assert focal_scatter(free_shape(solution), 1.0)["color"] == pytest.approx(0.015, abs=0.006)
     assert "its focal length differs by ± 1." in assess(solution, 1.0, 1.0).verdict
 
 
@@ -87,13 +88,13 @@ def rig(from_shot: int, degrees: float, millimetres: float) -> Solution:
 
 
 def test_a_rig_that_stays_as_it_is_has_no_change() -> None:
-    assert not changes_of_place(rig(20, 0, 0), 1.0)
+    assert not changes_of_place(free_shape(rig(20, 0, 0)), 1.0)
 
 
 @pytest.mark.parametrize(("shot", "degrees", "millimetres"), [(10, 0.1, 0), (15, 0, 2)])
 def test_a_camera_that_was_bumped_is_named_with_the_shot(shot: int, degrees: float, millimetres: float) -> None:
     solution = rig(shot, degrees, millimetres)
-    (found,) = changes_of_place(solution, 1.0)
+    (found,) = changes_of_place(free_shape(solution), 1.0)
     assert (found.sensor, found.shot) == ("color", shot)
     assert np.degrees(np.linalg.norm(found.values[:3])) == pytest.approx(degrees, abs=0.05)
     assert 1e3 * np.linalg.norm(found.values[3:]) == pytest.approx(millimetres, abs=1)
