@@ -39,7 +39,8 @@ class ShapeError:
     Attributes:
         stretch: True for a length along x relative to y [%], False for a bend from the middle to the edge [mm].
         size, sigma: its estimate and standard deviation.
-        effect_px: how much projections change if it is taken into account, root mean square [px].
+        effect_px: how much projections change if it is taken into account, root mean square, at the distance of the
+            scene or those of the boards where that is most [px].
     """
 
     stretch: bool
@@ -54,11 +55,11 @@ class ShapeError:
             longer, other = ("rows", "columns") if self.size > 0 else ("columns", "rows")
             return (
                 f"the board's {longer} are {abs(self.size):.2f} ± {self.sigma:.2f} % longer than described, compared "
-                f"with its {other}, which changes projections by {self.effect_px:.2g} px"
+                f"with its {other}, which changes projections by up to {self.effect_px:.2g} px"
             )
         return (
             f"a board that is bent by {abs(self.size):.2g} ± {self.sigma:.1g} mm would explain what the corners miss "
-            f"by, and change projections by {self.effect_px:.2g} px"
+            f"by, and change projections by up to {self.effect_px:.2g} px"
         )
 
     def __str__(self) -> str:
@@ -152,12 +153,17 @@ def _displacements(points: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _effect(solution: Solution, changes: NDArray[np.float64], distance: float) -> float:
-    """Largest change of a sensor's projections [px], up to a motion of it."""
+    """Largest change of a sensor's projections [px], up to a motion of it.
+
+    Counted at the ends of the boards' distances, too: in their middle, a motion makes up for most of a bend.
+    """
     layout, found = solution.adjustment.layout, [0.0]
     for name, free in layout.free_parameters.items():
         if free.intrinsics:
-            jacobian = projection_uncertainty.implied_jacobian(solution, name, distance)
-            moved = np.linalg.norm(jacobian @ changes[layout.columns(name, free.intrinsics)], axis=1)
             pixels = projection_uncertainty.grid(solution.cameras[name]).reshape(-1, 2)
-            found.append(projection_uncertainty.rms(moved[supported(solution, name, pixels)]))
+            usable = supported(solution, name, pixels)
+            for each in (distance, *projection_uncertainty.reach(solution, name)):
+                jacobian = projection_uncertainty.implied_jacobian(solution, name, each)
+                moved = np.linalg.norm(jacobian @ changes[layout.columns(name, free.intrinsics)], axis=1)
+                found.append(projection_uncertainty.rms(moved[usable]))
     return float(np.nanmax(found))

@@ -45,6 +45,12 @@ def test_a_print_that_is_scaled_along_one_axis_is_named_with_its_size(stretch: f
     assert assess(solved(stretch), 1.0, 1.0).verdict.startswith(f"Do not trust it yet: the board's {longer} are ")
 
 
+def test_a_bend_that_hardly_shows_in_the_middle_of_the_boards_distances_is_named() -> None:
+    (found,) = shape_errors(solved(bend=0.0002), 1.0, 1.0)
+    assert not found.stretch
+    assert abs(found.size) == pytest.approx(0.2, rel=0.35)
+
+
 def test_a_bent_board_is_named_with_its_size() -> None:
     (found,) = shape_errors(solved(bend=0.002), 1.0, 1.0)
     assert not found.stretch
