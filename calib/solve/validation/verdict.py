@@ -85,13 +85,13 @@ def assess(
     reasons += _outliers(solution, {one.shot for one in contradicting})
     reasons += _uncertain({**images, **pairs}, needed_px)
     reasons += _narrow(solution, images)
-    reasons += [str(one) for one in shape if not one.stretch]  # why the halves may differ, so before them
     try:
         agreements = cross_validate(solution, distance, note)
         reasons += _disagreeing(agreements, needed_px)
     except TooFewToSplitError as error:
         agreements = []
         reasons.append(f"two halves could not be compared: {error}")
+    reasons += [str(one) for one in shape if not one.stretch]  # why the halves may differ
     verdict = f"Do not trust it yet: {reasons[0]}" if reasons else _praise(agreements, images, pairs, distance)
     return Assessment(not reasons, verdict, reasons, contradicting, agreements, images, pairs, distance)
 
