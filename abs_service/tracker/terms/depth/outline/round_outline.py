@@ -5,8 +5,8 @@ distances from an outline of pixels are up to 20° off its normal, and the squar
 a millimetre.
 """
 
+import cv2
 import numpy as np
-import scipy  # its parts are imported when they are first used
 from numpy.typing import NDArray
 
 from abs_service.tracker.synthesis.perspective import project_with_jacobian
@@ -37,8 +37,8 @@ def is_round(
     places, by_place = project_with_jacobian(camera, points)
     column, row = np.floor(places - corner + 0.5).astype(int).T
     inside = (row >= 0) & (row < inwards.shape[0]) & (column >= 0) & (column < inwards.shape[1])
-    slopes = [scipy.ndimage.gaussian_filter(inwards, SMOOTH_PX, order=order) for order in ((0, 1), (1, 0))]
-    normals = np.stack([slope[row[inside], column[inside]] for slope in slopes], axis=1).astype(np.float64)
+    down, right = np.gradient(cv2.GaussianBlur(inwards, (0, 0), SMOOTH_PX))
+    normals = np.stack([slope[row[inside], column[inside]] for slope in (right, down)], axis=1).astype(np.float64)
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(float).tiny)
     cosine = np.vecdot(normals, _turn(points, by_place)[inside])
     known = np.isfinite(cosine)
