@@ -36,7 +36,7 @@ MIN_PIECE = 0.1
 
 
 def grid_mesh(detection: InitialDetection) -> Mesh:
-    """Mesh from a square grid over the object in the image, aligned with the minimum-area rectangle around it.
+    """Mesh from a grid of nearly square cells over the object in the image, along its minimum-area rectangle.
 
     A camera measures one distance per direction, so the grid never folds for any shape of the object. Every vertex
     comes from a plane fitted to the distances around it, so it is less noisy than a pixel; grid points off the object
