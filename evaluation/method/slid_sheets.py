@@ -88,7 +88,7 @@ class Cut:
         return SheetState(0.0, (0.0, 0.0, 0.0), (right + self.step_m * t / INTERVAL_S, down, 1.0))
 
 
-def spin(t: float) -> SheetState:
+def turn_plate(t: float) -> SheetState:
     """A flat sheet that turns in its plane about its centre, on the line of sight."""
     return SheetState(0.0, (0.0, 0.0, float(PLATE_STEP * t / INTERVAL_S)), (0.0, 0.0, PLATE_AT_M))
 
@@ -113,7 +113,7 @@ def sequences(slides_m: Sequence[float]) -> Iterator[SlidSheet]:
     for behind, measured in (("a wall", _as_it_is), ("no return", _without_background)):
         name = f"is drawn under stripes without return, {behind} behind"
         yield name, SheetScene(name, Cut((0.0, 0.0), STRIPED_STEP_M)), lambda frame, of=measured: _striped(of(frame))
-    yield "a round plate turns", SheetScene("plate", spin), _plate
+    yield "a round plate turns", SheetScene("plate", turn_plate), _plate
     for number, begin in enumerate(CURTAINS):
         yield f"a curtain, {number + 1}", SheetScene("curtain", Curtain(begin), sigma=CURTAIN_SIGMA), _as_it_is
 
@@ -144,8 +144,8 @@ def _without_corners(frame: SheetFrame) -> SheetFrame:
 
 def _plate(frame: SheetFrame) -> SheetFrame:
     """Without what is farther from the centre of the sheet than the plate's radius, on the line of sight."""
-    x, y, _ = np.moveaxis(CAMERA.rays() / CAMERA.rays()[..., 2:] * PLATE_AT_M, -1, 0)
-    on = frame.sheet & (np.hypot(x, y) < PLATE_RADIUS_M)
+    x, y, z = np.moveaxis(CAMERA.rays(), -1, 0)
+    on = frame.sheet & (np.hypot(x, y) / z * PLATE_AT_M < PLATE_RADIUS_M)
     return replace(frame, distance=np.where(on, frame.distance, np.float32(np.nan)), sheet=on)
 
 

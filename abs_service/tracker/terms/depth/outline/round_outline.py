@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.synthesis.perspective import project_with_jacobian
 from abs_service.tracker.terms.base import MIN_RIM
+from abs_service.tracker.terms.depth.outline.rim import read
 from calib.camera import Camera
 
 #: An outline is round if the squared cosine between its normals and a turn is smaller, on average. That of an ellipse
@@ -35,14 +36,14 @@ def is_round(
     if len(points) < MIN_RIM:
         return False
     places, by_place = project_with_jacobian(camera, points)
-    column, row = np.floor(places - corner + 0.5).astype(int).T
-    inside = (row >= 0) & (row < inwards.shape[0]) & (column >= 0) & (column < inwards.shape[1])
     down, right = np.gradient(cv2.GaussianBlur(inwards, (0, 0), SMOOTH_PX))
-    normals = np.stack([slope[row[inside], column[inside]] for slope in (right, down)], axis=1).astype(np.float64)
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(float).tiny)
-    cosine = np.vecdot(normals, _turn(points, by_place)[inside])
-    known = np.isfinite(cosine)
-    return bool(np.count_nonzero(known) >= MIN_RIM and np.mean(cosine[known] ** 2) < LARGEST_COSINE_SQUARED)
+    slopes, last = np.empty((2, len(points))), np.array([camera.width, camera.height], np.float64)
+    for image, along in zip((right, down), slopes):
+        read(image, corner, places, last, along)
+    known = np.isfinite(slopes).all(axis=0)
+    normals = slopes[:, known].T / np.maximum(np.linalg.norm(slopes[:, known], axis=0), np.finfo(float).tiny)[:, None]
+    cosine = np.vecdot(normals, _turn(points, by_place)[known])
+    return len(cosine) >= MIN_RIM and float(np.mean(cosine**2)) < LARGEST_COSINE_SQUARED
 
 
 def without_turn(
