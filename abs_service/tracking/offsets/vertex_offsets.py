@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from abs_service.pairing.images import DepthImage, Image
 from abs_service.tracker.mesh import Mesh, edge_lengths
 from abs_service.tracker.models.base import Surface
-from abs_service.tracking.offsets.heights import HeightSensor
+from abs_service.tracking.offsets.heights import INLIER_DEVIATIONS, Heights, HeightSensor
 from abs_service.tracking.offsets.offset_field import OffsetField, change_prior, offset_prior
 from calib.jit import kernel
 from calib.noise.base import DepthNoise
@@ -151,9 +151,18 @@ class LearntOffsets:
         vertices, normals = (values[0].T.astype(np.float64) for values in (surface.vertices, surface.normals))
         heights = self._heights.measure(image, vertices, normals, self.variance)
         gained = np.where(folded(vertices, normals, self._model.mesh.faces), 0, heights.precision)
+        if not self._random_walk:
+            gained = np.where(self._missed(heights), 0, gained)
         total = self._precision + gained
         self._mean = self._mean + gained / total * (self._offset + heights.mean - self._mean)
         self._precision = total
+
+    def _missed(self, heights: Heights) -> NDArray[np.bool_]:
+        """Mask (n,) of the vertices around which the model misses the surface: all heights are off to the same side."""
+        measured = heights.precision > 0
+        noise = np.where(measured, 1 / np.where(measured, heights.precision, 1) + self.variance, 0)
+        total, square = self._field.around(np.where(measured, heights.mean, 0)), self._field.around(noise)
+        return total**2 > INLIER_DEVIATIONS**2 * square
 
     def _infer(self) -> None:
         """The most probable offsets, bounded by the lengths of their vertices' edges."""

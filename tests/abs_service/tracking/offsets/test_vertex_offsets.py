@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from abs_service.tracking.offsets import vertex_offsets
-from abs_service.tracking.offsets.heights import HeightSensor
+from abs_service.tracking.offsets.heights import Heights, HeightSensor
 from abs_service.tracking.offsets.offset_field import change_prior, offset_prior
 from abs_service.tracking.offsets.vertex_offsets import FixedOffsets, LearntOffsets, Settings, folded
 from tests.abs_service.tracking.offsets.offset_sheet import (
@@ -34,6 +34,14 @@ def learnt(model: Flat, random_walk: float = 0.0) -> LearntOffsets:
     return offsets
 
 
+def missed(heights: Heights, variance: np.ndarray) -> np.ndarray:
+    """Vertices around which the heights, added up, are farther off than three deviations of their noise."""
+    noise = [1 / own + other if own else 0.0 for own, other in zip(heights.precision, variance)]
+    around = [{v, *flat_mesh().edges[(flat_mesh().edges == v).any(axis=1)].ravel().tolist()} for v in range(N)]
+    sums = [(sum(heights.mean[k] for k in ring), sum(noise[k] for k in ring)) for ring in around]
+    return np.array([abs(total) > 3 * np.sqrt(square) for total, square in sums])
+
+
 @settings(max_examples=10, deadline=None)
 @given(st.sampled_from([0.0, 1e-4, 1.6e-3]), st.floats(1e-3, 4e-3), st.integers(0, 2**32))
 def test_updates_are_those_of_the_dense_equations(random_walk, size, seed):
@@ -55,9 +63,10 @@ def test_updates_are_those_of_the_dense_equations(random_walk, size, seed):
         vertices, normals = (part[0].T.astype(float) for part in (model.surface.vertices, model.surface.normals))
         precision = precision / (1 + precision * random_walk**2 * FRAME_NS * 1e-9)
         heights = sensor.measure(picture, vertices, normals, offsets.variance)
+        gained = np.where(missed(heights, offsets.variance) & (random_walk == 0), 0, heights.precision)
         offsets.update(picture, model.surface, k * FRAME_NS)
-        mean = (precision * mean + heights.precision * (offset + heights.mean)) / (precision + heights.precision)
-        precision = precision + heights.precision
+        mean = (precision * mean + gained * (offset + heights.mean)) / (precision + gained)
+        precision = precision + gained
         matrix = dense(precision, prior)
         offset = prior.rest + np.linalg.solve(matrix, precision * (mean - prior.rest))
     np.testing.assert_allclose(offsets.variance, np.diag(np.linalg.inv(matrix)), rtol=0.1)
@@ -109,6 +118,16 @@ def test_a_wild_measurement_makes_no_spike(random_walk, beyond, frames, most):
         offsets.update(image(offset_z(wild if k <= frames else 0 * wild)), model.surface, k * FRAME_NS)
         assert np.abs(model.offset).max() < most
     assert np.abs(model.offset).max() < 0.03 * beyond
+
+
+@pytest.mark.parametrize(("random_walk", "least", "most"), [(0.0, 0.0, 1e-4), (1.6e-3, 2e-3, 4e-3)])
+def test_what_a_whole_area_misses_is_the_models_unless_offsets_change(random_walk, least, most):
+    """Each vertex alone is within three deviations, and would take it for noise of the first frame."""
+    generator, model = np.random.default_rng(5), Flat(np.zeros(N), 1e-3)
+    offsets = learnt(model, random_walk)
+    for k in range(1, 60):
+        offsets.update(image(1 - 4e-3 + SIGMA * generator.standard_normal(SHAPE)), model.surface, k * FRAME_NS)
+    assert least <= np.median(model.offset) < most
 
 
 def test_no_offset_moves_farther_than_half_an_edge():
