@@ -8,6 +8,7 @@ import pytest
 from evaluation.method.slid_sheets import FARTHEST_M, SLIDE_FRAME, Slide, creep, sequences
 from evaluation.method.trust import Followed, follow
 from evaluation.scenes.bent_sheet import (
+    CAMERA,
     INTERVAL_S,
     SIZE,
     SheetMotion,
@@ -18,6 +19,7 @@ from evaluation.scenes.bent_sheet import (
     swing,
 )
 from evaluation.scenes.curtain import Curtain
+from evaluation.scenes.rubber import SIGMA, STRAINS, printed_frames, state
 
 
 def test_a_frame_is_wrong_if_it_claims_tracking_beyond_three_deviations_and_five_millimetres():
@@ -95,3 +97,28 @@ def test_a_curtain_keeps_its_lengths_and_its_material_is_found_again():
     np.testing.assert_allclose(steps.sum(axis=1), SIZE[0], rtol=2e-3)  # chords of 5 mm
     assert np.ptp(points[..., 2]) > 0.02
     np.testing.assert_allclose(state.material(points[20]), grid[20], atol=1e-3)
+
+
+def test_a_curtain_is_not_said_to_be_tracked_while_the_mesh_goes_with_its_wrinkles():
+    scene = SheetScene("curtain", Curtain(5.0), sigma=2e-3)  # begins elsewhere than those of the experiment
+    found = follow(render_frames(scene, range(22), np.random.default_rng(7)), scene.sigma)
+    assert found.error_m.max() > 0.01
+    assert not found.wrong.any()
+
+
+def test_rubber_is_at_rest_and_flat_at_first_and_then_stretched_by_some_millimetres():
+    grid = places(31, 21)
+    for strain in STRAINS.values():
+        first, later = state(strain, 0.0), state(strain, 1.0)
+        np.testing.assert_allclose(first.material(first.points(grid).reshape(-1, 3)), grid.reshape(-1, 2), atol=1e-12)
+        moved = np.linalg.norm(later.points(grid) - later.placed.points(grid), axis=-1)
+        assert 3e-3 < moved.max() < 20e-3
+
+
+def test_a_print_that_the_mesh_of_a_paper_cannot_follow_widens_what_is_claimed():
+    shown, pictures = zip(*printed_frames(STRAINS["is sheared"], range(32), np.random.default_rng(8)))
+    found = follow(shown, SIGMA, CAMERA, pictures)
+    assert found.error_m[-1] > 5e-3
+    assert found.tracking[-1]
+    assert not found.wrong.any()
+    assert found.sigma_m[:5].max() < 1e-3  # as long as it keeps its lengths

@@ -34,10 +34,7 @@ class Misfit:
     """
 
     def __init__(self, mesh: Mesh):
-        n, edges = len(mesh.vertices), mesh.edges
-        rows, columns = np.concatenate([edges, edges[:, ::-1], np.tile(np.arange(n)[:, None], 2)]).T
-        ring = scipy.sparse.csr_array((np.ones(len(rows)), (rows, columns)), shape=(n, n))
-        self._mean = scipy.sparse.csr_array(scipy.sparse.diags_array(1 / ring.sum(axis=1)) @ ring)
+        self._mean = mean_around(mesh)
         self._squared = self._mean.power(2)
         self._along = 0.0
 
@@ -58,3 +55,11 @@ class Misfit:
         kept = self._along if missing > HARDLY_ANY else 0.0
         self._along = kept + (RISE if of_most > kept else FALL) * (of_most - kept)
         return across, np.maximum(across, self._along)
+
+
+def mean_around(mesh: Mesh) -> "scipy.sparse.csr_array":
+    """Matrix (n, n) of the mean over each vertex and its neighbours."""
+    n, edges = len(mesh.vertices), mesh.edges
+    rows, columns = np.concatenate([edges, edges[:, ::-1], np.tile(np.arange(n)[:, None], 2)]).T
+    ring = scipy.sparse.csr_array((np.ones(len(rows)), (rows, columns)), shape=(n, n))
+    return scipy.sparse.csr_array(scipy.sparse.diags_array(1 / ring.sum(axis=1)) @ ring)

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.models.base import DeformationModel, SparseJacobian, Surface
+from abs_service.tracker.posterior.covariance.appearance_misfit import AppearanceMisfit, Displacement, NoDisplacement
 from abs_service.tracker.posterior.covariance.first_frame_slide import FirstFrameSlide, NoSlide, Slide
 from abs_service.tracker.posterior.covariance.mesh_noise import MeshNoise
 from abs_service.tracker.posterior.covariance.misfit import Misfit
@@ -31,6 +32,7 @@ class VertexCovariance:
         self._slide: Slide = FirstFrameSlide(model.mesh) if is_new else NoSlide()
         self._mesh_noise = MeshNoise(model)
         self._misfit = Misfit(model.mesh)
+        self._displacement: Displacement = AppearanceMisfit(model.mesh) if len(centers) else NoDisplacement()
         self._began = False
 
     def restart(self) -> None:
@@ -55,6 +57,7 @@ class VertexCovariance:
         by_noise += along_normals(optimum.surface, self._mesh_noise.variance)
         by_noise += self._parallax.covariance(optimum, frame)
         across, along = self._misfit.update(*frame.misfit(optimum.surface))
+        along = along + self._displacement.variance(optimum)
         by_misfit = isotropic(along) + along_normals(optimum.surface, across - along)
         return by_noise + self._slide.beyond(optimum.surface, by_noise) + by_misfit
 

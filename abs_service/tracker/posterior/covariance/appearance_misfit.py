@@ -1,0 +1,122 @@
+"""Misfit of the appearance: where images show material beside its own vertex, the mesh is off by as much.
+
+A sheet of rubber stretches by more than the stretch prior of paper allows. The mesh then keeps its lengths, and colours
+disagree: none of its parameters could be off so that this is within its covariance. But the images tell how far each
+vertex would have to move along the surface. With the residuals r of its images and their derivatives J with respect to
+its position, those of its neighbours included, a step of Lucas and Kanade (IJCAI, 1981) is, along the surface,
+
+    d = −(A + 1 / L²)⁻¹ b,    A = Σ JᵀJ,    b = Σ Jᵀr,
+
+where L is the distance within which gradients hold. Noise alone makes |d|² as large as (A + 1 / L²)⁻¹ A (A + 1 / L²)⁻¹,
+the sum of its diagonal, on average. What |d|² has beyond four times of that is averaged over vertex and neighbours, and
+over the mesh, since a part of it may be plain. The larger of the two is added, one half along either tangent.
+"""
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.tracker.mesh import Mesh
+from abs_service.tracker.posterior.covariance.misfit import mean_around
+from abs_service.tracker.posterior.optimum import Optimum
+from abs_service.tracker.terms import chain_rule
+from abs_service.tracker.terms.linearization import PointLinearization
+from calib.jit import kernel
+
+#: Squared length of a displacement, in mean squared lengths by noise, that noise exceeds once in e⁴ = 55 times.
+NOT_BY_CHANCE = 4.0
+
+#: Distance within which gradients hold, in typical distances between neighbouring vertices.
+REACH = 2.0
+
+
+class Displacement(Protocol):
+    """Displacement of the vertices along the surface that images show."""
+
+    def variance(self, optimum: Optimum) -> NDArray[np.float64]:
+        """Variance (n,) [m²] of the vertices of an estimate, in either direction along the surface."""
+        ...
+
+
+class NoDisplacement:
+    """That of a rig without images of the appearance."""
+
+    def variance(self, optimum: Optimum) -> NDArray[np.float64]:
+        """Zeros (n,)."""
+        return np.zeros(optimum.surface.vertices.shape[2])
+
+
+class AppearanceMisfit:
+    """That of a mesh whose appearance images show.
+
+    Args:
+        mesh: the mesh.
+    """
+
+    def __init__(self, mesh: Mesh):
+        self._mean = mean_around(mesh)
+        self._least_precision = len(mesh.vertices) / (mesh.area * REACH**2)
+
+    def variance(self, optimum: Optimum) -> NDArray[np.float64]:
+        """Variance (n,) [m²] of the vertices of an estimate; samples between the vertices show none."""
+        near, n = optimum.linearized, optimum.surface.vertices.shape[2]
+        squares, gradient = np.zeros((n, 3, 3)), np.zeros((n, 3, 1))
+        for part in near.sensed_at(optimum.theta):
+            if isinstance(part, PointLinearization) and part.sparse_jacobian is near.sparse_jacobian:
+                chain_rule.sum_squares(part.rows, part.points, np.ones(len(part.points)), squares)
+                chain_rule.sum_at_points(part.rows, part.points, part.residual[:, None], gradient)
+        excess, ring = np.empty(n), (self._mean.indptr, self._mean.indices)
+        beyond_noise(*ring, squares, gradient, optimum.surface.normals[0], self._least_precision, excess)
+        np.maximum(excess, 0.0, out=excess)
+        return 0.5 * np.maximum(self._mean @ excess, excess.mean())
+
+
+@kernel
+def beyond_noise(
+    start: NDArray[np.int32],
+    around: NDArray[np.int32],
+    squares: NDArray[np.float64],
+    gradient: NDArray[np.float64],
+    normals: NDArray[np.float32],
+    least_precision: float,
+    excess: NDArray[np.float64],
+) -> None:
+    """|d|² less `NOT_BY_CHANCE` times that by noise (n,) [m²], into `excess`.
+
+    Args:
+        start, around: first place (n + 1,) of every vertex in the list of those around it, itself included (k,).
+        squares, gradient: JᵀJ (n, 3, 3) [1/m²] and Jᵀr (n, 3, 1) [1/m] of every vertex.
+        normals: of the surface (3, n).
+        least_precision: 1 / L² [1/m²].
+        excess: result.
+    """
+    for v in range(excess.size):
+        x, y, z = np.float64(normals[0, v]), np.float64(normals[1, v]), np.float64(normals[2, v])
+        if abs(z) > 0.5:  # normal × (0, 1, 0), or × (0, 0, 1) of one that lies across
+            scale = 1 / np.sqrt(x * x + z * z)
+            tx, ty, tz = -z * scale, 0.0, x * scale
+        else:
+            scale = 1 / max(np.sqrt(x * x + y * y), 1e-12)
+            tx, ty, tz = y * scale, -x * scale, 0.0
+        ux, uy, uz = y * tz - z * ty, z * tx - x * tz, x * ty - y * tx
+        a, b, c, f, g = least_precision, 0.0, least_precision, 0.0, 0.0
+        for k in range(start[v], start[v + 1]):
+            square, force = squares[around[k]], gradient[around[k]]
+            px = square[0, 0] * tx + square[0, 1] * ty + square[0, 2] * tz
+            py = square[1, 0] * tx + square[1, 1] * ty + square[1, 2] * tz
+            pz = square[2, 0] * tx + square[2, 1] * ty + square[2, 2] * tz
+            a += tx * px + ty * py + tz * pz
+            b += ux * px + uy * py + uz * pz
+            c += (
+                ux * (square[0, 0] * ux + 2 * square[0, 1] * uy + 2 * square[0, 2] * uz)
+                + uy * (square[1, 1] * uy + 2 * square[1, 2] * uz)
+                + uz * square[2, 2] * uz
+            )
+            f += tx * force[0, 0] + ty * force[1, 0] + tz * force[2, 0]
+            g += ux * force[0, 0] + uy * force[1, 0] + uz * force[2, 0]
+        determinant = a * c - b * b
+        one, other = c * f - b * g, a * g - b * f
+        # With G = (A + 1 / L²)⁻¹, the trace of G A G is that of G − G² / L².
+        noise = (a + c) / determinant - least_precision * (a * a + 2 * b * b + c * c) / determinant**2
+        excess[v] = (one * one + other * other) / determinant**2 - NOT_BY_CHANCE * noise
