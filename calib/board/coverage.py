@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from calib.board import mirrored
 from calib.board.board_pose_features import BoardPose, board_pose_features
-from calib.board.distinct import distinct_poses, is_repeated
+from calib.board.distinct import distinct_poses, is_repeated, same_images
 from calib.board.views import CornerView
 
 #: Minimum number of distinct poses before a sensor, and number for a reliable calibration.
@@ -39,6 +39,10 @@ class ViewsAlikeError(ValueError):
     """All views of a sensor show the board in nearly the same pose."""
 
 
+class SameImagesError(ValueError):
+    """The images of one sensor, given for two."""
+
+
 @dataclass(frozen=True, slots=True)
 class MissingView:
     """Instruction for a missing view.
@@ -56,7 +60,7 @@ def check(views: Iterable[CornerView]) -> None:
     """Checks a set of views for a minimum of number and variety.
 
     Raises:
-        TooFewViewsError, ViewsAlikeError, MirroredSensorError: names the sensor and the remedy.
+        TooFewViewsError, ViewsAlikeError, MirroredSensorError, SameImagesError: names the sensor and the remedy.
     """
     views = list(views)
     for sensor, seen in by_sensor(views).items():
@@ -72,6 +76,8 @@ def check(views: Iterable[CornerView]) -> None:
                 f"pose{'s' * (count != 1)} of the board, but a calibration needs {MIN_VIEWS} at the very least and "
                 f"{SUFFICIENT_VIEWS} to be reliable"
             )
+    for first, second in same_images(views):
+        raise SameImagesError(f"{first} and {second} have the same images: give each sensor its own images")
     mirrored.check(views)
 
 

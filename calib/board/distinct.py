@@ -6,6 +6,7 @@ that place: however many they are, they confirm nothing.
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,6 +68,19 @@ def counts_of(views: Sequence[CornerView | PlaneView], poses: Mapping[int, int])
     for view in views:
         seen.setdefault(view.sensor, set()).add(poses[view.shot])
     return {sensor: len(each) for sensor, each in seen.items()}
+
+
+def same_images(views: Iterable[CornerView]) -> list[tuple[str, str]]:
+    """Pairs of sensors with the same corners, to the last digit, in every shot that both saw."""
+    seen: dict[str, dict[int, CornerView]] = {}
+    for view in views:
+        seen.setdefault(view.sensor, {})[view.shot] = view
+    found = []
+    for first, second in combinations(seen, 2):
+        both = seen[first].keys() & seen[second].keys()
+        if both and all(np.array_equal(seen[first][shot].pixels, seen[second][shot].pixels) for shot in both):
+            found.append((first, second))
+    return found
 
 
 def _repeats(shot: Mapping[str, _Posed], other: Mapping[str, _Posed]) -> bool:

@@ -12,6 +12,7 @@ from itertools import combinations, product
 import numpy as np
 
 from calib import pose
+from calib.board.distinct import same_images
 from calib.board.views import CornerView
 from calib.calibration_check.alone import corner_fit
 from calib.calibration_check.stored import Stored, Views
@@ -76,7 +77,7 @@ def find(stored: Stored, corners: Sequence[CornerView]) -> list[Mistake]:
     least = LEAST_SHARE * max((stored.sensors[name].camera.width for name in names), default=0)
     if given <= least:
         return []
-    if same := [pair for pair in combinations(names, 2) if _are_the_same(shots, pair)]:
+    if same := same_images(view for views in shots for view in views):
         return [Mistake(Kind.REPEATED, pair, given, float("nan")) for pair in same]
     found: dict[tuple[Kind, tuple[str, ...]], float] = {}
     for key, undone in _undone(stored, shots, names):
@@ -131,13 +132,6 @@ def _miss(stored: Stored, shots: Shots) -> float:
         ]
         found.append(np.sqrt(np.min(np.nan_to_num(squares, nan=np.inf), initial=np.inf)))
     return float(np.median(found)) if found else 0.0
-
-
-def _are_the_same(shots: Shots, pair: tuple[str, str]) -> bool:
-    """True if two sensors have the same corners, to the last digit, in every shot that both saw."""
-    both = [[view for view in views if view.sensor in pair] for views in shots]
-    both = [views for views in both if len(views) == len(pair)]
-    return bool(both) and all(np.array_equal(one.pixels, other.pixels) for one, other in both)
 
 
 def _undone(stored: Stored, shots: Shots, names: Sequence[str]) -> Iterator[tuple[tuple[Kind, tuple[str, ...]], Shots]]:

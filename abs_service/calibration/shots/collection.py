@@ -68,6 +68,11 @@ class Collector:
         missing = [sensor for sensor in self.sizes if not any(view.sensor == sensor for view in self.views)]
         try:
             coverage.check(self.views)
-        except (coverage.TooFewViewsError, coverage.ViewsAlikeError, MirroredSensorError) as error:
+        except (
+            coverage.SameImagesError,
+            coverage.TooFewViewsError,
+            coverage.ViewsAlikeError,
+            MirroredSensorError,
+        ) as error:
             return str(error)
         return f"{missing[0]} has not seen the board" if missing else ""

@@ -52,7 +52,7 @@ def material(arguments: argparse.Namespace) -> Material:
         SolveOptionError, SkipError: incompatible options.
         UnusableImagesError: no board, or too few views; the message says why.
         TargetFileError, ShotsError, RecordingError, ConfigError: files that cannot be used.
-        ViewsAlikeError, MirroredSensorError: the views do not allow a calibration.
+        ViewsAlikeError, MirroredSensorError, SameImagesError: the views do not allow a calibration.
     """
     if arguments.out.exists():
         raise SolveOptionError(f"--out {arguments.out}: exists already; choose another name or remove it")

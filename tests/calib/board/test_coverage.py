@@ -103,7 +103,7 @@ def rolled(sensor: str, mirror: bool, roll: float = 0.5) -> list[CornerView]:
     found = []
     for n in range(8):
         one = view((0.3 * np.sin(n), 0.3 * np.cos(n), roll * np.sin(2 * n)), 0.7, shot=n, sensor=sensor)
-        pixels = one.pixels * (-1, 1) + (639, 0) if mirror else one.pixels
+        pixels = one.pixels * (-1, 1) + (639, 0) if mirror else one.pixels + (sensor == "tof")  # of another place
         lattice = pixels.reshape(6, 9, 2)
         found.append(replace(one, pixels=(lattice[:, ::-1] if mirror else lattice).reshape(-1, 2)))
     return found
@@ -115,6 +115,12 @@ def test_a_sensor_whose_images_are_mirrored_is_noticed() -> None:
         coverage.check([*rolled("color", mirror=False), *rolled("tof", mirror=True)])
     # A board that was never rolled does not show it.
     coverage.check([*rolled("color", mirror=False, roll=0.02), *rolled("tof", mirror=True, roll=0.02)])
+
+
+def test_images_of_one_sensor_that_are_given_for_two_are_noticed() -> None:
+    views = [*many(), *(replace(one, sensor="tof") for one in many())]
+    with pytest.raises(coverage.SameImagesError, match="color and tof have the same images"):
+        coverage.check(views)
 
 
 def test_the_simulated_board_is_shown_in_all_poses_that_are_needed() -> None:
