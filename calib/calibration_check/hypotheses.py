@@ -14,8 +14,8 @@ from calib.solve.bundle.parameters.layout import DEPTH_TERMS, POSE
 #: Deviations of what happens to a sensor: moved by 0.1 rad and 0.1 m, distances changed by 5 cm and 5 %.
 PRIOR: Mapping[str, float] = dict(zip((*POSE, *DEPTH_TERMS), (0.1,) * 6 + (0.05, 0.05), strict=True))
 
-#: Deviation of a board's size from its description.
-BOARD_PRIOR = 0.05
+#: Deviations of a board's size from its description, and of a focal length from the stored one.
+BOARD_PRIOR, FOCAL_PRIOR = 0.05, 0.05
 
 
 class Kind(Enum):
@@ -27,6 +27,7 @@ class Kind(Enum):
     SCALE = "depth scale"
     OFFSET = "depth offset"
     BOTH = "depth scale and offset"
+    FOCAL = "focal length"
     BOARD = "size of the board"
     SEVERAL = "several changes"
 
@@ -59,12 +60,12 @@ class Hypothesis:
     def contains(self, other: "Hypothesis") -> bool:
         """True if it allows all changes of another one, and more."""
         own, less = ({column for row in each.columns for column in row} for each in (self, other))
-        return less < own and self.kind != Kind.BOARD
+        return (less < own or self.kind == Kind.SEVERAL) and self.kind not in (Kind.BOARD, other.kind)
 
     def units(self, names: Sequence[str]) -> NDArray[np.float64]:
         """Prior deviations of its parameters (k,) [rad, m, 1]."""
-        if self.kind == Kind.BOARD:
-            return np.array([BOARD_PRIOR])
+        if self.factors:
+            return np.array([FOCAL_PRIOR if self.kind == Kind.FOCAL else BOARD_PRIOR])
         return np.array([PRIOR[names[column].rpartition(".")[2]] for own in self.columns[:1] for column in own])
 
     def basis(self, names: Sequence[str]) -> NDArray[np.float64]:
@@ -84,7 +85,8 @@ def hypotheses(stored: Stored, names: Sequence[str]) -> list[Hypothesis]:
 
     Args:
         stored: the calibration.
-        names: of the changes that the views can show, such as `tof.x`; intrinsics among them do not change.
+        names: of the changes that the views can show, such as `tof.x`; of intrinsics among them, only both focal
+            lengths change, by one factor.
     """
     sensors = [*dict.fromkeys(name.rpartition(".")[0] for name in names)]
     found = [Hypothesis(Kind.UNCHANGED)]
@@ -96,6 +98,10 @@ def hypotheses(stored: Stored, names: Sequence[str]) -> list[Hypothesis]:
     for name in sensors:
         if f"{name}.depth_scale" in names:
             found += [_hypothesis(kind, (name,), terms, names) for kind, terms in TERMS.items()]
+        if {f"{name}.fx", f"{name}.fy"} <= {*names}:
+            camera = stored.sensors[name].camera
+            both = _hypothesis(Kind.FOCAL, (name,), ("fx", "fy"), names).columns[0]
+            found.append(Hypothesis(Kind.FOCAL, (name,), tuple((one,) for one in both), (camera.fx, camera.fy)))
     every = tuple(column for column, name in enumerate(names) if name.rpartition(".")[2] in PRIOR)
     return [*found, Hypothesis(Kind.SEVERAL, tuple(sensors), (every,))]
 

@@ -131,6 +131,20 @@ def test_an_aligned_depth_image_that_is_too_long_has_not_moved() -> None:
     assert found.chosen.values[0] == pytest.approx(0.01, abs=5e-4)
 
 
+def test_a_camera_that_was_zoomed_has_not_moved() -> None:
+    heads = three_heads()
+    before = stored(heads)
+    assert before.covariance is not None
+    names = (*before.names, "color.fx", "color.fy")
+    before = Stored(before.sensors, names, np.diag([*np.diag(before.covariance), 0.04, 0.04]))
+    color = heads["color"].camera
+    heads["color"] = replace(heads["color"], camera=replace(color, fx=1.005 * color.fx, fy=1.005 * color.fy))
+    found = compare(before, seen(heads, 7))
+    assert named(found) == (Kind.FOCAL, ("color",))
+    assert found.rivals == []
+    assert found.chosen.values[0] == pytest.approx(0.005, abs=5e-4)
+
+
 def test_shots_at_one_distance_cannot_tell_a_scale_from_an_offset() -> None:
     random = np.random.default_rng(0)
     heads = aligned()

@@ -21,6 +21,7 @@ _ADVICE = {
     Kind.MOVED: "Put it back and fix it, or calibrate the rig again.",
     Kind.ALIGNMENT: "Calibrate the device again, or use its depth image before alignment.",
     Kind.BOARD: "Measure the squares with a ruler, and correct the description of the board.",
+    Kind.FOCAL: "Was it refocused, zoomed or set to another mode? If so, calibrate its intrinsics again.",
     Kind.SEVERAL: "Calibrate the rig again.",
 }
 _WARM = "Let it warm up for half an hour and look again; if it stays, calibrate its depth terms."
@@ -169,14 +170,18 @@ def _said(explanation: Explanation) -> str:
     if kind in TERMS:
         pairs = zip(TERMS[kind], values.tolist(), explanation.sigmas.tolist(), strict=True)
         return f"measures distances wrongly, by {' and '.join(_term(*each) for each in pairs)}"
+    if kind == Kind.FOCAL:
+        return f"has another focal length, by {_percent(values[0], explanation.sigmas[0])}"
     verb = "is aligned wrongly" if kind == Kind.ALIGNMENT else "has moved"
     return f"{verb}, by {np.linalg.norm(values[3:]) * 1e3:.1f} mm and {np.rad2deg(np.linalg.norm(values[:3])):.2f}°"
 
 
 def _term(name: str, value: float, sigma: float) -> str:
-    if name == "depth_scale":
-        return f"{100 * value:+.2f} ± {100 * sigma:.2f} %"
-    return f"{1e3 * value:+.1f} ± {1e3 * sigma:.1f} mm"
+    return _percent(value, sigma) if name == "depth_scale" else f"{1e3 * value:+.1f} ± {1e3 * sigma:.1f} mm"
+
+
+def _percent(value: float, sigma: float) -> str:
+    return f"{100 * value:+.2f} ± {100 * sigma:.2f} %"
 
 
 def _advice(every: Sequence[Explanation], reaches: Mapping[str, Reach]) -> str:
@@ -189,7 +194,9 @@ def _advice(every: Sequence[Explanation], reaches: Mapping[str, Reach]) -> str:
         return _ADVICE.get(every[0].hypothesis.kind, _WARM)
     if all(each.hypothesis.kind == Kind.MOVED for each in every):
         return "Calibrate the rig again. A third sensor that sees the board at the same time could tell."
-    sensor = next(each.hypothesis.sensors[0] for each in every if each.hypothesis.kind in TERMS)
+    sensor = next((each.hypothesis.sensors[0] for each in every if each.hypothesis.kind in TERMS), "")
+    if not sensor:
+        return "To tell, show the board to all sensors much nearer and much further, and tilted every way."
     reach = reaches[sensor]
     board = f"the board much nearer than {reach.near:.2f} m and much further than {reach.far:.2f} m"
     if all(each.hypothesis.kind in TERMS for each in every):

@@ -201,9 +201,9 @@ def _of_pair(change: PairChange, comparison: Comparison) -> Verdict:
 
 
 def _is_explained(change: PairChange, found: Verification) -> bool:
-    """True if a pair contradicts itself because the board has another size, or the distances of one changed."""
+    """True if a pair disagrees because the board has another size, or the distances or focal length of one changed."""
     chosen = found.comparison.chosen.hypothesis
-    explains = chosen.kind in TERMS and bool({*chosen.sensors} & {change.first, change.second})
+    explains = chosen.kind in (*TERMS, Kind.FOCAL) and bool({*chosen.sensors} & {change.first, change.second})
     return change.is_significant and (explains or chosen.kind == Kind.BOARD)
 
 

@@ -6,12 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from abs_service.calibration.cameras import verification
+from abs_service.calibration.cameras import causes, verification
 from abs_service.calibration.files import rig_file
 from abs_service.calibration.shots.corner_extraction import BoardObservations
 from abs_service.report.content import Level, Report
 from abs_service.report.provenance import Provenance
 from calib import pose
+from calib.calibration_check.comparison import Comparison, Explanation
+from calib.calibration_check.hypotheses import Hypothesis, Kind
 from calib.pose import Pose
 from tests.calib.solve.board_views import Head, look, random_boards, three_heads
 
@@ -62,6 +64,18 @@ def test_an_aligned_depth_image_that_is_too_long_is_said_to_measure_wrongly() ->
     assert worst.advice.startswith("Measure the squares with a ruler")
     assert "warm up" in worst.advice
     assert not any("moved" in one.text or "no longer stand" in one.text for one in report.verdicts)
+
+
+def test_a_camera_that_was_zoomed_is_said_to_have_another_focal_length() -> None:
+    focal = Hypothesis(Kind.FOCAL, ("color",), ((0,), (1,)), (920.0, 919.0))
+    zoomed = Explanation(focal, np.array([0.005]), np.array([2e-4]), np.zeros(3), 0.0)
+    (said,) = causes.verdicts(Comparison((zoomed,), 0.0, 0.0, 1.0), Level.DOUBTFUL, {})
+    assert (said.about, said.text) == ("color", "has another focal length, by +0.50 ± 0.02 %.")
+    assert said.advice.startswith("Was it refocused, zoomed")
+    moved = Explanation(Hypothesis(Kind.MOVED, ("color",)), np.zeros(6), np.ones(6), np.zeros(3), 0.0)
+    (said,) = causes.verdicts(Comparison((zoomed, moved), 0.0, 0.0, 1.0), Level.DOUBTFUL, {})
+    assert "These shots cannot tell that from this: color has moved" in said.text
+    assert said.advice == "To tell, show the board to all sensors much nearer and much further, and tilted every way."
 
 
 def test_what_cannot_be_told_apart_is_said_with_the_shots_that_would() -> None:
