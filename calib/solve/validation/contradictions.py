@@ -19,14 +19,16 @@ from calib.solve.start.start import fit_camera
 
 #: Corners of a view that contradict: their median residual in deviations. Normal errors have 1.18, …
 _DEVIATIONS = 3.0
-#: … and where residuals are this small they harm nothing [px].
+#: … and where residuals are this small they harm nothing, or the lens fits nearly if another would leave so little
+#: [px].
 _HARMLESS_PX = 0.5
 #: Fraction of outliers among the distances of a view that contradicts.
 _OUTLIERS = 0.5
 #: Above this fraction of contradicting shots there is no rest that they contradict.
 _MAX_SHARE = 1 / 3
-#: Images of a shot that fit this many times better alone, and miss by this much together, are of different moments.
-_BETTER, _SCATTERS_PX = 3.0, 0.5
+#: Images of a shot that fit this many times better alone are of different moments. If they miss by this much together,
+#: that is an objection of its own; by less, it may be why the shots disagree.
+_BETTER, SCATTERS_PX = 3.0, 0.5
 #: Exchanged images put the board in the same place again to this share of what they are apart.
 _SAME = 0.2
 
@@ -79,23 +81,41 @@ class Scatter:
     apart_px: float
     alone_px: float
 
+    def __str__(self) -> str:
+        """The finding, and what to do."""
+        return (
+            f"{' and '.join(self.sensors)}: each fits its own corners to {self.alone_px:.2g} px, but together they "
+            f"miss by {self.apart_px:.2g} px in most shots: the images of a shot were not taken at the same moment, or "
+            "a sensor was moved or zoomed between them; hold the board still in every shot, or synchronise the sensors"
+        )
 
-def contradictions(solution: Solution) -> list[Contradiction]:
-    """Shots that contradict the rest, the worst first; empty if they are too many to have a rest."""
+
+def contradictions(solution: Solution, left: Mapping[tuple[str, int], float] = {}) -> list[Contradiction]:
+    """Shots that contradict the rest, the worst first; empty if they are too many to have a rest.
+
+    Args:
+        solution: from all shots.
+        left: what corners miss by if board and lenses may have any smooth shape, by sensor and shot, where known [px].
+    """
     boards = _boards(solution)
-    found = [one for shot in solution.task.shots if (one := _of_shot(solution, shot, boards)) is not None]
+    found = [one for shot in solution.task.shots if (one := _of_shot(solution, shot, boards, left)) is not None]
     if len(found) > _MAX_SHARE * len(solution.task.shots):
         return []
     return sorted(found, key=lambda one: -one.miss / one.median)
 
 
-def scatter(solution: Solution) -> list[Scatter]:
-    """That images of most shots were taken at different moments; empty, or one."""
+def scatter(solution: Solution, least_px: float = SCATTERS_PX) -> list[Scatter]:
+    """That images of most shots were taken at different moments; empty, or one.
+
+    Args:
+        solution: from all shots.
+        least_px: what they miss by together, to be named [px].
+    """
     together = [shot for shot in solution.task.shots if len(_seeing(solution, shot)) > 1]
     corners = [view for view in solution.views if view.of == "corners" and view.shot in together]
     worst = [max(view.rms for view in corners if view.shot == shot) for shot in together]
     joint = float(np.median(worst)) if worst else 0.0
-    if joint < _SCATTERS_PX:
+    if not worst or joint < least_px:
         return []
     alone = [fitted for name in solution.task.sensors for fitted in _alone(solution, name, together)]
     if not alone or joint < _BETTER * float(np.median(alone)):
@@ -119,7 +139,10 @@ def _alone(solution: Solution, name: str, shots: Sequence[int]) -> list[float]:
 
 
 def _of_shot(
-    solution: Solution, shot: int, boards: Mapping[tuple[str, int], tuple[Pose, float]]
+    solution: Solution,
+    shot: int,
+    boards: Mapping[tuple[str, int], tuple[Pose, float]],
+    left: Mapping[tuple[str, int], float],
 ) -> Contradiction | None:
     """The worst view of a shot, if it contradicts."""
     worst: Contradiction | None = None
@@ -130,7 +153,8 @@ def _of_shot(
         median = max(float(np.median(others)), 1e-12)
         if view.of == "corners":
             sizes = np.linalg.norm(view.residuals, axis=1) / solution.deviations[f"{view.sensor} corners"]
-            is_bad = float(np.median(sizes)) > _DEVIATIONS and view.rms > _HARMLESS_PX
+            miss = min(view.rms, left.get((view.sensor, shot), np.inf))
+            is_bad = float(np.median(sizes)) > _DEVIATIONS and miss > _HARMLESS_PX
         else:
             is_bad = float(np.mean(view.outliers)) > _OUTLIERS
         if is_bad and (worst is None or view.rms / median > worst.miss / worst.median):

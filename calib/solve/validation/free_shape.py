@@ -6,6 +6,7 @@ the board and of the image that are polynomials are solved along, by one reweigh
 much in real sets.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -44,11 +45,13 @@ class FreeShape:
         solution: with the shapes that are described.
         poses: information of the poses on the sensors' parameters, followed by the coefficients.
         inflation: variance of an estimate relative to least squares with unit deviations.
+        misses: root mean square residual of the corners that is left, by sensor and shot [px].
     """
 
     solution: Solution
     poses: PoseInformation
     inflation: float
+    misses: Mapping[tuple[str, int], float]
 
     @property
     def size(self) -> int:
@@ -73,13 +76,13 @@ def free_shape(solution: Solution) -> FreeShape:
     ]
     whole = sparse.csr_array(sparse.block_array(blocks))
     left = _fitted(whole, np.concatenate([residuals, np.zeros(added.shape[1])]))
-    scales = np.ones(len(left))
+    misses, scales = _misses(equations, left), np.ones(len(left))
     redundancy = 1 - min((size + added.shape[1]) / measured, 0.9)
     for part in equations.slices():
         scales[part] = robust.scale(left[part], redundancy * len(left[part])) or 1.0
     left, whole = left / scales, _weighted(whole, 1 / scales)
     poses = information_of(whole, count + added.shape[1], equations, left)
-    return FreeShape(solution, poses, robust.covariance_inflation(left[:measured]))
+    return FreeShape(solution, poses, robust.covariance_inflation(left[:measured]), misses)
 
 
 def once(poses: PoseInformation) -> tuple[Array, Array]:
@@ -145,6 +148,19 @@ def _fitted(jacobian: sparse.csr_array, residuals: Array) -> Array:
         step = linalg.solve(curvature, weighted.T @ residuals / sizes, assume_a="pos") / sizes
         left = residuals - jacobian @ step
     return left
+
+
+def _misses(equations: Equations, left: Array) -> dict[tuple[str, int], float]:
+    """Root mean square of residuals (n,) of corners by sensor and shot [px]; none of boards between two shots."""
+    found = {}
+    for group, rows in zip(equations.groups, equations.slices(), strict=True):
+        if isinstance(group.measured, Corners) and group.shots.ndim == 1:
+            squares = np.sum((left[rows].reshape(-1, 2) * group.measured.sigmas[:, None]) ** 2, axis=1)
+            views = group.views_of_rows[::2]
+            means = np.bincount(views, squares) / np.bincount(views)
+            shots = (equations.layout.shots[index] for index in group.shots)
+            found |= {(group.sensor, shot): float(mean) ** 0.5 for shot, mean in zip(shots, means, strict=True)}
+    return found
 
 
 def _of_board(points: Array) -> Array:

@@ -1,6 +1,6 @@
 """Verdict on a calibration, in words."""
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +9,7 @@ from calib.solve.calibrate import calibrate
 from calib.solve.solution import Solution
 from calib.solve.validation import projection_uncertainty
 from calib.solve.validation.board_shape import ShapeError, shape_errors
-from calib.solve.validation.contradictions import Contradiction, Scatter, contradictions, scatter
+from calib.solve.validation.contradictions import SCATTERS_PX, Contradiction, Scatter, contradictions, scatter
 from calib.solve.validation.cross_validation import Agreement, TooFewToSplitError, cross_validate
 from calib.solve.validation.free_shape import free_shape
 from calib.solve.validation.groups import groups
@@ -80,39 +80,45 @@ def assess(
         if target != source
     }
     shape = shape_errors(solution, distance, needed_px)
-    reasons, contradicting = _unlike(solution, shape, needed_px)
+    reasons, contradicting, cause = _unlike(solution, shape, needed_px)
     reasons += weak_directions(solution, distance)
     reasons += _outliers(solution, {one.shot for one in contradicting})
-    reasons += _uncertain({**images, **pairs}, needed_px)
-    reasons += _narrow(solution, images)
     try:
         agreements = cross_validate(solution, distance, note)
         reasons += _disagreeing(agreements, needed_px)
     except TooFewToSplitError as error:
         agreements = []
         reasons.append(f"two halves could not be compared: {error}")
+    known = {of: field.rms * RADIUS_95 * _excess(of, agreements) for of, field in {**images, **pairs}.items()}
+    reasons += _uncertain(known, needed_px)
+    reasons += _narrow(solution, images)
     reasons += [str(one) for one in shape if not one.stretch]  # why the halves may differ
-    verdict = f"Do not trust it yet: {reasons[0]}" if reasons else _praise(agreements, images, pairs, distance)
+    reasons = [*cause, *reasons] if reasons else []
+    verdict = f"Do not trust it yet: {reasons[0]}" if reasons else _praise(agreements, images, known, distance)
     return Assessment(not reasons, verdict, reasons, contradicting, agreements, images, pairs, distance)
 
 
-def _unlike(solution: Solution, shape: Sequence[ShapeError], needed_px: float) -> tuple[list[str], list[Contradiction]]:
-    """Reasons to doubt that all shots show the described board and one rig, and shots that contradict the others."""
+def _unlike(
+    solution: Solution, shape: Sequence[ShapeError], needed_px: float
+) -> tuple[list[str], list[Contradiction], list[str]]:
+    """Reasons to doubt that all shots show one board and one rig, shots that contradict, and likely causes."""
     free = free_shape(solution)
     moved = changes_of_place(free, needed_px)
     # What happened to a sensor looks as if its image changed, and a wrong board as if every shot had another lens.
     refocused = [] if moved else changes_of_optics(free, needed_px)
-    contradicting = [] if moved else contradictions(solution)
-    scattered = [] if moved else _scattered(solution, contradicting)
+    contradicting = [] if moved else contradictions(solution, free.misses)
+    scattered = [] if moved else _scattered(solution, contradicting, SCATTERS_PX)
     if scattered:
         contradicting = []  # without a rest, nothing contradicts it
     misprinted = [str(one) for one in shape if one.stretch]
-    is_explained = moved or refocused or misprinted or scattered or contradicting
-    mixed = [] if is_explained or shape else groups(free, needed_px)
-    focus = {} if is_explained or mixed else focal_scatter(free, needed_px)
+    lasting = moved or refocused or misprinted or scattered
+    mixed = [] if lasting or contradicting or shape else groups(free, needed_px)
+    focus = {} if lasting or contradicting or mixed else focal_scatter(free, needed_px)
+    cause = [] if lasting or solution.task.planes else _scattered(solution, contradicting, 0.0)  # or wrong distances
     reasons = [*map(_of_place, moved), *(_of_optics(one, len(solution.task.sensors)) for one in refocused)]
     reasons += [*misprinted, *map(str, mixed), *(_of_focus(*each) for each in focus.items())]
-    return [*reasons, *scattered, *_contradicting(contradicting)], contradicting
+    reasons += [*map(str, scattered), *_contradicting(contradicting)]
+    return reasons, contradicting, [*map(str, cause)]
 
 
 def _of_place(one: Change) -> str:
@@ -138,21 +144,22 @@ def _of_optics(one: Change, sensors: int) -> str:
 def _of_focus(sensor: str, deviation: float) -> str:
     return (
         f"{sensor}: its focal length differs by ± {deviation:.1%} from shot to shot: switch autofocus, zoom and image "
-        "stabilisation off; if they are, make sure of a flat board, and even, sharp images"
+        "stabilisation off; if they are, make sure of a flat board and even, sharp images, and try another kind of lens"
     )
 
 
+def _excess(of: str, agreements: Sequence[Agreement]) -> float:
+    """Factor by which a projection is known worse than its deviation says, as the halves differ beyond chance."""
+    return max((each.ratio for each in agreements if each.of == of and each.ratio > MAX_RATIO), default=1.0)
+
+
 def _praise(
-    agreements: Sequence[Agreement],
-    images: dict[str, UncertaintyMap],
-    pairs: dict[str, UncertaintyMap],
-    distance: float,
+    agreements: Sequence[Agreement], images: Mapping[str, UncertaintyMap], known: Mapping[str, float], distance: float
 ) -> str:
-    fields = [*images.values(), *pairs.values()]
-    known = max((field.rms * RADIUS_95 for field in fields if not np.isnan(field.rms)), default=0)
+    most = max((each for each in known.values() if not np.isnan(each)), default=0)
     seen = min(field.inside.mean() for field in images.values())
     where = f" where boards were seen, in {seen:.0%} of the image" if seen < 1 else ""
-    text = f"Trust it: projections at {distance:.2g} m are known to {known:.2g} px (95 %){where}"
+    text = f"Trust it: projections at {distance:.2g} m are known to {most:.2g} px (95 %){where}"
     if agreements:
         worst = max(agreements, key=lambda each: each.ratio)
         text += (
@@ -173,10 +180,9 @@ def _disagreeing(agreements: Sequence[Agreement], needed_px: float) -> list[str]
     ]
 
 
-def _uncertain(fields: dict[str, UncertaintyMap], needed_px: float) -> list[str]:
+def _uncertain(radii: Mapping[str, float], needed_px: float) -> list[str]:
     found = []
-    for of, field in fields.items():
-        known = field.rms * RADIUS_95
+    for of, known in radii.items():
         if known > needed_px:
             found.append(
                 f"{of}: projections are known to {known:.2g} px only (95 %) where {needed_px:.2g} px are needed; take "
@@ -213,24 +219,19 @@ def _contradicting(found: Sequence[Contradiction]) -> list[str]:
     ]
 
 
-def _scattered(solution: Solution, contradicting: Sequence[Contradiction]) -> list[str]:
-    found = scatter(solution)
+def _scattered(solution: Solution, contradicting: Sequence[Contradiction], least_px: float) -> list[Scatter]:
+    found = scatter(solution, least_px)
     if found and contradicting:  # a few wrong shots spoil the others until they are left out
-        found = _scatter_without({one.shot for one in contradicting}, solution)
-    return [
-        f"{' and '.join(one.sensors)}: each fits its own corners to {one.alone_px:.2g} px, but together they miss by "
-        f"{one.apart_px:.2g} px in most shots: the images of a shot were not taken at the same moment, or a sensor was "
-        "moved between them; hold the board still in every shot, or synchronise the sensors"
-        for one in found
-    ]
+        found = _scatter_without({one.shot for one in contradicting}, solution, least_px)
+    return found
 
 
-def _scatter_without(shots: Collection[int], solution: Solution) -> list[Scatter]:
+def _scatter_without(shots: Collection[int], solution: Solution, least_px: float) -> list[Scatter]:
     rest = solution.task.of_shots([shot for shot in solution.task.shots if shot not in shots])
     try:
-        return scatter(calibrate(rest))
+        return scatter(calibrate(rest), least_px)
     except ValueError:  # nor can the rest be calibrated
-        return scatter(solution)
+        return scatter(solution, least_px)
 
 
 def _outliers(solution: Solution, named: Collection[int]) -> list[str]:

@@ -10,7 +10,7 @@ from calib.solve.bundle.tasks import SensorTask, Task
 from calib.solve.calibrate import calibrate
 from calib.solve.solution import Solution
 from calib.solve.validation.board_shape import shape_errors
-from calib.solve.validation.verdict import assess
+from calib.solve.validation.verdict import MAX_RATIO, RADIUS_95, assess
 from tests.calib.solve import board_views
 
 
@@ -56,3 +56,10 @@ def test_a_bent_board_is_named_with_its_size() -> None:
     assert not found.stretch
     assert abs(found.size) == pytest.approx(2, rel=0.35)
     assert any(reason.startswith("a board that is bent by ") for reason in assess(solved(bend=0.002), 1.0, 1.0).reasons)
+
+
+def test_halves_that_differ_beyond_chance_say_how_well_projections_are_known() -> None:
+    found = assess(solved(), 1.0, 2.0)
+    (halves,) = found.agreements
+    assert halves.ratio > MAX_RATIO
+    assert f"are known to {RADIUS_95 * found.images['color'].rms * halves.ratio:.2g} px (95 %)" in found.verdict

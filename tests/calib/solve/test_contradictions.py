@@ -1,6 +1,7 @@
 """Shots that contradict the rest are named, and images of different moments are told from a bad lens."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,21 +18,22 @@ from calib.solve.start.start import start
 from calib.solve.validation.contradictions import contradictions, scatter
 from calib.solve.validation.verdict import assess
 from tests.calib.solve import board_views
+from tests.calib.solve.board_views import Head
 
 HEADS = {name: head for name, head in board_views.three_heads().items() if name != "tof"}
 BOARDS = board_views.random_boards(20, np.random.default_rng(5))
 
 
-def views(second: Mapping[int, Pose], seed: int = 5) -> list[CornerView]:
+def views(second: Mapping[int, Pose], heads: Mapping[str, Head] = HEADS) -> list[CornerView]:
     """Corners of both heads; the colour camera sees the `second` boards."""
-    random = np.random.default_rng(seed)
-    light = board_views.look({"light": HEADS["light"]}, BOARDS, random)
-    return [*light.corners, *board_views.look({"color": HEADS["color"]}, second, random).corners]
+    random = np.random.default_rng(5)
+    light = board_views.look({"light": heads["light"]}, BOARDS, random)
+    return [*light.corners, *board_views.look({"color": heads["color"]}, second, random).corners]
 
 
-def task(second: Mapping[int, Pose]) -> Task:
-    sensors = {name: SensorTask(head.camera.width, head.camera.height) for name, head in HEADS.items()}
-    return Task(sensors, views(second), (), "light")
+def task(second: Mapping[int, Pose], heads: Mapping[str, Head] = HEADS) -> Task:
+    sensors = {name: SensorTask(head.camera.width, head.camera.height) for name, head in heads.items()}
+    return Task(sensors, views(second, heads), (), "light")
 
 
 def solved(second: Mapping[int, Pose]) -> Solution:
@@ -72,6 +74,23 @@ def test_images_of_different_moments_are_told_from_everything_else() -> None:
     verdict = assess(solution, 1.0, 1.0).verdict
     assert verdict.startswith("Do not trust it yet: light and color: each fits its own corners")
     assert "were not taken at the same moment" in verdict
+
+
+def test_different_moments_are_the_cause_of_what_else_is_wrong_where_they_are_small() -> None:
+    random = np.random.default_rng(6)
+    later = {shot: moved(T_rb, tuple(random.normal(0, 0.0005, 3))) for shot, T_rb in BOARDS.items()}
+    solution = calibrate(task(later, {name: replace(head, corner_sigma=0.02) for name, head in HEADS.items()}))
+    assert scatter(solution) == []
+    first, *others = assess(solution, 1.0, 1.0).reasons
+    assert "were not taken at the same moment" in first
+    assert others
+
+
+def test_shots_that_another_kind_of_lens_explains_do_not_contradict() -> None:
+    solution = solved({**BOARDS, 7: moved(BOARDS[7], (0.02, 0, 0))})
+    (found,) = contradictions(solution)
+    with_another_lens = {(name, found.shot): 0.3 for name in found.sensors}
+    assert contradictions(solution, with_another_lens) == []
 
 
 def test_pairs_of_which_most_are_wrong_are_told_with_those_that_agree() -> None:
