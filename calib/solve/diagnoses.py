@@ -210,7 +210,8 @@ def require_square_size(parameters: Sequence[Parameter]) -> None:
     said = " and ".join(f"{each.name.partition('.')[0]} by {each.value:+.1%}" for each in scales)
     raise SquareSizeError(
         f"measured distances differ from the board's apparent size: {said}. Its squares are probably {scale:.3f} times "
-        "as large as its description says: measure them with a ruler, and print without scaling to fit the page",
+        "as large as its description says, or the distances have another unit: measure the squares with a ruler, and "
+        "print without scaling to fit the page",
         scale,
     )
 
