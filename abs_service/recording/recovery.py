@@ -24,6 +24,10 @@ class RecoveryError(Exception):
     """A file that cannot be recovered; the message has the reason."""
 
 
+class InUseError(RecoveryError):
+    """A file that another process, or another part of this one, is writing or recovering."""
+
+
 @dataclass(frozen=True, slots=True)
 class RecoveryReport:
     """Result of a recovery.
@@ -62,7 +66,7 @@ def recover(source: Path, directory: Path | None = None) -> RecoveryReport:
     its name only when it is complete; to recover again after an interruption is safe.
 
     Raises:
-        RecoveryError: the file cannot be read, is no MCAP file, or another process is writing it.
+        RecoveryError: the file cannot be read, is no MCAP file, or (InUseError) another process is writing it.
         OSError: the new file cannot be written.
     """
     was_active = source.name.endswith(ACTIVE)
@@ -82,7 +86,9 @@ def recover(source: Path, directory: Path | None = None) -> RecoveryReport:
             raise
         os.replace(unfinished, target)
         lossless = not (salvage.damaged or salvage.orphans or salvage.skipped_bytes)
-        kept = _retire(source, lossless) if was_active and directory is None else source
+        kept = source
+        if was_active and directory is None:
+            kept = source.unlink() if lossless else set_aside(source)
     return RecoveryReport(
         kept,
         target,
@@ -107,10 +113,12 @@ def remove_interrupted(directory: Path) -> None:
             path.unlink()
 
 
-def _retire(source: Path, lossless: bool) -> Path | None:
-    if lossless:
-        source.unlink()
-        return None
+def set_aside(source: Path) -> Path:
+    """Renames `x.mcap.active` to `x.mcap.broken`, as which it is nobody's to finish; returns the new path.
+
+    Raises:
+        OSError: it cannot be renamed.
+    """
     broken = source.with_name(source.name.removesuffix(ACTIVE) + BROKEN)
     os.replace(source, broken)
     return broken
@@ -126,7 +134,7 @@ def _locked(source: Path) -> Iterator[BinaryIO]:
         try:
             fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            raise RecoveryError(f"{source}: another process is writing or recovering it") from None
+            raise InUseError(f"{source}: another process is writing or recovering it") from None
         yield stream
 
 

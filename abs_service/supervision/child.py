@@ -7,13 +7,16 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 from abs_service.supervision import log_lines
-from abs_service.supervision.child_process import NO_PROCESS, Process, ThreadTimes
+from abs_service.supervision.child_process import NO_PROCESS, Process, ThreadTimes, longest_wait_ns
 
 #: A label of the health of `run` for each process, after which the component's name follows: its state, and why.
 PROCESS = "process."
 
 #: First backoff before a restart [ns].
 FIRST_BACKOFF_NS = 200_000_000
+#: Time between two looks whether a process that starts or compiles does anything; the first is earlier than its next
+#: health is due, so that the second still tells within two seconds [ns].
+FIRST_LOOK_NS, LOOK_NS = 1_000_000_000, 800_000_000
 
 
 class State(StrEnum):
@@ -46,6 +49,7 @@ class Child:
         worst_code: the highest with which it ended by itself or because it was told; 128 + N for signal N that ended it
             after it was told. A crash counts as a restart only.
         overdue_ns, deadline_ns: without health until then it is said, and it is killed [ns].
+        busy: it starts or compiles, and need not send health until `limit_ns` as long as it does anything.
     """
 
     component: str
@@ -65,13 +69,37 @@ class Child:
     backoff_ns: int = FIRST_BACKOFF_NS // 2
     start_at_ns: int = 0
     heard_ns: int = 0
+    busy: bool = False
+    limit_ns: int = 0
     threads: Mapping[int, ThreadTimes] = field(default_factory=dict, repr=False)
+    looked_at: Mapping[int, ThreadTimes] = field(default_factory=dict, repr=False)
     exits_ns: deque[int] = field(default_factory=deque, repr=False)
 
     @property
     def condition(self) -> str:
         """State and its reason, in words."""
         return f"{self.state.value}: {self.reason}" if self.reason else self.state.value
+
+    def waited_ns(self, now_ns: int) -> int:
+        """Longest time that one of its threads has waited for a processor since its last health [ns]."""
+        return longest_wait_ns(self.threads, self.process.threads(), now_ns - self.heard_ns)
+
+    def is_overdue(self, now_ns: int, patience_ns: int) -> bool:
+        """True if its health should have come.
+
+        A busy one, which is killed after `limit_ns` only, has a patience as long as it runs; a look now and then tells.
+        A kernel that does not say whether threads have run is taken to say so.
+        """
+        if now_ns < self.overdue_ns or not self.busy:
+            return now_ns >= self.overdue_ns
+        before, self.looked_at = self.looked_at, self.process.threads()
+        self.overdue_ns = now_ns + LOOK_NS
+        runs = self.looked_at != before or any(thread.runnable for thread in self.looked_at.values())
+        if not self.looked_at or runs:
+            self.deadline_ns = self.limit_ns
+            return False
+        self.deadline_ns = min(now_ns + patience_ns, self.deadline_ns)
+        return True
 
     def end(self) -> None:
         """Keeps the exit code of a process that was told to end, and kills it if it has not; no effect without one."""

@@ -7,8 +7,8 @@ import logging
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from abs_service.supervision.child import FIRST_BACKOFF_NS, Child, State, exit_reason
-from abs_service.supervision.child_process import NO_PROCESS, Spawn, longest_wait_ns
+from abs_service.supervision.child import FIRST_BACKOFF_NS, FIRST_LOOK_NS, Child, State, exit_reason
+from abs_service.supervision.child_process import NO_PROCESS, Spawn
 from abs_service.supervision.exit_codes import Exit
 from abs_service.supervision.repeats import Repeats, counted
 
@@ -16,7 +16,7 @@ _log = logging.getLogger(__name__)
 
 #: Longest backoff before a restart: it doubles with each end of a process soon after its start [ns].
 LONGEST_BACKOFF_NS = 3_000_000_000
-#: After a run that was longer than this the next backoff is the first one again [ns].
+#: After a run that was longer than this a process is started again at once, and the next backoff is the first one [ns].
 WORKED_NS = 10_000_000_000
 #: A process says nothing for this long: its health, which comes once a second, is overdue [ns].
 OVERDUE_NS = 1_800_000_000
@@ -31,7 +31,8 @@ class Limits:
     Attributes:
         restarts, window_ns: a process that needs more restarts than this within the window is given up, for as long
             [ns].
-        startup_ns: timeout for the first health, and between healths while a process reports to be busy [ns].
+        startup_ns: timeout for the first health, and between healths while a process reports to be busy [ns], as long
+            as it does anything.
         stall_ns: timeout between healths afterwards; a process that exceeds it is restarted [ns]. The time that it
             waited for a processor is added, up to `startup_ns`.
         stop_ns: time that all processes together have to end in order [ns].
@@ -90,9 +91,7 @@ class Supervisor:
         """Extends a component's deadline; further for a busy one, which compiles kernels."""
         child = self.children.get(component)
         if child is not None and child.state is State.RUNNING:
-            child.heard_ns = self._clock()
-            child.deadline_ns = child.heard_ns + (self._limits.startup_ns if busy else self._limits.stall_ns)
-            child.overdue_ns = child.deadline_ns if busy else child.heard_ns + OVERDUE_NS
+            self._expect_health(child, self._clock(), busy)
             child.threads, child.reason = child.process.threads(), ""
 
     def renew(self, component: str) -> None:
@@ -166,12 +165,12 @@ class Supervisor:
             for child in self.children.values():
                 child.deadline_ns += paused_ns
                 child.overdue_ns += paused_ns
+                child.limit_ns += paused_ns
 
-    def _is_starved(self, child: Child, now_ns: int) -> bool:
-        """True if a child that is late has waited for a processor in the meantime, instead of hanging."""
-        silent_ns = now_ns - child.heard_ns
-        waited_ns = longest_wait_ns(child.threads, child.process.threads(), silent_ns)
-        return now_ns < child.deadline_ns + min(waited_ns, self._limits.startup_ns)
+    def _expect_health(self, child: Child, now_ns: int, busy: bool) -> None:
+        child.heard_ns, child.busy, child.limit_ns = now_ns, busy, now_ns + self._limits.startup_ns
+        child.deadline_ns = child.limit_ns if busy else now_ns + self._limits.stall_ns
+        child.overdue_ns = now_ns + (FIRST_LOOK_NS if busy else OVERDUE_NS)
 
     def _start(self, child: Child, now_ns: int) -> None:
         child.end()
@@ -186,15 +185,15 @@ class Supervisor:
         started = {"component": child.component, "child": child.process.pid, "restarts": child.restarts}
         _log.info("%s is started", child.component, extra={"fields": started})
         child.state, child.reason, child.lacks, child.starts = State.RUNNING, "", False, child.starts + 1
-        child.started_ns, child.heard_ns, child.threads = now_ns, now_ns, {}
-        child.deadline_ns = child.overdue_ns = now_ns + self._limits.startup_ns
+        child.started_ns, child.threads, child.looked_at = now_ns, {}, {}
+        self._expect_health(child, now_ns, busy=True)
 
     def _check(self, child: Child, now_ns: int) -> None:
         code = child.process.poll()
         if code is None:
             if now_ns >= child.deadline_ns:
                 self._treat_silence(child, now_ns)
-            elif now_ns >= child.overdue_ns:
+            elif child.is_overdue(now_ns, self._limits.stall_ns):
                 child.reason = f"no health for {(now_ns - child.heard_ns) / 1e9:.0f} s"
             return
         child.exit_code, child.worst_code = code, max(child.worst_code, code)
@@ -206,7 +205,7 @@ class Supervisor:
             self._schedule_restart(child, now_ns, exit_reason(code, child.process.output_tail()), State.BACKOFF)
 
     def _treat_silence(self, child: Child, now_ns: int) -> None:
-        if self._is_starved(child, now_ns):
+        if now_ns < child.deadline_ns + min(child.waited_ns(now_ns), self._limits.startup_ns):
             silent_s = (now_ns - child.heard_ns) / 1e9
             child.reason = f"no health for {silent_s:.0f} s, because it waits for a processor"
             return
@@ -222,8 +221,8 @@ class Supervisor:
             self._give_up(child, now_ns, f"{times}; the last time it {reason}")
             return
         worked = now_ns - child.started_ns > WORKED_NS
-        child.backoff_ns = FIRST_BACKOFF_NS if worked else min(2 * child.backoff_ns, LONGEST_BACKOFF_NS)
-        child.start_at_ns = now_ns + child.backoff_ns
+        child.backoff_ns = FIRST_BACKOFF_NS // 2 if worked else min(2 * child.backoff_ns, LONGEST_BACKOFF_NS)
+        child.start_at_ns = now_ns + (1 if worked else child.backoff_ns)  # 1: at the next look, when health has said it
         child.exits_ns.append(now_ns)
         child.restarts += 1
         child.state, child.reason, child.process = state, reason, NO_PROCESS

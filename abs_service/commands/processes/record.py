@@ -14,6 +14,7 @@ import os
 import shutil
 import threading
 import time
+from contextlib import suppress
 
 from abs_service import config
 from abs_service.bus.health import Health, Level
@@ -22,7 +23,7 @@ from abs_service.commands.parts import disk, rig_process
 from abs_service.recording.disk.disk_watch import DiskWatch
 from abs_service.recording.recorder import Recorder
 from abs_service.recording.recorder_settings import RecorderSettings
-from abs_service.recording.recovery import RecoveryError, leftovers, recover, remove_interrupted
+from abs_service.recording.recovery import InUseError, RecoveryError, leftovers, recover, remove_interrupted, set_aside
 from abs_service.recording.triggers.first_tracking import FirstTracking
 from abs_service.recording.triggers.trigger import ALWAYS, Asked, Trigger
 from abs_service.supervision import process_tuning
@@ -59,15 +60,18 @@ def run(arguments: argparse.Namespace) -> int:
         bus.declare_liveliness("record")
         trigger = _trigger(rig, clock)
         # In parallel: it may take minutes.
-        threading.Thread(target=recover_leftovers, args=(settings, health), daemon=True).start()
+        recovery = threading.Thread(target=recover_leftovers, args=(settings, health), daemon=True)
         recorder = Recorder(bus, settings, health, clock, trigger=trigger)
         os.nice(NICE)  # this thread and those that it starts from now on: not those that receive
         tracking = FirstTracking(bus, rig.trackers)
         if rig.record.begin == "tracking":
+            recovery.start()
             _wait_for_tracking(tracking, health, stop)
         if stop.is_set():
             return Exit.OK
         recorder.start()
+        if recovery.ident is None:  # not earlier: it would take the time in which nothing is recorded
+            recovery.start()
         commands.answer_record(bus, headers, health, recorder.ask)
         process_tuning.freeze_loaded_objects()
         watch = DiskWatch(disk.recordings(rig), disk.estimates(rig), settings.minimum_free_bytes, health, clock)
@@ -131,8 +135,12 @@ def recover_leftovers(settings: RecorderSettings, health: Health) -> None:
                 # Recording goes first: the copy must not take the room that it needs.
                 raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
             report = recover(path)
-        except RecoveryError as error:  # another recorder's file, or one that holds nothing
+        except InUseError:  # the file that is being recorded, or another recorder's
+            continue
+        except RecoveryError as error:  # it holds nothing
             _log.warning("not recovered: %s", error)
+            with suppress(OSError):
+                set_aside(path)  # else its size would count for ever, and recordings would be deleted for it
             continue
         except OSError as error:
             health.report("recovery", Level.WARNING, f"{path} cannot be recovered: {error.strerror}")

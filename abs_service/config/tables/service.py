@@ -182,7 +182,8 @@ class RunTable(Table):
         max_restarts: number of restarts within `restart_window_s` that a process may need; with more, it is given up
             for as long. Without cameras or any tracker, `abs-service run` ends.
         restart_window_s: time over which the restarts of a process are counted [s].
-        startup_timeout_s: longest time without health of a process that starts or compiles its kernels [s].
+        startup_timeout_s: longest time without health of a process that starts or compiles its kernels [s]; of one
+            in which nothing runs meanwhile, `stall_timeout_s`.
         stall_timeout_s: longest time without health afterwards [s]; a process that exceeds either is restarted. The
             time that it waited for a processor is added, up to `startup_timeout_s`.
         stop_timeout_s: time that all processes together have to end in order before they are killed [s].

@@ -6,6 +6,7 @@ from abs_service.bus.health import Health
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.commands.processes import record
 from abs_service.recording.recorder_settings import RecorderSettings
+from abs_service.recording.recording_file import RecordingFile
 from tests.abs_service.bus.loopback import LoopbackBus
 
 
@@ -18,3 +19,13 @@ def test_an_unfinished_recording_that_holds_nothing_is_told(tmp_path, caplog):
     assert [record.getMessage() for record in caplog.records] == [
         f"not recovered: {tmp_path}/a.mcap.active: holds no MCAP record"
     ]
+    assert [path.name for path in tmp_path.iterdir()] == ["a.mcap.broken"], "which retention may delete"
+
+
+def test_what_is_being_recorded_is_nothing_to_recover(tmp_path, caplog):
+    mine = RecordingFile(tmp_path / "a.mcap", 0, {})
+    health = Health(LoopbackBus(), "record", HeaderFactory("demo", WallClock()))
+    with caplog.at_level("WARNING"):
+        record.recover_leftovers(RecorderSettings(tmp_path, "demo", "", minimum_free_bytes=0), health)
+    mine.finish({})
+    assert (caplog.records, [path.name for path in tmp_path.iterdir()]) == ([], ["a.mcap"])
