@@ -11,6 +11,7 @@ from abs_service.bus.contract import Bus, Sample
 from abs_service.bus.health import Health, Level
 from abs_service.bus.queues import BoundedQueue
 from abs_service.bus.stamps import WallClock
+from abs_service.recording.disk import folder
 from abs_service.recording.disk.stall import DiskStall
 from abs_service.recording.losses import Losses
 from abs_service.recording.recorder_settings import RecorderSettings
@@ -61,7 +62,7 @@ class Recorder:
         health: Health,
         clock: WallClock,
         open_file: Callable[[Path], BinaryIO] = open_for_writing,
-        free_bytes: Callable[[Path], int] = lambda folder: shutil.disk_usage(folder).free,
+        free_bytes: Callable[[Path], int] = lambda directory: shutil.disk_usage(directory).free,
         retry_s: float = RETRY_S,
         trigger: Trigger = ALWAYS,
     ) -> None:
@@ -84,6 +85,7 @@ class Recorder:
         )
         self._stopping = threading.Event()
         self._failed = ""
+        self._mount = Path("/")  # of the disk that has the recordings
         self._is_short_of_space = False
         self._losses = Losses(health)
         self.stall = DiskStall(health, clock.monotonic, lambda: self._queue.size)
@@ -143,6 +145,7 @@ class Recorder:
     def _attempt(self) -> bool:
         """Records one file; False if the disk is to be left alone for a while."""
         try:
+            folder.check_mounted(self._mount)
             self._settings.directory.mkdir(parents=True, exist_ok=True)
             self._check_space()
             self._record_one_file()
@@ -162,10 +165,8 @@ class Recorder:
         self._health.gauge("free_bytes", free)
         self._is_short_of_space = free < least
         if self._is_short_of_space:
-            raise OSError(
-                f"only {free / 1e6:.0f} MB free in {settings.directory}; "
-                f"recording resumes with {settings.minimum_free_bytes * RESUME_FACTOR / 1e6:.0f} MB"
-            )
+            resumes = f"recording resumes with {settings.minimum_free_bytes * RESUME_FACTOR / 1e6:.0f} MB"
+            raise OSError(f"only {free / 1e6:.0f} MB free in {settings.directory}; {resumes}")
 
     def _record_one_file(self) -> None:
         settings, started_ns = self._settings, self._clock.monotonic()
@@ -179,7 +180,7 @@ class Recorder:
             settings.chunk_bytes,
             self._open_file,
         )
-        self._finished = self.written
+        self._mount, self._finished = folder.mount_point(settings.directory), self.written
         self._health.label("file", take.path.name)
         self._health.count("files")
         try:

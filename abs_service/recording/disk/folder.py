@@ -1,6 +1,7 @@
 """The folder of recordings: whether it can be used."""
 
 import errno
+import os.path
 import tempfile
 import threading
 from collections.abc import Iterator
@@ -31,6 +32,24 @@ def check(directory: Path) -> None:
     thread.join(PATIENCE_S)
     if found:
         raise found[0]
+
+
+def mount_point(directory: Path) -> Path:
+    """The folder at which the file system of an existing folder is mounted."""
+    path = Path(os.path.realpath(directory))
+    while not os.path.ismount(path):
+        path = path.parent
+    return path
+
+
+def check_mounted(mount: Path) -> None:
+    """Checks that a file system is there, in whose place would be an empty folder of another one, often the system's.
+
+    Raises:
+        OSError: nothing is mounted there.
+    """
+    if not os.path.ismount(mount):
+        raise OSError(f"the disk at {mount} is not mounted any more")
 
 
 def _mistakes(directory: Path) -> Iterator[FolderError]:

@@ -1,5 +1,6 @@
 """The recorder with a disk that is slow, nearly full, full or missing."""
 
+import os.path
 import queue
 import stat
 import threading
@@ -81,6 +82,27 @@ def test_it_stops_before_the_disk_is_full_with_a_complete_file_and_resumes_when_
     rig.recorder.stop(5)
     assert [rig.recorder.failures, rig.said.counters["failures"]] == [1, 1]
     assert sequences(tmp_path) == [1, 2]
+
+
+def test_where_the_disk_was_unmounted_nothing_is_written_to_the_empty_folder_until_it_is_back(tmp_path, monkeypatch):
+    mount, mounted = tmp_path / "disk", [True]
+    monkeypatch.setattr(os.path, "ismount", lambda path: path.name == "" or (path == mount and mounted[0]))
+    rig = Rig(mount / "takes", flush_s=0.005)
+    rig.recorder.start()
+    rig.publish_image(depth(1))
+    assert eventually(lambda: rig.written(1))
+    mounted[0] = False
+    mount.rename(tmp_path / "unmounted")
+    rig.publish_image(depth(2))
+    assert eventually(lambda: rig.said.message == f"RECORD_FAILED the disk at {mount} is not mounted any more")
+    assert not mount.exists()
+    (tmp_path / "unmounted").rename(mount)
+    mounted[0] = True
+    assert eventually(lambda: not rig.recorder.failed)
+    rig.recorder.stop(5)
+    for path in (mount / "takes").glob("*.active"):
+        recover(path)
+    assert sequences(mount / "takes") == [1, 2]
 
 
 class Full(SlowFile):
