@@ -23,6 +23,7 @@ class FramePublisher:
     """Publishes the frames of one device from a thread of its own; a `drivers.contract.device.Sink`.
 
     The device is never blocked: if publishing falls behind, the oldest frame of the stream is dropped and counted.
+    One that no message can hold, by a mistake of the driver, is counted, too.
 
     Args:
         bus: where to publish.
@@ -36,6 +37,8 @@ class FramePublisher:
         self._device = device
         self._publishers: dict[str, Publisher] = {}
         self._published: Counter[str] = Counter()
+        self._refused: Counter[str] = Counter()
+        self._trouble = ""
         self._queue: LatestQueue[Frame | Truth] = LatestQueue(DEPTH)
         self._thread = threading.Thread(target=self._run, name=f"publish {device}", daemon=True)
         self._thread.start()
@@ -47,8 +50,13 @@ class FramePublisher:
 
     @property
     def dropped(self) -> Mapping[str, int]:
-        """Messages dropped because publishing fell behind, by topic."""
-        return self._queue.dropped
+        """Messages that were not published, because publishing fell behind or they cannot be, by topic."""
+        return self._refused + Counter(self._queue.dropped)
+
+    def take_trouble(self) -> str:
+        """The last reason since the last call why something cannot be published; "" if there was none."""
+        trouble, self._trouble = self._trouble, ""
+        return trouble
 
     def on_frame(self, frame: Frame) -> None:
         """See `drivers.contract.device.Sink.on_frame`."""
@@ -78,10 +86,15 @@ class FramePublisher:
     def _run(self) -> None:
         while (entry := self._queue.take()) is not None:
             topic, item = entry
-            if isinstance(item, Frame):
-                self._publish_frame(topic, item)
-            else:
-                self._publish_truth(topic, item)
+            try:
+                if isinstance(item, Frame):
+                    self._publish_frame(topic, item)
+                else:
+                    self._publish_truth(topic, item)
+            except Exception as error:  # a number that no message holds, say: the next frames may be right
+                self._refused[topic] += 1
+                self._trouble = f"{topic} cannot be published: {error}"
+                continue
             self._published[topic] += 1
 
     def _publish_frame(self, topic: str, frame: Frame) -> None:

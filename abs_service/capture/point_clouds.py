@@ -8,12 +8,10 @@ from abs_service.bus import keys
 from abs_service.bus.contract import IMAGES, Bus, Publisher
 from abs_service.bus.queues import LatestQueue
 from abs_service.bus.stamps import WallClock
-from abs_service.pairing.observation import ObservationError
 from abs_service.pairing.points import points_s, z_image
 from abs_service.wire.message_header import POINTS
 from abs_service.wire.viewer_messages import ViewRate, point_cloud
 from calib.camera import Camera
-from calib.lenses.lens import LensError
 from drivers.contract.device import DeviceState, Sink, Truth
 from drivers.contract.frame import Frame, Kind
 
@@ -79,12 +77,15 @@ class PointCloudPublisher:
         while (entry := self._queue.take()) is not None:
             topic, frame = entry
             try:
-                camera = self._camera(frame.sensor)
-                points = points_s(z_image(frame, camera), camera)
-            except (ObservationError, LensError):  # a tracker of this sensor says what is wrong
+                cloud = self._cloud(frame)
+            except Exception:  # a tracker of this sensor, or who publishes the frame, says what is wrong
                 self._refused[topic] += 1
                 continue
             if topic not in self._publishers:
                 self._publishers[topic] = self._bus.publisher(topic, POINTS, IMAGES)
-            cloud = point_cloud(frame.sensor, self._clock.wall(frame.t_host_ns), points)
-            self._publishers[topic].put(cloud.SerializeToString())
+            self._publishers[topic].put(cloud)
+
+    def _cloud(self, frame: Frame) -> bytes:
+        camera = self._camera(frame.sensor)
+        points = points_s(z_image(frame, camera), camera)
+        return point_cloud(frame.sensor, self._clock.wall(frame.t_host_ns), points).SerializeToString()

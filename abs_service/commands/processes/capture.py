@@ -164,7 +164,9 @@ def tick(
 def _count(publishers: Mapping[str, FramePublisher], points: Mapping[str, PointCloudPublisher], health: Health) -> None:
     for clouds in points.values():
         health.count_up_to(clouds.dropped, "dropped.")
-    for publisher in publishers.values():
+    for name, publisher in publishers.items():
+        trouble = publisher.take_trouble()
+        health.report(f"frames of {name}", Level.ERROR if trouble else Level.OK, trouble)
         health.count_up_to(publisher.dropped, "dropped.")
         health.count_up_to(publisher.published, "published.")
         for topic, number in publisher.published.items():

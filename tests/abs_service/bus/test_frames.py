@@ -3,7 +3,7 @@
 import queue
 import threading
 import time
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -129,6 +129,18 @@ def test_a_publisher_that_falls_behind_drops_the_oldest_and_never_blocks(headers
         release.set()
     sent = [codec.decode(sample.payload, sample.attachment) for sample in bus.sent]
     assert [(item.stream, item.seq) for item in sent] == [("depth", n) for n in (0, 7, 8, 9, 10)] + [("other", 0)]
+
+
+@pytest.mark.parametrize("wrong", [{"t_host_ns": 2**70}, {"seq": -1}, {"epoch": -1}, {"scale": "1"}])
+def test_what_no_message_can_hold_is_told_and_ends_no_camera(headers, wrong):
+    bus = LoopbackBus()
+    with publisher(bus, headers) as sink:
+        for one in (frame(1), replace(frame(2), **wrong), frame(3)):
+            sink.on_frame(one)
+    assert [codec.decode(sample.payload, sample.attachment).seq for sample in bus.sent] == [1, 3]
+    assert sink.dropped == {"tof/depth/image": 1}
+    assert sink.take_trouble().startswith("tof/depth/image cannot be published: ")
+    assert sink.take_trouble() == ""
 
 
 def test_a_slow_reader_gets_the_newest_and_the_loss_is_counted(headers):

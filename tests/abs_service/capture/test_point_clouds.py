@@ -49,3 +49,14 @@ def test_nothing_is_published_by_default():
 def test_what_does_not_fit_its_camera_is_counted():
     other = dataclasses.replace(SIMULATION.heads["tof"].camera, width=31)
     assert published(1000.0, lambda sensor: other) == ([], {"tof/depth/points": 6})
+
+
+def test_a_frame_with_which_a_driver_errs_does_not_end_the_others():
+    bus, sink = LoopbackBus(), RecordingSink()
+    clouds = PointCloudPublisher(bus, CLOCK, {"tof": 1000.0}, lambda sensor: SIMULATION.heads[sensor].camera, sink)
+    depth = next(frame for frame in SIMULATION.frames(0) if frame.stream == "depth")
+    for time_ns in (2**70, 2**70 + 10**9):
+        clouds.on_frame(dataclasses.replace(depth, t_host_ns=time_ns))
+        assert eventually(lambda: sum(clouds.dropped.values()) >= 1)
+    assert eventually(lambda: clouds.dropped == {"tof/depth/points": 2})
+    clouds.close()
