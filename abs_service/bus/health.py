@@ -14,6 +14,8 @@ from abs_service.bus.stamps import HeaderFactory
 from drivers.contract.text import printable
 
 PERIOD_NS = 1_000_000_000
+#: The largest number that a counter holds; drivers count in ways of their own.
+LARGEST = 2**64 - 1
 
 
 class Level(IntEnum):
@@ -69,10 +71,10 @@ class Health:
             return self._counters[name]
 
     def count_up_to(self, totals: Mapping[str, int], prefix: str = "") -> None:
-        """Sets counters to totals counted elsewhere; a smaller total, as after a new epoch, is ignored."""
+        """Sets counters to totals counted elsewhere, up to `LARGEST`; a smaller one, as of a new epoch, is ignored."""
         with self._lock:
             for name, total in totals.items():
-                self._counters[prefix + name] = max(self._counters[prefix + name], total)
+                self._counters[prefix + name] = min(max(self._counters[prefix + name], total), LARGEST)
 
     def gauge(self, name: str, value: float) -> None:
         """Sets a current value, none if it is not finite; the name ends in its unit."""

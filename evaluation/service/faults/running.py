@@ -67,11 +67,12 @@ class RunningRig:
         self.path.write_text(tomli_w.dumps(table), encoding="utf-8")
         self.endpoint = endpoint_of(self.path)
         self._start, self._components = start, components
-        self._stack = ExitStack()
         self.service = start(self.path)
-        self._stack.callback(self._stop)
-        self.listener = self._stack.enter_context(Listener(self.endpoint, NAME))
-        self._wait(lambda: self.listener.tracks(0), START_S, "nothing was tracked")
+        with ExitStack() as stack:
+            stack.callback(self._stop)
+            self.listener = stack.enter_context(Listener(self.endpoint, NAME))
+            self._wait(lambda: self.listener.tracks(0), START_S, "nothing was tracked")
+            self._stack = stack.pop_all()
 
     def __enter__(self) -> "RunningRig":
         return self

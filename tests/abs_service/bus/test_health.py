@@ -68,3 +68,10 @@ def test_numbers_and_names_are_published():
     assert message.gauges == {"queue_bytes": 1.5, "rate_hz": 30.0}
     assert message.labels == {"file": "x.mcap"}
     assert (message.component, message.header.rig) == ("capture", "demo")
+
+
+def test_a_number_that_no_message_holds_does_not_end_the_health_of_whoever_counts():
+    rig = Rig()
+    rig.health.count_up_to({"huge": 2**70, "negative": -1})
+    rig.health.publish()
+    assert rig.said[0].counters == {"huge": 2**64 - 1, "negative": 0}

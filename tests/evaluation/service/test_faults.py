@@ -3,6 +3,7 @@
 import json
 import math
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
@@ -11,9 +12,10 @@ from abs_service.report.provenance import trace
 from evaluation import experiment
 from evaluation.experiment import UnavailableError
 from evaluation.service import faults, soak
-from evaluation.service.faults import page
+from evaluation.service.faults import page, running
 from evaluation.service.faults.fault import Elsewhere, Fault, Made, Seen, Try, gap_s
 from evaluation.service.faults.report import row
+from evaluation.service.faults.running import RunningRig
 from evaluation.service.faults.table import FAULTS
 from evaluation.service.soak import Usage, growth, lost_images
 
@@ -50,6 +52,17 @@ def test_names_are_unique_and_tests_exist():
 )
 def test_each_broken_promise_is_named(seen, words):
     assert seen.missed(FAULT) == words
+
+
+def test_a_rig_that_cannot_be_listened_to_is_ended_and_disturbs_no_further_fault(tmp_path, monkeypatch):
+    def refuse(*_):
+        raise TimeoutError
+
+    monkeypatch.setattr(running, "Listener", refuse)
+    service = Mock()
+    with pytest.raises(TimeoutError):
+        RunningRig(tmp_path, running.table(""), lambda _: service, frozenset())
+    service.stop.assert_called_once_with()
 
 
 def test_a_rig_that_is_started_again_has_to_track_soon():
