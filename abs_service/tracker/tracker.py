@@ -90,7 +90,7 @@ class Tracker:
         """Analysis by synthesis: ask, deform, synthesise and score, tell, until the search returns."""
         thetas = next(search)  # ask: candidates (population, dim)
         while True:
-            surface = self.model.deform(thetas)  # eqs. 2–8
+            surface = frame.surfaces.deform(thetas)  # eqs. 2–8
             costs = frame.cost(
                 thetas, surface
             )  # synthesised into every sensor (eqs. 10, 11, 20) and scored (eqs. 16–22)

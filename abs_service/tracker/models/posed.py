@@ -83,8 +83,7 @@ class Posed:
 
     def deform(self, thetas: NDArray[np.float64]) -> Surface:
         """Deforms the mesh with every row of `thetas` (population, dim)."""
-        shape = self._shape.deform(thetas[:, 6:])
-        surface = Surface(shape.vertices.copy(), shape.normals.copy())  # the shape may keep its own
+        surface = self._shape.deform(thetas[:, 6:])
         rotations = scipy.spatial.transform.Rotation.from_rotvec(thetas[:, :3]).as_matrix()
         shifts = self._centroid + thetas[:, 3:6]
         motion = np.concatenate([rotations, shifts[:, :, None]], axis=2).astype(np.float32)

@@ -13,6 +13,7 @@ from abs_service.tracker.posterior.optimum import Optimum
 from abs_service.tracker.posterior.priors.motion_prediction import MotionPrediction
 from abs_service.tracker.posterior.priors.shape_prior import ShapePrior
 from abs_service.tracker.posterior.priors.stretch_prior import StretchPrior
+from abs_service.tracker.posterior.surfaces import FrameSurfaces
 from abs_service.tracker.terms.base import SensorFit
 
 
@@ -25,6 +26,7 @@ class FramePosterior:
         objective: the measurements.
         stretch, shape: priors that hold for all frames.
         motion: the motion prior of this frame.
+        surfaces: the meshes that this frame deforms.
     """
 
     model: DeformationModel
@@ -32,6 +34,7 @@ class FramePosterior:
     stretch: StretchPrior
     shape: ShapePrior
     motion: MotionPrediction
+    surfaces: FrameSurfaces
 
     @property
     def dimension(self) -> int:
@@ -54,7 +57,7 @@ class FramePosterior:
 
     def linearize(self, theta: NDArray[np.float64]) -> LinearizedCost:
         """The cost near theta (dim,)."""
-        surface, sparse_jacobian = self.model.deform(theta[None]), self.model.sparse_jacobian(theta)
+        surface, sparse_jacobian = self.surfaces.deform(theta[None]), self.model.sparse_jacobian(theta)
         terms = self.objective.linearize(surface, sparse_jacobian)
         sensed = [source for term in terms for source in term.sources()]
         priors = self._priors(surface, sparse_jacobian, theta)
@@ -64,16 +67,16 @@ class FramePosterior:
     def optimum(self, theta: NDArray[np.float64], known: LinearizedCost | None) -> Optimum:
         """The optimum at theta (dim,), with what is known of the cost nearby if that holds there."""
         near = known if known is not None and known.holds_at(theta) else self.linearize(theta)
-        return Optimum(theta, self.model.deform(theta[None]), near, posterior_covariance(near.quadratic))
+        return Optimum(theta, self.surfaces.deform(theta[None]), near, posterior_covariance(near.quadratic))
 
     def prior(self, theta: NDArray[np.float64]) -> Quadratic:
         """Gauss–Newton approximation of the priors alone near theta (dim,)."""
-        surface, sparse_jacobian = self.model.deform(theta[None]), self.model.sparse_jacobian(theta)
+        surface, sparse_jacobian = self.surfaces.deform(theta[None]), self.model.sparse_jacobian(theta)
         return self._priors(surface, sparse_jacobian, theta)
 
     def cross_curvature(self, theta: NDArray[np.float64], offsets: NDArray[np.float64]) -> NDArray[np.float64]:
         """JᵀJE (dim, n) at theta (dim,): derivatives with respect to theta, and to an offset (n, 3) [m] per vertex."""
-        surface, each = self.model.deform(theta[None]), np.arange(len(offsets))
+        surface, each = self.surfaces.deform(theta[None]), np.arange(len(offsets))
         single = SparseJacobian(
             np.ascontiguousarray(offsets[:, :, None]), each.astype(np.int32), each[:, None], len(each)
         )
@@ -84,7 +87,7 @@ class FramePosterior:
 
     def fits(self, theta: NDArray[np.float64]) -> tuple[SensorFit, ...]:
         """Agreement of every contributing sensor with theta (dim,)."""
-        return tuple(self.objective.fits(self.model.deform(theta[None])))
+        return tuple(self.objective.fits(self.surfaces.deform(theta[None])))
 
     def misfit(self, surface: Surface) -> NDArray[np.float64]:
         """Signed distance of each vertex from its measurements, and its deviation by noise (2, n) [m]."""

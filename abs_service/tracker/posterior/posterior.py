@@ -7,6 +7,7 @@ from abs_service.tracker.posterior.frame_posterior import FramePosterior
 from abs_service.tracker.posterior.priors.motion_prior import MotionPrior
 from abs_service.tracker.posterior.priors.shape_prior import ShapePrior
 from abs_service.tracker.posterior.priors.stretch_prior import StretchPrior
+from abs_service.tracker.posterior.surfaces import FrameSurfaces
 
 
 class Posterior:
@@ -45,5 +46,6 @@ class Posterior:
         """
         self.stretch.rest_on(self.model.mesh.vertices)
         motion = self.motion.predict(observation.t_host_ns)
-        observed = self.objective.observe(observation, self.model.deform(motion.theta[None]), motion.reach_m)
-        return FramePosterior(self.model, observed, self.stretch, self.shape, motion)
+        surfaces = FrameSurfaces(self.model)
+        observed = self.objective.observe(observation, surfaces.deform(motion.theta[None]), motion.reach_m)
+        return FramePosterior(self.model, observed, self.stretch, self.shape, motion, surfaces)

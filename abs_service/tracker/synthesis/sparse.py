@@ -101,37 +101,40 @@ class SparseView:
         self._gradients = gradients
         self._hidden = np.zeros(len(attributes), np.bool_)
         self._rendered: tuple[Surface | None, NDArray[np.float32]] = (None, np.zeros((0, 0), np.float32))
-        self._seen: tuple[Surface, Synthesis] | None = None
+        self._seen: dict[Surface, Synthesis] = {}  # in this frame, without populations
         self._optics = *optics(camera), camera.field_radius**2, camera.height, camera.width
         self._sample = gradients.sampler(camera.lens)
 
     def look(self, predicted: Surface) -> None:
         """Marks the vertices that face away or are self-occluded in the predicted mesh."""
-        self._hidden, self._seen = np.zeros(predicted.vertices.shape[2], np.bool_), None
+        self._hidden, self._seen = np.zeros(predicted.vertices.shape[2], np.bool_), {}
         self._gradients.look(predicted)
-        seen = self.synthesize(predicted)
+        seen = self._synthesize(predicted)
         stride = self.camera.width + 2
         row, column = np.divmod(seen.pixel[0], stride)
         inside = seen.pixel[0] > 0
         front = np.where(inside, self._front(predicted, (row - 1) * inside, (column - 1) * inside), np.float32(np.inf))
         facing = np.einsum("in,in->n", predicted.normals[0], self._sight(predicted)) < 0
-        self._hidden, self._seen = ~facing | (front < seen.distance[0] - HIDING_M), None
+        self._hidden = ~facing | (front < seen.distance[0] - HIDING_M)
 
     def synthesize(self, surface: Surface) -> Synthesis:
         """Synthesises a population of deformed meshes; occluded vertices are ignored.
 
-        The result for the last population is cached.
+        A surface by itself is synthesised once in a frame.
         """
-        if self._seen is not None and self._seen[0] is surface:
-            return self._seen[1]
+        if len(surface.vertices) > 1:
+            return self._synthesize(surface)
+        if surface not in self._seen:
+            self._seen[surface] = self._synthesize(surface)
+        return self._seen[surface]
+
+    def _synthesize(self, surface: Surface) -> Synthesis:
         population, _, n = surface.vertices.shape
         pixel = np.empty((population, n), np.int32)
         distance = np.empty((population, n), np.float32)
         steps = self._gradients.steps(population, n)
         self._sample(surface.vertices, surface.normals, self._hidden, *self._optics, pixel, distance, steps)
-        seen = Synthesis(pixel, distance, self._gradients.at_centers(self._attributes, steps))
-        self._seen = surface, seen
-        return seen
+        return Synthesis(pixel, distance, self._gradients.at_centers(self._attributes, steps))
 
     def attribute_gradients(self, surface: Surface) -> NDArray[np.float32]:
         """Gradients for the predicted surface, see `look`."""

@@ -48,19 +48,12 @@ class Patches:
         value, along_u, along_w = denominator
         self._vertices = np.zeros((6, len(u) + LANES), np.float32)
         self._vertices[:, : len(u)] = [*place, offset, 1 / value, along_u, along_w]
-        self._last: tuple[NDArray[np.float64], Surface | None] = (np.zeros((0, 0)), None)
 
     def deform(self, thetas: NDArray[np.float64]) -> Surface:
-        """Vertices and normals for every row of `thetas` (population, 3 · control points) [m].
-
-        For the last thetas again it is the same surface, which a view need not synthesise once more.
-        """
-        last, surface = self._last
-        if surface is None or not np.array_equal(last, thetas):
-            shape = len(thetas), 3, self._vertices.shape[1] - LANES
-            surface = Surface(np.empty(shape, np.float32), np.empty(shape, np.float32))
-            self._deform(thetas, *self._arguments, surface.vertices, surface.normals)
-            self._last = thetas.copy(), surface
+        """Vertices and normals for every row of `thetas` (population, 3 · control points) [m]."""
+        shape = len(thetas), 3, self._vertices.shape[1] - LANES
+        surface = Surface(np.empty(shape, np.float32), np.empty(shape, np.float32))
+        self._deform(thetas, *self._arguments, surface.vertices, surface.normals)
         return surface
 
     @property
@@ -70,7 +63,6 @@ class Patches:
     def set_offsets(self, offset: NDArray[np.float64]) -> None:
         """Replaces the vertex offsets (n,) [m]."""
         self._vertices[2, : len(offset)] = offset
-        self._last = np.zeros((0, 0)), None
 
 
 def _polynomials(
