@@ -158,7 +158,7 @@ class FirstOrder:
         """
         flat = metres_per_pixel(self._camera, predicted.vertices[0].T, self._edges, self._lengths)
         self._per_pixel = np.ascontiguousarray(self._per_metre @ flat, np.float32)
-        self._gains = self._noise * np.square(flat).sum(axis=1)
+        self._gains = self._noise * (flat[:, 0] ** 2 + flat[:, 1] ** 2)  # faster than a sum over so short an axis
         self._planes = np.ascontiguousarray(self._per_pixel.transpose(1, 2, 0))
 
     def at_centers(self, values: NDArray[np.float32], steps: NDArray[np.float32]) -> NDArray[np.float32]:

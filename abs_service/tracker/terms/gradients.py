@@ -82,7 +82,8 @@ def noiseless_color_rows(
     places, projection = project_with_jacobian(camera, vertices)
     rows = _image_rows(image, places, projection) * weight[..., None]
     weighted = np.square(noise_deviation(image, places) * weight).sum(axis=1)
-    return shortened(rows, _NOISE_GAIN * float(weighted @ np.square(projection).sum(axis=(1, 2))))
+    entries = projection.reshape(len(projection), -1)
+    return shortened(rows, _NOISE_GAIN * float(weighted @ np.vecdot(entries, entries)))
 
 
 def shortened(rows: NDArray[np.float64], noise: float) -> NDArray[np.float64]:

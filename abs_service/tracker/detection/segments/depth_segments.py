@@ -43,7 +43,7 @@ def connected_surfaces(distance: NDArray[np.float32], largest_step: float) -> Su
         largest_step: largest difference between connected neighbours [m].
     """
     known = np.isfinite(distance)
-    smooth = cv2.medianBlur(np.where(known, distance, 0).astype(np.float32, copy=False), 5)
+    smooth = cv2.medianBlur(cv2.copyTo(distance, known.view(np.uint8)), 5)  # zero where unknown
     highest, lowest = cv2.dilate(smooth, _AROUND), cv2.erode(smooth, _AROUND)
     surface = (known & (lowest > 0) & (highest - lowest < largest_step)).view(np.uint8)
     count, labels = cv2.connectedComponents(surface, connectivity=4)

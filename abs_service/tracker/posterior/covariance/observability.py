@@ -23,13 +23,14 @@ def single_frame_deviation(optimum: Optimum, prediction: MotionPrediction) -> fl
         optimum: the estimate of the frame.
         prediction: its motion prior, of which hardly anything is kept.
     """
-    alone = _without_motion(optimum, prediction) + KEPT_PRIOR * prediction.least_precision
-    derivatives = optimum.linearized.sparse_jacobian
+    alone = _with_widest(optimum, prediction, KEPT_PRIOR)
+    derivatives, dimension = optimum.linearized.sparse_jacobian, len(alone)
     some = np.linspace(0, len(derivatives.local) - 1, PROBES).astype(np.intp)
-    rows = np.zeros((PROBES, 3, len(alone)))
-    np.put_along_axis(rows, derivatives.parameters[derivatives.group[some]][:, None], derivatives.local[some], axis=2)
-    white = whitened(alone, rows.reshape(-1, len(alone)).T)
-    return float(np.sqrt(median(np.einsum("ij,ij->j", white, white).reshape(PROBES, 3).sum(axis=1))))
+    rows = np.zeros((PROBES, dimension, 3))
+    own = derivatives.parameters[derivatives.group[some]]
+    rows[np.arange(PROBES)[:, None], own] = derivatives.local[some].transpose(0, 2, 1)
+    white = whitened(alone, rows.transpose(1, 0, 2).reshape(dimension, -1))
+    return float(np.sqrt(median(np.square(white).sum(axis=0).reshape(PROBES, 3).sum(axis=1))))
 
 
 def unobserved_motion(
@@ -46,14 +47,13 @@ def unobserved_motion(
         optimum: the estimate of the frame.
         prediction: its motion prior.
     """
-    least_precision = prediction.least_precision
-    gain = solved(_without_motion(optimum, prediction) + least_precision, least_precision)
+    gain = solved(_with_widest(optimum, prediction, 1.0), prediction.least_precision)
     gain = gain.astype(np.float32)  # enough for a share that only tells the two apart, in half the time
     for _ in range(3):
         gain = gain @ gain
     return np.asarray(gain @ motion.astype(np.float32) @ gain.T, np.float64)
 
 
-def _without_motion(optimum: Optimum, prediction: MotionPrediction) -> NDArray[np.float64]:
-    """Curvature (dim, dim) of likelihood and priors without the motion prior."""
-    return optimum.linearized.quadratic.curvature - prediction.precision
+def _with_widest(optimum: Optimum, prediction: MotionPrediction, share: float) -> NDArray[np.float64]:
+    """Curvature (dim, dim) of likelihood and priors with a share of the widest motion prior in place of the frame's."""
+    return optimum.linearized.quadratic.curvature + prediction.exchanged(share)

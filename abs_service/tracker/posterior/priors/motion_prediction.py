@@ -50,6 +50,11 @@ class MotionPrediction:
         """Inverse covariance (dim, dim) of the widest prior, that of an object whose motion is unknown."""
         return self.metric.matrix / (self.settings.speed * self.elapsed_s) ** 2
 
+    def exchanged(self, share: float) -> NDArray[np.float64]:
+        """A share of the widest prior's precision in place of this one's: their difference (dim, dim)."""
+        widest = share / (self.settings.speed * self.elapsed_s) ** 2
+        return self.metric.matrix * (widest - 1 / self._deviation_m**2)
+
     @property
     def persistence(self) -> float:
         """Share of the last velocity that is predicted for this frame, 0…1."""

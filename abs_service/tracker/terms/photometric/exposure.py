@@ -28,14 +28,15 @@ def gains(measured: NDArray[np.floating], expected: NDArray[np.floating]) -> NDA
         measured: values at the predicted samples (m, channels) [8-bit levels]; NaN where unknown.
         expected: appearance of these samples (m, channels) [8-bit levels]; NaN where unknown.
     """
+    of_image, own = np.ascontiguousarray(measured.T), np.ascontiguousarray(expected.T)
     with np.errstate(invalid="ignore", divide="ignore"):
-        usable = (np.minimum(expected, measured) > DARKEST) & (np.maximum(expected, measured) < BRIGHTEST)
-        ratios = measured / expected
-    common = _gain(ratios[usable]) if np.count_nonzero(usable.any(axis=1)) >= MIN_SAMPLES else 1.0
-    result = np.full(expected.shape[1], common, np.float32)
-    for channel, chosen in enumerate(usable.T):
-        if np.count_nonzero(chosen) >= MIN_SAMPLES:
-            result[channel] = _gain(ratios[chosen, channel])
+        usable = (np.minimum(own, of_image) > DARKEST) & (np.maximum(own, of_image) < BRIGHTEST)
+        ratios = of_image / own
+    known = [ratio[chosen] for ratio, chosen in zip(ratios, usable)]
+    result = np.array([_gain(some) if len(some) >= MIN_SAMPLES else np.nan for some in known], np.float32)
+    if np.isnan(result).any():
+        is_enough = np.count_nonzero(usable.any(axis=0)) >= MIN_SAMPLES
+        result[np.isnan(result)] = _gain(np.concatenate(known)) if is_enough else 1.0
     return result
 
 

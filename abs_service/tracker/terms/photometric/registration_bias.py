@@ -54,7 +54,11 @@ class RegistrationBias:
         camera = self._view.camera
         axes = camera.T_rs[:3]
         depth = (vertices - camera.center) @ axes[:, 2]
-        return self._deviation_px * (rows @ axes[:, :2]) * (depth[points, None] / (camera.fx, camera.fy))
+        return (
+            rows
+            @ (axes[:, :2] * (self._deviation_px / camera.fx, self._deviation_px / camera.fy))
+            * depth[points, None]
+        )
 
 
 def deviation_px(image: NDArray[np.float32] | NDArray[np.uint8], places: NDArray[np.float64]) -> float:

@@ -27,9 +27,10 @@ def displacement(away: NDArray[np.float64], directions: NDArray[np.float64]) -> 
         away: signed distances (k,) of the edges from the outline.
         directions: out of the mesh, in the image (k, 2).
     """
+    if not away.any():
+        return 0.0
     right, down, left, up = (_typical(away[side]) for side in by_side(directions))
-    mean = float(np.mean(np.abs(away))) if len(away) else 0.0
-    return max(mean, _slide(right, left), _slide(down, up))
+    return max(float(np.mean(np.abs(away))), _slide(right, left), _slide(down, up))
 
 
 def motion(away: NDArray[np.float64], directions: NDArray[np.float64], places: NDArray[np.float64]) -> float:

@@ -1,5 +1,7 @@
 """Directions that the measurements of a single frame do not show."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -43,3 +45,14 @@ def test_a_direction_that_no_measurement_determines_is_found_in_a_single_frame()
 def test_only_a_motion_in_that_direction_remains_unobserved():
     found = unobserved_motion(4e-6 * np.eye(2), optimum(np.diag([0.0, 1e6])), PREDICTION)
     np.testing.assert_allclose(found, np.diag([4e-6, 0.0]), atol=1e-12)
+
+
+def test_the_frame_s_own_motion_prior_counts_for_nothing():
+    """Its part in the curvature makes room for a share of the widest one."""
+    narrow = replace(PREDICTION, speed=0.1, metric=ChangeMetric(np.array([1.0, 0.5]), np.ones((1, 2))))
+    np.testing.assert_allclose(
+        narrow.exchanged(0.25), 0.25 * narrow.least_precision - narrow.precision, rtol=1e-12, atol=0
+    )
+    likelihood, wide = np.diag([1e3, 1e6]), replace(narrow, speed=np.inf)
+    found = single_frame_deviation(optimum(likelihood + narrow.precision), narrow)
+    assert found == pytest.approx(single_frame_deviation(optimum(likelihood), wide), rel=1e-9)
