@@ -67,7 +67,8 @@ class FramePosterior:
     def optimum(self, theta: NDArray[np.float64], known: LinearizedCost | None) -> Optimum:
         """The optimum at theta (dim,), with what is known of the cost nearby if that holds there."""
         near = known if known is not None and known.holds_at(theta) else self.linearize(theta)
-        return Optimum(theta, self.surfaces.deform(theta[None]), near, posterior_covariance(near.quadratic))
+        surface, sensed = self.surfaces.deform(theta[None]), near.sensed_at(theta)
+        return Optimum(theta, surface, near, sensed, posterior_covariance(near.quadratic))
 
     def prior(self, theta: NDArray[np.float64]) -> Quadratic:
         """Gauss–Newton approximation of the priors alone near theta (dim,)."""

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.models.base import Surface
-from abs_service.tracker.posterior.linearized_cost import LinearizedCost
+from abs_service.tracker.posterior.linearized_cost import LinearizedCost, Sensed
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -17,12 +17,14 @@ class Optimum:
         theta: the estimate (dim,).
         surface: its surface, a population of one.
         linearized: the cost linearised near it.
+        sensed: residuals of the sensors at the estimate, and their derivatives.
         inverse_curvature: Σ (dim, dim), the covariance of the estimate by Laplace's approximation.
     """
 
     theta: NDArray[np.float64]
     surface: Surface
     linearized: LinearizedCost
+    sensed: Sensed
     inverse_curvature: NDArray[np.float64]
 
     @property

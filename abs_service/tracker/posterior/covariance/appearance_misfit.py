@@ -3,13 +3,15 @@
 A sheet of rubber stretches by more than the stretch prior of paper allows. The mesh then keeps its lengths, and colours
 disagree: none of its parameters could be off so that this is within its covariance. But the images tell how far each
 vertex would have to move along the surface. With the residuals r of its images and their derivatives J with respect to
-its position, those of its neighbours included, a step of Lucas and Kanade (IJCAI, 1981) is, along the surface,
+its position, those of the vertices within two edges included, a step of Lucas and Kanade (IJCAI, 1981) is, along the
+surface,
 
     d = −(A + 1 / L²)⁻¹ b,    A = Σ JᵀJ,    b = Σ Jᵀr,
 
 where L is the distance within which gradients hold. Noise alone makes |d|² as large as (A + 1 / L²)⁻¹ A (A + 1 / L²)⁻¹,
-the sum of its diagonal, on average. What |d|² has beyond four times of that is averaged over vertex and neighbours, and
-over the mesh, since a part of it may be plain. The larger of the two is added, one half along either tangent.
+the sum of its diagonal, on average. What |d|² has beyond three deviations of noise is averaged over vertex and
+neighbours, and over the mesh, since a part of it may be plain. The larger of the two is added along either tangent,
+which is twice as much: colours that do not agree at all are outliers, without which d is too short.
 """
 
 from typing import Protocol
@@ -21,11 +23,9 @@ from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.posterior.covariance.misfit import mean_around
 from abs_service.tracker.posterior.optimum import Optimum
 from abs_service.tracker.terms import chain_rule
+from abs_service.tracker.terms.base import INLIER_DEVIATIONS
 from abs_service.tracker.terms.linearization import PointLinearization
 from calib.jit import kernel
-
-#: Squared length of a displacement, in mean squared lengths by noise, that noise exceeds once in e⁴ = 55 times.
-NOT_BY_CHANCE = 4.0
 
 #: Distance within which gradients hold, in typical distances between neighbouring vertices.
 REACH = 2.0
@@ -56,20 +56,21 @@ class AppearanceMisfit:
 
     def __init__(self, mesh: Mesh):
         self._mean = mean_around(mesh)
+        self._around = self._mean @ self._mean  # within two edges
         self._least_precision = len(mesh.vertices) / (mesh.area * REACH**2)
 
     def variance(self, optimum: Optimum) -> NDArray[np.float64]:
         """Variance (n,) [m²] of the vertices of an estimate; samples between the vertices show none."""
-        near, n = optimum.linearized, optimum.surface.vertices.shape[2]
+        vertices, n = optimum.linearized.sparse_jacobian, optimum.surface.vertices.shape[2]
         squares, gradient = np.zeros((n, 3, 3)), np.zeros((n, 3, 1))
-        for part in near.sensed_at(optimum.theta):
-            if isinstance(part, PointLinearization) and part.sparse_jacobian is near.sparse_jacobian:
+        for part in optimum.sensed:
+            if isinstance(part, PointLinearization) and part.sparse_jacobian is vertices:
                 chain_rule.sum_squares(part.rows, part.points, np.ones(len(part.points)), squares)
                 chain_rule.sum_at_points(part.rows, part.points, part.residual[:, None], gradient)
-        excess, ring = np.empty(n), (self._mean.indptr, self._mean.indices)
-        beyond_noise(*ring, squares, gradient, optimum.surface.normals[0], self._least_precision, excess)
+        excess, around = np.empty(n), (self._around.indptr, self._around.indices)
+        beyond_noise(*around, squares, gradient, optimum.surface.normals[0], self._least_precision, excess)
         np.maximum(excess, 0.0, out=excess)
-        return 0.5 * np.maximum(self._mean @ excess, excess.mean())
+        return np.maximum(self._mean @ excess, excess.mean())
 
 
 @kernel
@@ -82,7 +83,7 @@ def beyond_noise(
     least_precision: float,
     excess: NDArray[np.float64],
 ) -> None:
-    """|d|² less `NOT_BY_CHANCE` times that by noise (n,) [m²], into `excess`.
+    """|d|² beyond `INLIER_DEVIATIONS` of noise (n,) [m²], into `excess`; negative where there is none.
 
     Args:
         start, around: first place (n + 1,) of every vertex in the list of those around it, itself included (k,).
@@ -119,4 +120,4 @@ def beyond_noise(
         one, other = c * f - b * g, a * g - b * f
         # With G = (A + 1 / L²)⁻¹, the trace of G A G is that of G − G² / L².
         noise = (a + c) / determinant - least_precision * (a * a + 2 * b * b + c * c) / determinant**2
-        excess[v] = (one * one + other * other) / determinant**2 - NOT_BY_CHANCE * noise
+        excess[v] = (one * one + other * other) / determinant**2 - INLIER_DEVIATIONS**2 * noise

@@ -38,8 +38,7 @@ class ThetaCovariance:
             prediction: the motion prior of the frame.
             recent: the object's motion lately.
         """
-        inverse, linearized = optimum.inverse_curvature, optimum.linearized
-        sensed = linearized.sensed_at(optimum.theta)
+        inverse, linearized, sensed = optimum.inverse_curvature, optimum.linearized, optimum.sensed
         leverage = leverages(inverse, sensed)
         effects = self._effects.update(inverse, sensed, leverage)
         errors = FrameErrors(

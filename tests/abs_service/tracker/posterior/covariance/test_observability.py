@@ -31,7 +31,7 @@ def optimum(curvature: np.ndarray) -> Optimum:
     jacobian = SparseJacobian(local, np.zeros(30, np.int32), np.array([[0, 1]]), 2)
     linearized = LinearizedCost(np.zeros(2), Quadratic(np.zeros(2), curvature), np.zeros((2, 2)), [], jacobian)
     surface = Surface(*np.zeros((2, 1, 3, 30), np.float32))
-    return Optimum(np.zeros(2), surface, linearized, np.zeros((2, 2)))
+    return Optimum(np.zeros(2), surface, linearized, [], np.zeros((2, 2)))
 
 
 def test_a_direction_that_no_measurement_determines_is_found_in_a_single_frame():
