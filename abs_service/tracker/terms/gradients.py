@@ -82,7 +82,7 @@ def noiseless_color_rows(
     places, projection = project_with_jacobian(camera, vertices)
     rows = _image_rows(image, places, projection) * weight[..., None]
     weighted = np.square(noise_deviation(image, places) * weight).sum(axis=1)
-    entries = projection.reshape(len(projection), -1)
+    entries = projection.reshape(len(projection), 6)
     return shortened(rows, _NOISE_GAIN * float(weighted @ np.vecdot(entries, entries)))
 
 
