@@ -59,8 +59,8 @@ def run(arguments: argparse.Namespace) -> int:
         health = Health(bus, "record", headers)
         bus.declare_liveliness("record")
         trigger = _trigger(rig, clock)
-        # In parallel: it may take minutes.
-        recovery = threading.Thread(target=recover_leftovers, args=(settings, health), daemon=True)
+        # In parallel: it may take minutes, and the disk may not answer.
+        recovery = threading.Thread(target=recover_leftovers, args=(settings, health, time.time()), daemon=True)
         recorder = Recorder(bus, settings, health, clock, trigger=trigger)
         os.nice(NICE)  # this thread and those that it starts from now on: not those that receive
         tracking = FirstTracking(bus, rig.trackers)
@@ -126,21 +126,30 @@ def _trigger(rig: config.ServiceConfig, clock: WallClock) -> Trigger:
     return trigger
 
 
-def recover_leftovers(settings: RecorderSettings, health: Health) -> None:
-    """Recovers what recorders before this one have left; health and log say what came of it."""
+def recover_leftovers(settings: RecorderSettings, health: Health, begun_s: float) -> None:
+    """Recovers what recorders before this one have left; health and log say what came of it.
+
+    Args:
+        settings: of the recorder.
+        health: of the recorder.
+        begun_s: Unix time at which it began [s]; what has been written since is nobody's who has ended.
+    """
     remove_interrupted(settings.directory)
     for path in leftovers(settings.directory):
         try:
+            if path.stat().st_mtime >= begun_s:
+                continue
             if shutil.disk_usage(settings.directory).free < path.stat().st_size + settings.minimum_free_bytes:
                 # Recording goes first: the copy must not take the room that it needs.
                 raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
             report = recover(path)
-        except InUseError:  # the file that is being recorded, or another recorder's
+        except (InUseError, FileNotFoundError):  # another recorder's, which may have finished it
             continue
         except RecoveryError as error:  # it holds nothing
             _log.warning("not recovered: %s", error)
             with suppress(OSError):
-                set_aside(path)  # else its size would count for ever, and recordings would be deleted for it
+                if path.stat().st_size:  # an empty one takes no room, and a recorder may have made it this moment
+                    set_aside(path)  # else its size would count for ever, and recordings would be deleted for it
             continue
         except OSError as error:
             health.report("recovery", Level.WARNING, f"{path} cannot be recovered: {error.strerror}")
