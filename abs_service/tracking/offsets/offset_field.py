@@ -96,10 +96,6 @@ class OffsetField:
         self._messages = 1 / (known[self._from] + incoming[self._back])
         return 1 / (diagonal - np.bincount(self._to, squares * self._messages, len(diagonal)))
 
-    def around(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Sums (n,) over every vertex and its neighbours."""
-        return values + np.bincount(self._from, values[self._to], len(values))
-
     def _diagonal(self, precision: NDArray[np.float64], prior: Prior) -> NDArray[np.float64]:
         return precision + prior.precision + prior.coupling * self._total
 

@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 from abs_service.pairing.images import DepthImage, Image
 from abs_service.tracker.mesh import Mesh, edge_lengths
 from abs_service.tracker.models.base import Surface
-from abs_service.tracking.offsets.heights import INLIER_DEVIATIONS, Heights, HeightSensor
+from abs_service.tracker.posterior.covariance.misfit import CommonDistance
+from abs_service.tracking.offsets.heights import Heights, HeightSensor
 from abs_service.tracking.offsets.offset_field import OffsetField, change_prior, offset_prior
 from calib.jit import kernel
 from calib.noise.base import DepthNoise
@@ -121,6 +122,7 @@ class LearntOffsets:
         self._model, self._random_walk = model, random_walk
         self._heights = HeightSensor(sensor.camera, noise, mesh)
         self._field = OffsetField(mesh)
+        self._common = CommonDistance(mesh)
         self._first = self._mean = self._offset = np.array(model.offset, np.float64)
         self._precision = 1 / self.variance
         self._around = edges_around(mesh)
@@ -161,8 +163,7 @@ class LearntOffsets:
         """Mask (n,) of the vertices around which the model misses the surface: all heights are off to the same side."""
         measured = heights.precision > 0
         noise = np.where(measured, 1 / np.where(measured, heights.precision, 1) + self.variance, 0)
-        total, square = self._field.around(np.where(measured, heights.mean, 0)), self._field.around(noise)
-        return total**2 > INLIER_DEVIATIONS**2 * square
+        return self._common.excess(heights.mean, noise) > 0
 
     def _infer(self) -> None:
         """The most probable offsets, bounded by the lengths of their vertices' edges."""

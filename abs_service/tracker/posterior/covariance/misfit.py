@@ -34,8 +34,7 @@ class Misfit:
     """
 
     def __init__(self, mesh: Mesh):
-        self._mean = mean_around(mesh)
-        self._squared = self._mean.power(2)
+        self._common = CommonDistance(mesh)
         self._along = 0.0
 
     def update(
@@ -47,14 +46,37 @@ class Misfit:
             distance: signed distances of the vertices from their measurements (n,) [m].
             deviation: of independent noise of these (n,) [m].
         """
-        noise = self._squared @ deviation**2
-        excess = np.maximum((self._mean @ distance) ** 2 - INLIER_DEVIATIONS**2 * noise, 0.0)
-        across = self._mean @ excess
+        excess = self._common.excess(distance, deviation**2)
+        across = self._common.mean @ excess
         missing = np.count_nonzero(excess) / len(excess)
         of_most = float(across.mean()) if missing > MOST else 0.0
         kept = self._along if missing > HARDLY_ANY else 0.0
         self._along = kept + (RISE if of_most > kept else FALL) * (of_most - kept)
         return across, np.maximum(across, self._along)
+
+
+class CommonDistance:
+    """Distances that neighbouring vertices have in common: noise and outliers stand alone.
+
+    Args:
+        mesh: the mesh.
+
+    Attributes:
+        mean: matrix (n, n) of the mean over each vertex and its neighbours.
+    """
+
+    def __init__(self, mesh: Mesh):
+        self.mean = mean_around(mesh)
+        self._squared = self.mean.power(2)
+
+    def excess(self, distance: NDArray[np.float64], variance: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Squares of the mean distances beyond `INLIER_DEVIATIONS` of noise (n,) [m²], 0 where noise explains them.
+
+        Args:
+            distance: of the vertices (n,) [m].
+            variance: of independent noise of these (n,) [m²].
+        """
+        return np.maximum((self.mean @ distance) ** 2 - INLIER_DEVIATIONS**2 * (self._squared @ variance), 0.0)
 
 
 def mean_around(mesh: Mesh) -> "scipy.sparse.csr_array":
