@@ -36,7 +36,8 @@ class Tracker:
     Args:
         depth: camera of the depth images.
         model: deformation model: `Nurbs(4, 4)`, `FlexPad()`, `Gravity()`, `Rigid()` or `Posed(…)`.
-        noise: noise model of the depths, one of `noise`; None: `noise.StructuredLight()`, a Kinect v1.
+        noise: noise model of the depths, one of `noise`; None: `noise.StructuredLight()`, a Kinect v1. A sensor that is
+            much noisier than its model is found out in the image that the mesh is made from.
         color: camera of the colour images with its pose `T_rs`, which maps its coordinates to those of the rig.
         color_noise: `noise.Color()`, `noise.Grey()` or `noise.Bayer()`; None: `noise.Color()`.
         texture: noise model of the amplitudes, `noise.Intensity("amplitude", …)`, if they are to be tracked as a

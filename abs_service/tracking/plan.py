@@ -28,7 +28,9 @@ from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.tracker import Tracker
 from abs_service.tracking.monitors import loss_monitor
 from abs_service.tracking.offsets.vertex_offsets import Settings as VertexOffsetSettings
-from calib.noise.base import ImageNoise
+from abs_service.tracking.offsets.vertex_offsets import VertexOffsets
+from calib.noise.base import DepthNoise, ImageNoise
+from calib.noise.scaled import Scaled
 from calib.rig import Rig
 
 
@@ -153,8 +155,8 @@ def _derived(part: object) -> Mapping[str, tuple[float, ...]]:
 
 def make_tracker(
     plan: Plan, template: Template, rig: Rig, detection: InitialDetection, observation: Observation
-) -> tuple[Tracker, Mesh]:
-    """A tracker of the detected object, and its mesh; the template is that of the plan.
+) -> tuple[Tracker, Mesh, VertexOffsets]:
+    """A tracker of the detected object, its mesh and the offsets of its vertices; the template is that of the plan.
 
     Raises:
         DetectionError: the model finds no object of its kind, or the template another one.
@@ -167,7 +169,18 @@ def make_tracker(
         if doubts := warnings(detection):
             raise ExtentError(f"{', '.join(doubts)} The model cannot be made of it") from error
         raise
+    rig = _as_seen(rig, plan.reference, detection)
     posterior, mesh = make_posterior(plan, rig, model, observation, sight)
     optimizer = plan.optimizer.build(posterior.dimension, np.random.default_rng(plan.seed))
     centers = [sensor.camera.center for sensor in rig.sensors.values() if isinstance(sensor.noise, ImageNoise)]
-    return Tracker(posterior, optimizer, plan.evaluations, plan.status, sight.registration_m, centers), mesh
+    tracker = Tracker(posterior, optimizer, plan.evaluations, plan.status, sight.registration_m, centers)
+    return tracker, mesh, plan.vertex_offsets.build(model, rig.sensors[plan.reference])
+
+
+def _as_seen(rig: Rig, reference: str, detection: InitialDetection) -> Rig:
+    """The rig with as much noise of the reference sensor as the first image shows."""
+    sensor = rig.sensors[reference]
+    if detection.noise_scale == 1 or not isinstance(sensor.noise, DepthNoise):
+        return rig
+    noisier = replace(sensor, noise=Scaled(sensor.noise, detection.noise_scale))
+    return replace(rig, sensors={**rig.sensors, reference: noisier})

@@ -118,7 +118,7 @@ def _look(
     try:
         detection = detect_object(observation, rig, plan.reference, region, plan.vertices)
         selected = np.isfinite(detection.distance)
-        tracker, _ = make_tracker(plan, template, rig, detection, observation)
+        tracker, _, _ = make_tracker(plan, template, rig, detection, observation)
     except (DetectionError, ModelError) as error:
         warned = (str(error),) if isinstance(error, ExtentError) else ()
         return Preview(number, camera, image.distance, selected, None, str(error), warned)

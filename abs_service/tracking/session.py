@@ -57,10 +57,11 @@ class _Failure(NamedTuple):
 
 
 class _Built(NamedTuple):
-    """A tracker of a detected object, its mesh, and the detection that both are of."""
+    """A tracker of a detected object, its mesh, their offsets, and the detection that all are of."""
 
     tracker: Tracker
     mesh: Mesh
+    vertex_offsets: VertexOffsets
     detection: InitialDetection
 
 
@@ -228,13 +229,10 @@ class TrackingSession:
         self._vertex_offsets.update(observation.images.get(self._plan.reference), surface, observation.t_host_ns)
 
     def _adopt(self, built: _Built, observation: Observation) -> None:
-        self._tracker, self.mesh, detection = built
+        self._tracker, self.mesh, self._vertex_offsets, detection = built
         self._view, self._vertices = FirstView(detection, built.mesh), built.mesh.vertices
         self._warnings = doubts(detection, built.mesh, observation.images, self._rig)
         self.made_ns = observation.t_host_ns
-        self._vertex_offsets = self._plan.vertex_offsets.build(
-            built.tracker.model, self._rig.sensors[self._plan.reference]
-        )
         unknown = [n for n in observation.missing if isinstance(self._rig.sensors[n].noise, ImageNoise)]
         self._appearance_monitor = AppearanceMonitor(unknown, self._plan.reinitialization.every_s)
         self._growth_monitor = GrowthMonitor(self._plan.reinitialization.grow_s)

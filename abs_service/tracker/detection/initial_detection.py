@@ -26,7 +26,9 @@ class InitialDetection:
         camera: the camera that measured them.
         vertices: approximate number of vertices of the mesh to be built.
         surroundings: the same image without segmentation; empty if unknown.
-        deviation: standard deviation of a distance of the object by the sensor's noise model, median [m]; 0 if unknown.
+        deviation: standard deviation of a distance of the object, median [m]; 0 if unknown. By the sensor's noise
+            model, unless the image scatters much more.
+        noise_scale: the deviation over that by the noise model.
     """
 
     distance: NDArray[np.float32]
@@ -34,6 +36,7 @@ class InitialDetection:
     vertices: int
     surroundings: NDArray[np.float32] = field(default_factory=lambda: np.zeros((0, 0), np.float32))
     deviation: float = 0.0
+    noise_scale: float = 1.0
 
     @property
     def points(self) -> NDArray[np.float64]:

@@ -10,7 +10,6 @@ from abs_service.pairing.images import Image
 from abs_service.tracker.detection.image_alignment import alignment_warnings
 from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection
 from abs_service.tracker.mesh import Mesh, pieces_of
-from calib.noise.fit.scatter import scatter
 from calib.rig import Rig
 
 #: Range of the extent of an object [m]; outside, the distances have the wrong unit.
@@ -38,10 +37,6 @@ LINING = 1.2
 
 #: Depth below the border of all that is measured at which the length along it is counted [px]: surfaces end inside.
 BELOW_BORDER_PX = 6
-
-#: Distances that scatter by this factor more than their noise model says contradict it. They are judged where they
-#: differ from the object's by less than this share, because deviations change with the distance.
-TOO_MUCH_SCATTER, AS_FAR = 1.5, 0.25
 
 
 class ExtentError(DetectionError):
@@ -141,18 +136,14 @@ def mesh_warnings(mesh: Mesh) -> tuple[str, ...]:
 
 
 def noise_warnings(detection: InitialDetection) -> tuple[str, ...]:
-    """Doubts about the noise model of the distances, which weighs all measurements: they may not scatter much more."""
-    if not (detection.surroundings.size and detection.deviation):
-        return ()
-    middle = float(np.nanmedian(detection.distance))
-    as_far = np.abs(detection.surroundings - middle) < AS_FAR * middle
-    seen = scatter(np.where(as_far, detection.surroundings, np.nan)) * middle**2
-    if not seen > TOO_MUCH_SCATTER * detection.deviation:
+    """Doubts about the noise model of the distances, if it is not the one in use."""
+    if detection.noise_scale == 1:
         return ()
     return (
-        f"distances scatter by {seen * 1e3:.1f} mm about flat things as far away as the object, and not by "
-        f"{detection.deviation * 1e3:.1f} mm, as the sensor's noise model says: the mesh would seem to disagree – "
-        "measure the noise by abs-service calibrate noise",
+        f"distances scatter by {detection.deviation * 1e3:.1f} mm about flat things as far away as the object, and not "
+        f"by {detection.deviation / detection.noise_scale * 1e3:.1f} mm, as the sensor's noise model says: all its "
+        f"deviations are taken {detection.noise_scale:.1f} times as large – measure the noise by abs-service calibrate "
+        "noise",
     )
 
 

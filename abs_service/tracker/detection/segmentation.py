@@ -11,7 +11,12 @@ from abs_service.tracker.detection.initial_detection import DetectionError, Init
 from abs_service.tracker.detection.plausibility import LARGEST_M, LARGEST_SCENE_M, MAX_POINTS, check_extent
 from abs_service.tracker.detection.regions.base import Region
 from calib.noise.base import DepthNoise, subtract_mean_offset
+from calib.noise.fit.scatter import scatter
 from calib.rig import Rig
+
+#: Distances that scatter by this factor more than their noise model says contradict it. They are judged where they
+#: differ from the object's by less than this share, because deviations change with the distance.
+TOO_MUCH_SCATTER, AS_FAR = 1.5, 0.25
 
 
 def detect_object(
@@ -36,7 +41,33 @@ def detect_object(
     distance = np.where(inside, view.distance, np.nan).astype(np.float32)
     deviation = _median_deviation(sensor.noise, image, inside)
     count = resolution.vertices(int(np.isfinite(distance).sum())) if vertices == "auto" else vertices
-    return InitialDetection(distance, sensor.camera, count, view.distance, deviation)
+    scale = _noise_scale(sensor.noise, image, view.distance, inside)
+    return InitialDetection(distance, sensor.camera, count, view.distance, scale * deviation, scale)
+
+
+def _noise_scale(
+    noise: DepthNoise, image: DepthImage, distance: NDArray[np.float32], inside: NDArray[np.bool_]
+) -> float:
+    """Factor on the noise model's deviation if distances scatter much more than it says about flat things; else 1.
+
+    The noise model weighs all measurements: with too small a deviation, many of a good mesh would seem to disagree.
+
+    Args:
+        noise: the model.
+        image: the depth image.
+        distance: its distances without mean offset (height, width) [m].
+        inside: the object's pixels (height, width).
+    """
+    own = distance[inside & np.isfinite(distance)]
+    if not own.size:
+        return 1.0
+    middle = float(np.median(own))
+    as_far = np.abs(distance - middle) < AS_FAR * middle
+    deviation = _median_deviation(noise, image, as_far)
+    if not deviation:
+        return 1.0
+    factor = scatter(np.where(as_far, distance, np.nan)) * middle**2 / deviation
+    return factor if factor > TOO_MUCH_SCATTER else 1.0
 
 
 def _median_deviation(noise: DepthNoise, image: DepthImage, inside: NDArray[np.bool_]) -> float:

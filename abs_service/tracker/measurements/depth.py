@@ -19,6 +19,7 @@ from calib.camera import Camera
 from calib.noise.base import DepthNoise
 from calib.noise.measured import Measured
 from calib.noise.per_pixel import PerPixel
+from calib.noise.scaled import Scaled
 from calib.rig import Sensor
 from drivers.contract.frame import Frame, Geometry, Kind
 
@@ -50,7 +51,7 @@ class Measurement:
 def _auxiliary(noise: DepthNoise) -> tuple[Kind, ...]:
     """Kinds of frames that a depth noise model needs besides the distance."""
     match noise:
-        case PerPixel():
+        case PerPixel() | Scaled():
             return _auxiliary(noise.law)
         case Measured():
             return (Kind.DEVIATION,)

@@ -4,7 +4,8 @@ A model of few parameters cannot follow every shape. Its covariance does not kno
 can do balances the residuals, and outliers have no part in it. Where it misses the shape, neighbouring vertices miss it
 to the same side; noise and an outlier of the sensor stand alone. So the signed distances are averaged over each vertex
 and its neighbours. What the squares of these means have beyond three of their deviations by noise, averaged once more,
-is added to the covariance of the vertices in all directions.
+is added to the covariance of the vertices in all directions. With a noisy sensor a ring of neighbours shows little, and
+all of them together more: the mean square of what no single ring tells from noise is added if all tell it.
 
 Across the surface, this ends with the frame in which distances agree again. Along it, the mesh may have moved while
 most of it missed, as over wrinkles that wander, and distances of which more agree again do not show it. So there the
@@ -46,8 +47,9 @@ class Misfit:
             distance: signed distances of the vertices from their measurements (n,) [m].
             deviation: of independent noise of these (n,) [m].
         """
-        excess = self._common.excess(distance, deviation**2)
-        across = self._common.mean @ excess
+        variance = deviation**2
+        excess = self._common.excess(distance, variance)
+        across = self._common.mean @ excess + self._common.unnoticed(distance, variance)
         missing = np.count_nonzero(excess) / len(excess)
         of_most = float(across.mean()) if missing > MOST else 0.0
         kept = self._along if missing > HARDLY_ANY else 0.0
@@ -68,6 +70,7 @@ class CommonDistance:
     def __init__(self, mesh: Mesh):
         self.mean = mean_around(mesh)
         self._squared = self.mean.power(2)
+        self._vertices_of_ring = self.mean.nnz / self.mean.shape[0]
 
     def excess(self, distance: NDArray[np.float64], variance: NDArray[np.float64]) -> NDArray[np.float64]:
         """Squares of the mean distances beyond `INLIER_DEVIATIONS` of noise (n,) [m²], 0 where noise explains them.
@@ -77,6 +80,20 @@ class CommonDistance:
             variance: of independent noise of these (n,) [m²].
         """
         return np.maximum((self.mean @ distance) ** 2 - INLIER_DEVIATIONS**2 * (self._squared @ variance), 0.0)
+
+    def unnoticed(self, distance: NDArray[np.float64], variance: NDArray[np.float64]) -> float:
+        """Mean square [m²] of the mean distances up to `excess`, less noise; 0 unless beyond its own deviations.
+
+        Args:
+            distance, variance: as for `excess`.
+        """
+        noise = self._squared @ variance
+        within = np.minimum((self.mean @ distance) ** 2, INLIER_DEVIATIONS**2 * noise)
+        expected = float(noise.mean())
+        # Rings overlap: so many are independent as there are rings without a vertex in common.
+        independent = len(distance) / self._vertices_of_ring
+        common = float(within.mean()) - expected
+        return common if common > INLIER_DEVIATIONS * expected * np.sqrt(2 / independent) else 0.0
 
 
 def mean_around(mesh: Mesh) -> "scipy.sparse.csr_array":

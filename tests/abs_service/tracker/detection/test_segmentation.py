@@ -8,11 +8,13 @@ from abs_service.tracker.detection.initial_detection import DetectionError
 from abs_service.tracker.detection.regions import box, nearest
 from abs_service.tracker.detection.segmentation import detect_object
 from calib.camera import Camera
+from calib.noise.constant import Constant
 from calib.noise.structured_light import StructuredLight
 from calib.rig import Rig, Sensor
 from tests.abs_service.tracker.scenes import depth_image, observation
 
 CAMERA = Camera(64, 48, 60.0, 60.0, 31.5, 23.5)
+FINE = Camera(128, 96, 120.0, 120.0, 63.5, 47.5)
 RIG = Rig("r", {"tof": Sensor("tof", CAMERA, StructuredLight())})
 EVERYWHERE = box.Settings((-1e4, -1e4, -1e4), (1e4, 1e4, 1e4)).build()
 #: A sheet of 0.33 × 0.33 m and a wall behind it.
@@ -58,3 +60,16 @@ def test_an_image_without_returns_is_left_to_the_region():
     with pytest.raises(DetectionError, match="holds no surface"):
         detect(np.full((48, 64), np.nan))
     assert not DepthView.of(np.full((48, 64), np.nan, np.float32), CAMERA).measured.any()
+
+
+@pytest.mark.parametrize(("error_m", "factor"), [(4e-3, 1.0), (12e-3, 2.4)])
+def test_a_sensor_is_as_noisy_as_its_first_image_if_that_scatters_much_more_than_its_noise_model_says(error_m, factor):
+    """Not as noisy as a background that scatters more because it is farther away."""
+    generator = np.random.default_rng(1)
+    scene, inside = generator.normal(2.0, 0.05, (96, 128)), np.s_[10:86, 12:116]
+    scene[inside] = generator.normal(1.0, error_m, (76, 104))
+    rig = Rig("r", {"tof": Sensor("tof", FINE, Constant(5e-3))})
+    images = observation(tof=depth_image(scene.astype(np.float32)))
+    seen = detect_object(images, rig, "tof", nearest.Settings().build(), 300)
+    assert seen.noise_scale == pytest.approx(factor, rel=0.1)
+    assert seen.deviation == pytest.approx(seen.noise_scale * 5e-3)

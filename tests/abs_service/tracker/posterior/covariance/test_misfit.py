@@ -50,6 +50,14 @@ def test_noise_is_no_misfit_and_what_neighbours_share_within_three_deviations_is
     assert 0.5 * 4e-6 < np.mean(shared) < 4e-6
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_what_no_ring_tells_from_noise_all_of_them_do(seed):
+    """A smooth misfit below the noise, whose mean over seven vertices has three deviations of 1.1 of it."""
+    noise, wave = np.random.default_rng(seed).normal(0, SIGMA), 1e-3 * np.sin(np.linspace(0, 12, 21))
+    shown = np.mean(variance(noise + np.repeat(wave, 31), SIGMA))
+    assert shown == pytest.approx(np.mean(wave**2), rel=0.4)
+
+
 def frames(*shares: float) -> NDArray[np.float64]:
     """Variances across the surface and along it (frames, 2) [m²], means over the mesh of which such shares are off."""
     misfit, by_place = Misfit(MESH), np.arange(N) / N
