@@ -32,11 +32,13 @@ class Comparison:
         bounds: costs of the outlier model.
         registration_noise: of the texture.
         outline_px: standard deviation of the outline in a depth image; 0 for no outline.
+        ragged_outline_px: the largest of an outline that is seen to be ragged; 0 if it does not change.
     """
 
     bounds: Bounds
     registration_noise: TextureRegistrationNoise = NO_REGISTRATION_NOISE
     outline_px: float = 0.0
+    ragged_outline_px: float = 0.0
 
 
 class MeasurementKind(Protocol):

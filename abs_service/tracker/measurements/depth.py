@@ -12,9 +12,10 @@ from abs_service.tracker.measurements.base import Comparison, Decoder
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.terms.depth.depth import DepthTerm
+from abs_service.tracker.terms.depth.outline.base import NoOutline, Outline
 from abs_service.tracker.terms.depth.outline.continuation import CoarseContinuation
 from abs_service.tracker.terms.depth.outline.rim import Rim
-from abs_service.tracker.terms.depth.outline.rim_outline import NoOutline, Outline, RimOutline
+from abs_service.tracker.terms.depth.outline.rim_outline import RimOutline
 from calib.camera import Camera
 from calib.noise.base import DepthNoise
 from calib.noise.measured import Measured
@@ -43,7 +44,7 @@ class Measurement:
 
     def term(self, sensor: Sensor, mesh: Mesh, synthesizer: Synthesizer, comparison: Comparison) -> DepthTerm:
         """Distances, the outline at the mesh's rim, and the surface beyond it."""
-        outline = _outline(mesh, comparison.outline_px)
+        outline = _outline(mesh, comparison)
         beyond = partial(CoarseContinuation, mesh=mesh)
         return DepthTerm(sensor.name, synthesizer, len(mesh.vertices), self.noise, comparison.bounds, outline, beyond)
 
@@ -58,8 +59,10 @@ def _auxiliary(noise: DepthNoise) -> tuple[Kind, ...]:
     return (Kind.AMPLITUDE,) if noise.uses_amplitude else ()
 
 
-def _outline(mesh: Mesh, deviation_px: float) -> Callable[[Camera], Outline]:
-    return partial(RimOutline, rim=Rim.of(mesh), deviation=deviation_px) if deviation_px else lambda camera: NoOutline()
+def _outline(mesh: Mesh, comparison: Comparison) -> Callable[[Camera], Outline]:
+    if not comparison.outline_px:
+        return lambda camera: NoOutline()
+    return partial(RimOutline, rim=Rim.of(mesh), deviation=comparison.outline_px, ragged=comparison.ragged_outline_px)
 
 
 class _DepthDecoder:

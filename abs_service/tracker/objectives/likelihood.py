@@ -20,6 +20,9 @@ from calib.rig import Rig, Sensor
 #: Deviation of an outline in a depth image: it is known to a pixel, and its pixels mix object and background [px].
 OUTLINE_PX = 0.5
 
+#: The largest deviation of one that is seen to be ragged [px].
+RAGGED_OUTLINE_PX = 3.0
+
 
 @dataclass(frozen=True)
 class Settings:
@@ -35,9 +38,10 @@ class Settings:
             mesh, in pixels of the sensor. It widens the noise model around edges of a print. About 0.2 for sharp edges,
             such as those of a checkerboard.
         outline_px: standard deviation of the outline at the free edges of the object, in pixels of the depth sensor;
-            it stops a surface from sliding along itself. "auto" is half a pixel; 0 disables the outline. Edges in
-            contact with another surface, cut by a mask or the image's border, and silhouettes of bodies are found in
-            the first image and have no outline.
+            it stops a surface from sliding along itself. "auto" is half a pixel, and up to 3 for an outline that
+            wanders from image to image, as that of a stereo camera; 0 disables the outline. Edges in contact with
+            another surface, cut by a mask or the image's border, and silhouettes of bodies are found in the first image
+            and have no outline.
     """
 
     outlier_share: Annotated[float, Interval(gt=0, lt=1)] = 0.05
@@ -54,9 +58,10 @@ class Settings:
         """The likelihood of a mesh in a rig."""
         registration_noise = TextureRegistrationNoise(self.texture_registration_px)
         outline_px = self.derived["outline_px"][0]
+        ragged_px = RAGGED_OUTLINE_PX if self.outline_px == "auto" else outline_px
         terms: list[Term] = []
         for sensor in rig.sensors.values():
-            comparison = Comparison(self.bounds(sensor), registration_noise, outline_px)
+            comparison = Comparison(self.bounds(sensor), registration_noise, outline_px, ragged_px)
             terms.append(measurement(sensor.noise).term(sensor, mesh, synthesizer, comparison))
         return TermSum(synthesizer, terms)
 

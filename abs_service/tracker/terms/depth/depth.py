@@ -19,8 +19,8 @@ from abs_service.tracker.terms.depth.depth_cost import (
     missing_cost,
     normalize,
 )
+from abs_service.tracker.terms.depth.outline.base import NoOutline, Outline
 from abs_service.tracker.terms.depth.outline.continuation import Continuation, NoContinuation
-from abs_service.tracker.terms.depth.outline.rim_outline import NoOutline, Outline
 from abs_service.tracker.terms.depth.texels import Unusable, texels
 from abs_service.tracker.terms.gradients import color_rows, depth_rows
 from abs_service.tracker.terms.linearization import NO_ROWS, PointLinearization, Together

@@ -49,14 +49,33 @@ def motion(away: NDArray[np.float64], directions: NDArray[np.float64], places: N
     """
     if len(away) < LEAST_OF_A_SIDE or not away.any():
         return 0.0
+    (along, across, turn), left = _explained(away, directions, places)
     x, y = (places - places.mean(axis=0)).T
-    right, down = (directions / np.linalg.norm(directions, axis=1, keepdims=True)).T
-    rows = np.stack([right, down, down * x - right * y], axis=1)
-    (along, across, turn), *_ = np.linalg.lstsq(rows, away)
-    left = away - rows @ (along, across, turn)
     length = median(np.hypot(along - turn * y, across + turn * x))
     explained = left @ left < (1 - LEAST_EXPLAINED) * (away @ away)
     return length if explained and length > LEAST_PX else 0.0
+
+
+def without_motion(
+    away: NDArray[np.float64], directions: NDArray[np.float64], places: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """The rest (k,) of the distances of edges from the outline that no slide and turn of the mesh explain [px].
+
+    Args:
+        away, directions, places: as in `motion`; at least `LEAST_OF_A_SIDE`.
+    """
+    return _explained(away, directions, places)[1]
+
+
+def _explained(
+    away: NDArray[np.float64], directions: NDArray[np.float64], places: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Slide [px] along the columns and rows and turn [rad] that explain most, and what is left (k,) [px]."""
+    x, y = (places - places.mean(axis=0)).T
+    right, down = (directions / np.linalg.norm(directions, axis=1, keepdims=True)).T
+    rows = np.stack([right, down, down * x - right * y], axis=1)
+    found, *_ = np.linalg.lstsq(rows, away)
+    return found, away - rows @ found
 
 
 def _typical(away: NDArray[np.float64]) -> float:

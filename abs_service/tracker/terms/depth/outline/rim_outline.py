@@ -5,8 +5,6 @@ between the pixels on the object and those beside it. Which stretches of the rim
 image (`rim_classes`).
 """
 
-from typing import Protocol
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,6 +16,7 @@ from abs_service.tracker.synthesis.window import WHOLE, corner
 from abs_service.tracker.terms.base import RimFit
 from abs_service.tracker.terms.depth.classification.outline_distance import inwards
 from abs_service.tracker.terms.depth.classification.visibility import Visibility
+from abs_service.tracker.terms.depth.outline.raggedness import Raggedness
 from abs_service.tracker.terms.depth.outline.rim import Rim, chain, is_behind, locate, read, shared_by_side
 from abs_service.tracker.terms.depth.outline.rim_classes import LARGEST_GAP_STEPS, RimClass, classify_rim
 from abs_service.tracker.terms.depth.outline.rim_cost import FARTHEST, rim_cost
@@ -37,71 +36,6 @@ Ends = tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float32]]
 Optics = tuple[bool, NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], float]
 
 
-class Outline(Protocol):
-    """Cost of the outline in one camera."""
-
-    def observe(
-        self,
-        distance: NDArray[np.float32],
-        seen: Visibility,
-        expected: NDArray[np.float32],
-        predicted: Surface,
-        window: Window = WHOLE,
-    ) -> NDArray[np.bool_]:
-        """Sets the outline from a window of a depth image.
-
-        Args:
-            distance: measured distances (rows, columns) [m] in the window.
-            seen: their classification.
-            expected: distances of the predicted surface there, infinite beside it [m].
-            predicted: predicted surface, a population of one.
-            window: of the image.
-
-        Returns:
-            Mask (rows, columns) of the pixels beside the object that serve for the outline only.
-        """
-        ...
-
-    def cost(self, surface: Surface) -> NDArray[np.float64] | float:
-        """Cost (population,) of every deformed mesh."""
-        ...
-
-    def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> Linearization:
-        """Normalised residuals of a population of one and their derivatives with respect to theta."""
-        ...
-
-    def fit(self, surface: Surface) -> RimFit:
-        """Agreement of the free edges of a population of one with the outline."""
-        ...
-
-
-class NoOutline:
-    """Null object for objects whose outline is not compared: zero cost."""
-
-    def observe(
-        self,
-        distance: NDArray[np.float32],
-        seen: Visibility,
-        expected: NDArray[np.float32],
-        predicted: Surface,
-        window: Window = WHOLE,
-    ) -> NDArray[np.bool_]:
-        """Empty mask."""
-        return np.zeros(distance.shape, np.bool_)
-
-    def cost(self, surface: Surface) -> float:
-        """Zero."""
-        return 0.0
-
-    def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> Linearization:
-        """No rows."""
-        return Linearization(np.zeros(0), np.zeros((0, sparse_jacobian.dimension)))
-
-    def fit(self, surface: Surface) -> RimFit:
-        """No free edges."""
-        return RimFit()
-
-
 class RimOutline:
     """The distances of the free edges from the outline are normal with zero mean, and bounded as outliers are.
 
@@ -113,19 +47,21 @@ class RimOutline:
         camera: the camera.
         rim: outermost vertices.
         deviation: standard deviation of the position of the outline [px].
+        ragged: the largest that it may be seen to have; no more than `deviation` if that is fixed [px].
 
     Attributes:
         classes: `RimClass` (k,) of every outer vertex, from the first image; all FREE before it.
     """
 
-    def __init__(self, camera: Camera, rim: Rim, deviation: float):
+    def __init__(self, camera: Camera, rim: Rim, deviation: float, ragged: float = 0.0):
         self.classes = np.full(len(rim.outer), RimClass.FREE, np.uint8)
         self._camera = camera
         self._projection = Projection(camera)
         self._rim_cost = rim_cost(camera.lens)
         self._rim = rim
+        self._raggedness = Raggedness(deviation, ragged)
         self._deviation, self._bound = deviation, FARTHEST * deviation
-        self._far = max(OFF_PX, self._bound)
+        self._usually_off = self._far = max(OFF_PX, self._bound)
         self._inwards = np.zeros((0, 0), np.float32)
         self._corner = np.zeros(2, np.float32)
         self._beyond = np.zeros(len(rim.outer), np.float32)
@@ -141,6 +77,8 @@ class RimOutline:
         window: Window = WHOLE,
     ) -> NDArray[np.bool_]:
         """Sets the outline from a window of a depth image; the mask of pixels that serve for the outline only."""
+        self._deviation = self._raggedness.deviation
+        self._bound, self._far = FARTHEST * self._deviation, max(self._usually_off, self._raggedness.off_px)
         part, self._inwards = inwards(distance, seen, int(np.ceil(self._bound)) + 1)
         self._corner = np.add(corner(window), corner(part))[::-1].astype(np.float32)
         if not self._begun:
@@ -156,6 +94,8 @@ class RimOutline:
             self._is_round = is_round(self._camera, edges, self._inwards, self._corner)
             self._begun = True
         self._hidden = len(free) - len(visible)
+        places = project_with_jacobian(self._camera, self._locate(predicted)[0].astype(np.float64))[0]
+        self._raggedness.update(self._inside(places), self._directions(predicted, places), places)
         beside = np.zeros(distance.shape, np.bool_)
         beside[part] = (seen.free_m[part] > 0) & (self._inwards > -UNJUDGED_DEVIATIONS * self._deviation)
         return beside
@@ -205,13 +145,17 @@ class RimOutline:
         self, surface: Surface, places: NDArray[np.float64], away: NDArray[np.float64], pixel_m: NDArray[np.float64]
     ) -> float:
         """The larger of `displacement` and `motion` [m], of free edges at places (k, 2) and distances (k,) [px]."""
-        inner = surface.vertices[0].T[self._ends[1]].astype(np.float64)
         known = ~np.isnan(away)
-        directions = (places - project_with_jacobian(self._camera, inner)[0])[known]
+        directions = self._directions(surface, places)[known]
         # Outside, distances are known up to there; how much farther, nothing tells.
         off_m = np.where(np.abs(away) > self._far, np.maximum(away, -self._far), 0.0) * pixel_m
         moved = motion(np.clip(away[known], -self._bound, self._bound), directions, places[known])
         return max(displacement(off_m[known], directions), moved * float(np.mean(pixel_m)))
+
+    def _directions(self, surface: Surface, places: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Directions out of the mesh in the image (k, 2), at the edges' places (k, 2) [px]."""
+        inner = surface.vertices[0].T[self._ends[1]].astype(np.float64)
+        return places - project_with_jacobian(self._camera, inner)[0]
 
     def _beyond_gap(self, surface: Surface, which: NDArray[np.intp]) -> NDArray[np.float64]:
         """Distances inside the outline (m,) the largest gap beyond outer vertices (m,), see `_inside_at`."""

@@ -1,0 +1,78 @@
+"""Interface of the outline of an object in one camera, and the null object without one."""
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.pairing.images import Window
+from abs_service.tracker.models.base import SparseJacobian, Surface
+from abs_service.tracker.synthesis.window import WHOLE
+from abs_service.tracker.terms.base import RimFit
+from abs_service.tracker.terms.depth.classification.visibility import Visibility
+from abs_service.tracker.terms.linearization import Linearization
+
+
+class Outline(Protocol):
+    """Cost of the outline in one camera."""
+
+    def observe(
+        self,
+        distance: NDArray[np.float32],
+        seen: Visibility,
+        expected: NDArray[np.float32],
+        predicted: Surface,
+        window: Window = WHOLE,
+    ) -> NDArray[np.bool_]:
+        """Sets the outline from a window of a depth image.
+
+        Args:
+            distance: measured distances (rows, columns) [m] in the window.
+            seen: their classification.
+            expected: distances of the predicted surface there, infinite beside it [m].
+            predicted: predicted surface, a population of one.
+            window: of the image.
+
+        Returns:
+            Mask (rows, columns) of the pixels beside the object that serve for the outline only.
+        """
+        ...
+
+    def cost(self, surface: Surface) -> NDArray[np.float64] | float:
+        """Cost (population,) of every deformed mesh."""
+        ...
+
+    def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> Linearization:
+        """Normalised residuals of a population of one and their derivatives with respect to theta."""
+        ...
+
+    def fit(self, surface: Surface) -> RimFit:
+        """Agreement of the free edges of a population of one with the outline."""
+        ...
+
+
+class NoOutline:
+    """Null object for objects whose outline is not compared: zero cost."""
+
+    def observe(
+        self,
+        distance: NDArray[np.float32],
+        seen: Visibility,
+        expected: NDArray[np.float32],
+        predicted: Surface,
+        window: Window = WHOLE,
+    ) -> NDArray[np.bool_]:
+        """Empty mask."""
+        return np.zeros(distance.shape, np.bool_)
+
+    def cost(self, surface: Surface) -> float:
+        """Zero."""
+        return 0.0
+
+    def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> Linearization:
+        """No rows."""
+        return Linearization(np.zeros(0), np.zeros((0, sparse_jacobian.dimension)))
+
+    def fit(self, surface: Surface) -> RimFit:
+        """No free edges."""
+        return RimFit()
