@@ -73,6 +73,12 @@ STRUCTURED_LIGHT = """\
 noise = { type = "structured_light", noise = 1.425e-3, step = 2.85e-3 }
 """
 
+STEREO = """\
+# A starting point, that of a RealSense D435: 0.08 px of disparity, whose errors neighbouring pixels share, in inverse
+# distance [1/m]. Measure yours with `abs-service calibrate noise`.
+noise = { type = "structured_light", noise = 4.2e-3, step = 0.0 }
+"""
+
 TIME_OF_FLIGHT = """\
 # A starting point: 1 cm. Measure yours with `abs-service calibrate noise`.
 noise = { type = "constant", sigma = 0.01 }
@@ -98,10 +104,10 @@ DEVICES: Mapping[str, Device] = {
         Color("color", '{ type = "bayer", sigma = 25.0 }'),
         controls="auto_exposure = false\nauto_white_balance = false\nexposure_s = 0.02\n",
     ),
-    "realsense": Device("Intel RealSense", "realsense://", "depth", STRUCTURED_LIGHT),
-    "oak-stereo": Device("OAK with stereo cameras", "oak://?mode=stereo", "depth", STRUCTURED_LIGHT),
+    "realsense": Device("Intel RealSense", "realsense://", "depth", STEREO),
+    "oak-stereo": Device("OAK with stereo cameras", "oak://?mode=stereo", "depth", STEREO),
     "oak-tof": Device("OAK with a time-of-flight camera", "oak://?mode=tof", "tof", TIME_OF_FLIGHT),
-    "orbbec-stereo": Device("Orbbec Gemini", "orbbec://", "depth", STRUCTURED_LIGHT),
+    "orbbec-stereo": Device("Orbbec Gemini", "orbbec://", "depth", STEREO),
     "orbbec-tof": Device("Orbbec Femto", "orbbec://", "depth", TIME_OF_FLIGHT),
 }
 
