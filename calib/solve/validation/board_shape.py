@@ -10,13 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg
 
-from calib.solve.bundle import robust
-from calib.solve.bundle.adjustment import DAMPING
 from calib.solve.bundle.blocks import Corners
 from calib.solve.bundle.equations import Equations
-from calib.solve.bundle.uncertainty import MAX_SHARE, MIN_POSES
+from calib.solve.bundle.further import further
 from calib.solve.solution import Solution
 from calib.solve.validation import projection_uncertainty
 from calib.solve.validation.support import supported
@@ -87,29 +84,11 @@ def shape_errors(solution: Solution, distance: float, needed_px: float) -> list[
 
 
 def _estimates(solution: Solution, distance: float) -> Iterator[ShapeError]:
-    adjustment = solution.adjustment
-    equations = adjustment.equations
-    clusters = np.unique(equations.poses, return_inverse=True)[1][equations.shots_of_rows]
-    if len(set(clusters.tolist())) < MIN_POSES:
-        return
-    jacobian = equations.jacobian(np.zeros(equations.layout.size))
-    columns = shape_columns(equations, jacobian.toarray(), _displacements)
-    curvature = (jacobian.T @ jacobian).toarray()
-    sizes = np.sqrt(np.diag(curvature))
-    curvature = curvature / np.outer(sizes, sizes) + DAMPING * np.eye(len(sizes))
-    taken = (
-        linalg.solve(curvature, jacobian[: len(clusters)].T @ columns / sizes[:, None], assume_a="pos") / sizes[:, None]
-    )
-    own = columns - (jacobian @ taken)[: len(clusters)]
-    pulls, efficiency = robust.influence(adjustment.residuals[: len(clusters)]), robust.efficiency(adjustment.residuals)
-    for number, (column, changes) in enumerate(zip(own.T, taken.T, strict=True)):
-        information = np.bincount(clusters, column**2)
-        total = max(float(information.sum()), 1e-12)
-        scores = np.bincount(clusters, column * pulls)
-        size = -float(scores.sum()) / (efficiency * total)
-        left = (scores + efficiency * size * information) / np.sqrt(1 - np.minimum(information / total, MAX_SHARE))
-        sigma = float(np.sqrt(np.sum(left**2))) / (efficiency * total)
-        yield ShapeError(number == 0, size, sigma, _effect(solution, -changes * size, distance))
+    equations = solution.adjustment.equations
+    columns = shape_columns(equations, equations.jacobian(np.zeros(equations.layout.size)).toarray(), _displacements)
+    each_alone = [column[:, None] for column in columns.T]
+    for number, one in enumerate(further(equations, solution.adjustment.residuals, each_alone)):
+        yield ShapeError(number == 0, one.sizes.item(), one.sigmas.item(), _effect(solution, one.changes, distance))
 
 
 def shape_columns(

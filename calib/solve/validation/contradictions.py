@@ -4,7 +4,7 @@ In a rig all sensors share one pose of the board per shot. If two images of a sh
 because they were paired wrongly or the board moved between them, each fits alone and both together do not.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -24,6 +24,8 @@ _DEVIATIONS = 3.0
 _HARMLESS_PX = 0.5
 #: Fraction of outliers among the distances of a view that contradicts.
 _OUTLIERS = 0.5
+#: Largest fraction of outliers of a group.
+_MAX_OUTLIERS = 0.1
 #: Above this fraction of contradicting shots there is no rest that they contradict.
 _MAX_SHARE = 1 / 3
 #: Images of a shot that fit this many times better alone are of different moments. If they miss by this much together,
@@ -206,3 +208,19 @@ def _nearest(candidates: Sequence[PoseCandidate], solution: Solution, view: Corn
     turned = [np.linalg.norm(pose.to_rotation_vector(T_rs @ one.T_sb @ pose.inverse(board))[0]) for one in allowed]
     best = allowed[int(np.argmin(turned))]
     return T_rs @ best.T_sb, best.rms_px
+
+
+def outliers(solution: Solution, named: Collection[int]) -> list[str]:
+    """Reasons to doubt groups with too many outliers, but for those of shots that are named anyway."""
+    found = []
+    for sensor, of in dict.fromkeys((view.sensor, view.of) for view in solution.views if view.shot not in named):
+        views = [view for view in solution.views if (view.sensor, view.of) == (sensor, of) and view.shot not in named]
+        far = sum(int(view.outliers.sum()) for view in views)
+        every = sum(len(view.outliers) for view in views)
+        if far > _MAX_OUTLIERS * every:
+            worst = max(views, key=lambda view: view.outliers.mean())
+            found.append(
+                f"{sensor}: {far} of {every} {of} are outliers, most in shot {worst.shot}; look at its picture, "
+                "and leave it out if the board moved or is covered"
+            )
+    return found

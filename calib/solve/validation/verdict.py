@@ -9,8 +9,9 @@ from calib.solve.calibrate import calibrate
 from calib.solve.solution import Solution
 from calib.solve.validation import projection_uncertainty
 from calib.solve.validation.board_shape import ShapeError, shape_errors
-from calib.solve.validation.contradictions import SCATTERS_PX, Contradiction, Scatter, contradictions, scatter
+from calib.solve.validation.contradictions import SCATTERS_PX, Contradiction, Scatter, contradictions, outliers, scatter
 from calib.solve.validation.cross_validation import Agreement, TooFewToSplitError, cross_validate
+from calib.solve.validation.distance_errors import distance_errors
 from calib.solve.validation.free_shape import free_shape
 from calib.solve.validation.groups import groups
 from calib.solve.validation.projection_uncertainty import UncertaintyMap
@@ -29,9 +30,6 @@ HARMLESS = 0.25
 #: Largest deviation of a focal length [1], and smallest part of an image in which boards are seen; real sets of single
 #: cameras have 0.005, and 0.2 of the image.
 MAX_FOCAL, MIN_SEEN = 0.02, 0.1
-
-#: Largest fraction of outliers.
-MAX_OUTLIERS = 0.1
 
 
 @dataclass(frozen=True)
@@ -82,7 +80,7 @@ def assess(
     shape = shape_errors(solution, distance, needed_px)
     reasons, contradicting, cause = _unlike(solution, shape, needed_px)
     reasons += weak_directions(solution, distance)
-    reasons += _outliers(solution, {one.shot for one in contradicting})
+    reasons += outliers(solution, {one.shot for one in contradicting})
     try:
         agreements = cross_validate(solution, distance, note)
         reasons += _disagreeing(agreements, needed_px)
@@ -102,6 +100,8 @@ def _unlike(
     solution: Solution, shape: Sequence[ShapeError], needed_px: float
 ) -> tuple[list[str], list[Contradiction], list[str]]:
     """Reasons to doubt that all shots show one board and one rig, shots that contradict, and likely causes."""
+    if wrong := distance_errors(solution, needed_px):
+        return [*map(str, wrong)], [], []  # they pull everything else along
     free = free_shape(solution)
     moved = changes_of_place(free, needed_px)
     # What happened to a sensor looks as if its image changed, and a wrong board as if every shot had another lens.
@@ -232,19 +232,3 @@ def _scatter_without(shots: Collection[int], solution: Solution, least_px: float
         return scatter(calibrate(rest), least_px)
     except ValueError:  # nor can the rest be calibrated
         return scatter(solution, least_px)
-
-
-def _outliers(solution: Solution, named: Collection[int]) -> list[str]:
-    """Groups with too many outliers, but for those of shots that are named anyway."""
-    found = []
-    for sensor, of in dict.fromkeys((view.sensor, view.of) for view in solution.views if view.shot not in named):
-        views = [view for view in solution.views if (view.sensor, view.of) == (sensor, of) and view.shot not in named]
-        far = sum(int(view.outliers.sum()) for view in views)
-        every = sum(len(view.outliers) for view in views)
-        if far > MAX_OUTLIERS * every:
-            worst = max(views, key=lambda view: view.outliers.mean())
-            found.append(
-                f"{sensor}: {far} of {every} {of} are outliers, most in shot {worst.shot}; look at its picture, "
-                "and leave it out if the board moved or is covered"
-            )
-    return found
