@@ -1,4 +1,4 @@
-"""Boards that are longer along one axis than described, from solves that estimate each camera anew."""
+"""Boards whose print is not as described, from solves that estimate each camera anew."""
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from calib.solve.validation.board_shape import ShapeError, shape_errors
 
 
 def misprint(stored: Stored, views: Views, needed_px: float) -> ShapeError | None:
-    """The surest stretch of the board that a sensor's own corners show; None without any.
+    """The surest error of the print that a sensor's own corners show; None without any.
 
     With stored intrinsics, another ratio of the focal lengths would look the same.
 
@@ -32,5 +32,5 @@ def misprint(stored: Stored, views: Views, needed_px: float) -> ShapeError | Non
         except (ViewsError, NotSolvedError, UndeterminedError):
             continue
         distances = [np.linalg.norm((camera.T_sr @ T_rb)[:3, 3]) for T_rb in solution.state.boards.values()]
-        found += [one for one in shape_errors(solution, float(np.median(distances)), needed_px) if one.stretch]
+        found += [one for one in shape_errors(solution, float(np.median(distances)), needed_px) if one.is_misprint]
     return max(found, key=lambda one: abs(one.size) / one.sigma, default=None)

@@ -109,10 +109,10 @@ def of_material(size: float, found: Sequence[Mistake]) -> list[Verdict]:
     return [_of_size(size)] if size != 1 else [_of_mistakes(found)] if found else []
 
 
-def of_stretch(found: ShapeError) -> Verdict:
-    """Verdict on a board that is longer along one axis than described."""
+def of_misprint(found: ShapeError) -> Verdict:
+    """Verdict on a board whose print is not as described."""
     text = f"{found.finding[0].upper()}{found.finding[1:]}. Nothing else can be said of the calibration."
-    return Verdict(Level.BAD, text, "Measure rows and columns with a ruler, and print the board without scaling.")
+    return Verdict(Level.BAD, text, f"{found.shape.value[0].upper()}{found.shape.value[1:]}.")
 
 
 def _of_mistakes(found: Sequence[Mistake]) -> Verdict:

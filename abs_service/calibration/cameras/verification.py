@@ -93,8 +93,8 @@ def verify(known: RigCalibration, seen: BoardObservations, provenance: Provenanc
     values = tables.values(found.fits, found.biases, found.changes, found.comparison)
     said = verdicts(found)
     # A good board and good cameras need no solve of their own.
-    if said[0].level > Level.GOOD and (stretch := misprint(stored, new_views.thinned(used), SPOILT_PX)):
-        said = [causes.of_stretch(stretch), *new_views.verdicts(stored, seen, used)]
+    if said[0].level > Level.GOOD and (wrong_print := misprint(stored, new_views.thinned(used), SPOILT_PX)):
+        said = [causes.of_misprint(wrong_print), *new_views.verdicts(stored, seen, used)]
     return Report(title, provenance, tuple(said), tuple(sections), values)
 
 

@@ -1,12 +1,14 @@
 """Shape of the printed board: errors that all views share, which small residuals and agreeing halves do not show.
 
-A print that is longer along one axis, or a bent board, is explained by wrong intrinsics instead. How large such an
-error is follows from one Gauss-Newton step with its column added to the equations, its deviation from the scatter of
-the distinct poses (a sandwich estimator, as in `calib.solve.bundle.uncertainty`).
+A print that is longer along one axis, tags of another size than described, or a bent board are explained by wrong
+intrinsics instead. How large such an error is follows from one Gauss-Newton step with its column added to the
+equations, its deviation from the scatter of the distinct poses (a sandwich estimator, as in
+`calib.solve.bundle.uncertainty`).
 """
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +28,15 @@ CERTAIN = 5.0
 NOTICED, NOTICED_BEND = 0.15, 0.25
 
 #: Sizes of the errors that columns of the equations stand for: 1 %, 1 mm.
-_STRETCH, _BEND_M = 0.01, 1e-3
+_SHARE, _BEND_M = 0.01, 1e-3
+
+
+class Shape(Enum):
+    """Kinds of errors, each with what to do."""
+
+    STRETCH = "measure rows and columns with a ruler, and print without scaling"
+    TAGS = "measure a tag and a gap with a ruler, and correct the description"
+    BEND = "glue it onto a flat plate"
 
 
 @dataclass(frozen=True)
@@ -34,39 +44,46 @@ class ShapeError:
     """An error of the board's shape.
 
     Attributes:
-        stretch: True for a length along x relative to y [%], False for a bend from the middle to the edge [mm].
+        shape: length along x relative to y [%], size of the tags relative to the distances of their centres [%], or a
+            bend from the middle to the edge [mm].
         size, sigma: its estimate and standard deviation.
         effect_px: how much projections change if it is taken into account, root mean square, at the distance of the
             scene or those of the boards where that is most [px].
     """
 
-    stretch: bool
+    shape: Shape
     size: float
     sigma: float
     effect_px: float
 
     @property
+    def is_misprint(self) -> bool:
+        """True if the print is not as described, False if it is not flat."""
+        return self.shape != Shape.BEND
+
+    @property
     def finding(self) -> str:
         """One clause for people."""
-        if self.stretch:
+        size = f"{abs(self.size):.2f} ± {self.sigma:.2f} %"
+        effect = f"change projections by up to {self.effect_px:.2g} px"
+        if self.shape == Shape.STRETCH:
             longer, other = ("rows", "columns") if self.size > 0 else ("columns", "rows")
-            return (
-                f"the board's {longer} are {abs(self.size):.2f} ± {self.sigma:.2f} % longer than described, compared "
-                f"with its {other}, which changes projections by up to {self.effect_px:.2g} px"
-            )
-        return (
-            f"a board that is bent by {abs(self.size):.2g} ± {self.sigma:.1g} mm would explain what the corners miss "
-            f"by, and change projections by up to {self.effect_px:.2g} px"
-        )
+            change = effect.replace("change", "changes")
+            return f"the board's {longer} are {size} longer than described, compared with its {other}, which {change}"
+        if self.shape == Shape.TAGS:
+            than = "larger" if self.size > 0 else "smaller"
+            change = effect.replace("change", "changes")
+            return f"tags are {size} {than} than described, compared with their distances, which {change}"
+        bend = f"{abs(self.size):.2g} ± {self.sigma:.1g} mm"
+        return f"a board that is bent by {bend} would explain what the corners miss by, and {effect}"
 
     def __str__(self) -> str:
         """The finding, and what to do."""
-        remedy = "measure both with a ruler, and print without scaling" if self.stretch else "glue it onto a flat plate"
-        return f"{self.finding}: {remedy}"
+        return f"{self.finding}: {self.shape.value}"
 
 
 def shape_errors(solution: Solution, distance: float, needed_px: float) -> list[ShapeError]:
-    """Errors of the board that are certain and matter: a stretch, the bend with the largest effect, or both.
+    """Errors of the board that are certain and matter: the surest of the print, the bend with the largest effect.
 
     Args:
         solution: from all shots.
@@ -77,18 +94,20 @@ def shape_errors(solution: Solution, distance: float, needed_px: float) -> list[
         one
         for one in _estimates(solution, distance)
         if abs(one.size) > CERTAIN * one.sigma
-        and one.effect_px > (NOTICED if one.stretch else NOTICED_BEND) * needed_px
+        and one.effect_px > (NOTICED if one.is_misprint else NOTICED_BEND) * needed_px
     ]
-    bends = sorted((one for one in found if not one.stretch), key=lambda one: -one.effect_px)
-    return [*(one for one in found if one.stretch), *bends[:1]]
+    misprints = sorted((one for one in found if one.is_misprint), key=lambda one: -abs(one.size) / one.sigma)
+    bends = sorted((one for one in found if not one.is_misprint), key=lambda one: -one.effect_px)
+    return [*misprints[:1], *bends[:1]]
 
 
 def _estimates(solution: Solution, distance: float) -> Iterator[ShapeError]:
     equations = solution.adjustment.equations
     columns = shape_columns(equations, equations.jacobian(np.zeros(equations.layout.size)).toarray(), _displacements)
-    each_alone = [column[:, None] for column in columns.T]
-    for number, one in enumerate(further(equations, solution.adjustment.residuals, each_alone)):
-        yield ShapeError(number == 0, one.sizes.item(), one.sigmas.item(), _effect(solution, one.changes, distance))
+    shapes = (Shape.STRETCH, Shape.TAGS, *(Shape.BEND,) * 3)
+    every = further(equations, solution.adjustment.residuals, [column[:, None] for column in columns.T])
+    for shape, one in zip(shapes, every, strict=False):  # of too few poses there are none
+        yield ShapeError(shape, one.sizes.item(), one.sigmas.item(), _effect(solution, one.changes, distance))
 
 
 def shape_columns(
@@ -121,14 +140,28 @@ def shape_columns(
 
 
 def _displacements(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Displacements of points of the board (n, 3) in its frame, for each error (n, 4, 3) [m]."""
+    """Displacements of points of the board (n, 3) in its frame, for each error (n, 5, 3) [m]."""
     low, high = points.min(axis=0), points.max(axis=0)
     x, y, _ = (points - (low + high) / 2).T
     radius = max((high - low).max() / 2, 1e-12)
     none = np.zeros_like(x)
     bends = [_BEND_M * shape / radius**2 for shape in (x * x, y * y, x * y)]
-    stretch = np.stack([x, -y, none], axis=1) * _STRETCH / 2
-    return np.stack([stretch, *(np.stack([none, none, bend], axis=1) for bend in bends)], axis=1)
+    stretch = np.stack([x, -y, none], axis=1) * _SHARE / 2
+    tags = np.stack([_from_tag(points[:, 0]), _from_tag(points[:, 1]), none], axis=1) * _SHARE
+    return np.stack([stretch, tags, *(np.stack([none, none, bend], axis=1) for bend in bends)], axis=1)
+
+
+def _from_tag(places: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Places of points along an axis from the middle of their tag (n,) [m]; 0 if points are evenly spaced.
+
+    Gaps are narrower than tags.
+    """
+    edges, numbers = np.unique(places, return_inverse=True)
+    steps = np.diff(edges)
+    if len(steps) == 0 or np.ptp(steps) < _SHARE * steps.max():
+        return np.zeros_like(places)
+    before, after = np.concatenate([[0.0], steps]), np.concatenate([steps, [0.0]])
+    return np.where(after > before, -after, before)[numbers] / 2
 
 
 def _effect(solution: Solution, changes: NDArray[np.float64], distance: float) -> float:

@@ -90,7 +90,7 @@ def assess(
     known = {of: field.rms * RADIUS_95 * _excess(of, agreements) for of, field in {**images, **pairs}.items()}
     reasons += _uncertain(known, needed_px)
     reasons += _narrow(solution, images)
-    reasons += [str(one) for one in shape if not one.stretch]  # why the halves may differ
+    reasons += [str(one) for one in shape if not one.is_misprint]  # why the halves may differ
     reasons = [*cause, *reasons] if reasons else []
     verdict = f"Do not trust it yet: {reasons[0]}" if reasons else _praise(agreements, images, known, distance)
     return Assessment(not reasons, verdict, reasons, contradicting, agreements, images, pairs, distance)
@@ -110,7 +110,7 @@ def _unlike(
     scattered = [] if moved else _scattered(solution, contradicting, SCATTERS_PX)
     if scattered:
         contradicting = []  # without a rest, nothing contradicts it
-    misprinted = [str(one) for one in shape if one.stretch]
+    misprinted = [str(one) for one in shape if one.is_misprint]
     lasting = moved or refocused or misprinted or scattered
     mixed = [] if lasting or contradicting or shape else groups(free, needed_px)
     focus = {} if lasting or contradicting or mixed else focal_scatter(free, needed_px)

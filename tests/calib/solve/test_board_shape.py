@@ -5,11 +5,14 @@ from functools import cache
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
+from calib.board.april_grid import AprilGrid
+from calib.board.views import CornerView
 from calib.solve.bundle.tasks import SensorTask, Task
 from calib.solve.calibrate import calibrate
 from calib.solve.solution import Solution
-from calib.solve.validation.board_shape import shape_errors
+from calib.solve.validation.board_shape import Shape, shape_errors
 from calib.solve.validation.verdict import MAX_RATIO, RADIUS_95, assess
 from tests.calib.solve import board_views
 
@@ -17,19 +20,22 @@ from tests.calib.solve import board_views
 @cache
 def solved(stretch: float = 1.0, bend: float = 0.0) -> Solution:
     """Solution from images of a board whose rows are longer, or whose left and right edges are bent back [m]."""
-    generator = np.random.default_rng(1)
-    camera = replace(board_views.three_heads()["color"].camera, T_rs=np.eye(4))
     points_b = board_views.board_points()
     made = points_b * (stretch, 1, 1)
     made[:, 2] = bend * (points_b[:, 0] / 0.16 - 1) ** 2
+    return photographed(points_b, made)
+
+
+def photographed(described: NDArray[np.float64], made: NDArray[np.float64]) -> Solution:
+    """Solution from images of a board whose points (n, 3) are elsewhere than described [m]."""
+    generator = np.random.default_rng(1)
+    camera = replace(board_views.three_heads()["color"].camera, T_rs=np.eye(4))
     seen = []
     for shot, T_rb in board_views.random_boards(24, generator).items():
-        (view,) = board_views.corners("color", board_views.Head(camera, 0.1), shot, T_rb, generator, shot) or (None,)
-        if view is not None and len(view.pixels) == len(made):
-            pixels = board_views.projected(camera, T_rb, made) + generator.normal(0, 0.1, (len(made), 2))
-            seen.append(replace(view, pixels=pixels))
-    inside = [view for view in seen if view.pixels.min() > 0 and np.all(view.pixels.max(axis=0) < (1279, 719))]
-    return calibrate(Task({"color": SensorTask(1280, 720)}, inside, (), "color"))
+        pixels = board_views.projected(camera, T_rb, made) + generator.normal(0, 0.1, (len(made), 2))
+        if pixels.min() > 0 and np.all(pixels.max(axis=0) < (1279, 719)):
+            seen.append(CornerView("color", shot, float(shot), described, pixels))
+    return calibrate(Task({"color": SensorTask(1280, 720)}, seen, (), "color"))
 
 
 def test_a_board_as_described_has_no_error() -> None:
@@ -40,20 +46,37 @@ def test_a_board_as_described_has_no_error() -> None:
 def test_a_print_that_is_scaled_along_one_axis_is_named_with_its_size(stretch: float, longer: str) -> None:
     found = shape_errors(solved(stretch), 1.0, 1.0)
     (one,) = found
-    assert one.stretch
+    assert one.shape == Shape.STRETCH
     assert one.size == pytest.approx(100 * (stretch - 1), rel=0.35)
     assert assess(solved(stretch), 1.0, 1.0).verdict.startswith(f"Do not trust it yet: the board's {longer} are ")
 
 
+@pytest.mark.parametrize(("gap", "than"), [(0.0095, "smaller"), (0.0115, "larger")])
+def test_tags_that_are_not_as_large_as_described_beside_their_gaps_are_named(gap: float, than: str) -> None:
+    made, described = AprilGrid(6, 5, 0.045, 0.0105), AprilGrid(6, 5, 0.045, gap)
+    solution = photographed(described.points(), made.points())
+    (found,) = shape_errors(solution, 1.0, 1.0)
+    assert found.shape == Shape.TAGS
+    # Sizes count by the distances of the tags' centres.
+    assert found.size == pytest.approx(100 * ((0.045 + gap) / (0.045 + 0.0105) - 1), rel=0.1)
+    assert assess(solution, 1.0, 1.0).verdict.startswith("Do not trust it yet: tags are ")
+    assert f"% {than} than described" in str(found)
+
+
+def test_an_april_grid_as_described_has_no_error() -> None:
+    points = AprilGrid(6, 5, 0.045, 0.0105).points()
+    assert shape_errors(photographed(points, points), 1.0, 1.0) == []
+
+
 def test_a_bend_that_hardly_shows_in_the_middle_of_the_boards_distances_is_named() -> None:
     (found,) = shape_errors(solved(bend=0.0002), 1.0, 1.0)
-    assert not found.stretch
+    assert found.shape == Shape.BEND
     assert abs(found.size) == pytest.approx(0.2, rel=0.35)
 
 
 def test_a_bent_board_is_named_with_its_size() -> None:
     (found,) = shape_errors(solved(bend=0.002), 1.0, 1.0)
-    assert not found.stretch
+    assert found.shape == Shape.BEND
     assert abs(found.size) == pytest.approx(2, rel=0.35)
     assert any(reason.startswith("a board that is bent by ") for reason in assess(solved(bend=0.002), 1.0, 1.0).reasons)
 
