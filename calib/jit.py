@@ -3,6 +3,8 @@
 import functools
 import hashlib
 import os
+import pickle
+import zlib
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from importlib import import_module
@@ -131,7 +133,11 @@ class Kernel:
         copy.__module__ = self.function.__module__
         copy.__qualname__ = f"{self.function.__qualname__}_{self.digest}{suffix}"
         settings: dict[str, Any] = _OPTIONS | {"fastmath": set(_FASTMATH)} | options
-        compiled: Any = njit(**settings)(copy)
+        try:
+            compiled: Any = njit(**settings)(copy)
+        except RuntimeError:  # there is no folder in which the code can be kept
+            settings["cache"] = False
+            return njit(**settings)(copy)
         if settings["cache"] and not isinstance(compiled, FunctionType):  # Numba may be switched off
             _tolerate_damage(compiled._cache)  # noqa: SLF001
         return compiled
@@ -168,6 +174,7 @@ def _tolerate_damage(cache: Any) -> None:
 
     A power cut or a full disk may leave empty or cut files, with which each call would fail, for ever.
     """
+    _check_content(cache._cache_file)  # noqa: SLF001
     load, save = cache.load_overload, cache.save_overload
 
     def load_if_whole(*key: Any) -> Any:
@@ -183,6 +190,38 @@ def _tolerate_damage(cache: Any) -> None:
             save(*key_and_code)
 
     cache.load_overload, cache.save_overload = load_if_whole, save_if_possible
+
+
+def _check_content(file: Any) -> None:
+    """Lets machine code be loaded only as it was saved, and for what it was saved.
+
+    Other bytes end a process without a word, for ever, or compute something else. Two processes that save at the same
+    time may give the code of one the name of the other's.
+    """
+    save, load = file.save, file.load
+
+    def save_data(name: str, data: Any) -> None:
+        dumped: bytes = file._dump(data)  # noqa: SLF001
+        with file._open_for_write(file._data_path(name)) as stream:  # noqa: SLF001
+            stream.write(_checksum(dumped) + dumped)
+
+    def load_data(name: str) -> Any:
+        with open(file._data_path(name), "rb") as stream:  # noqa: SLF001
+            checksum, dumped = stream.read(len(_checksum(b""))), stream.read()
+        if checksum != _checksum(dumped):
+            raise ValueError(f"{name} is damaged")
+        return pickle.loads(dumped)  # as Numba does
+
+    def load_own(key: Any) -> Any:
+        owner, data = load(key) or (None, None)
+        return data if owner == key else None
+
+    file._save_data, file._load_data = save_data, load_data  # noqa: SLF001
+    file.save, file.load = lambda key, data: save(key, (key, data)), load_own
+
+
+def _checksum(data: bytes) -> bytes:
+    return zlib.crc32(data).to_bytes(4, "little")
 
 
 def load_compiler() -> None:

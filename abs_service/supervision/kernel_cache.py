@@ -9,17 +9,35 @@ from abs_service.supervision import standard_files
 
 #: Numba's environment variable for it.
 VARIABLE = "NUMBA_CACHE_DIR"
+#: The environment variable for the folder of the user in which it keeps them where it cannot beside the code.
+USER = "XDG_CACHE_HOME"
 #: Room for the kernels of a rig, on a disk that is not full [bytes].
 LEAST_BYTES = 50_000_000
 
 
 def ensure() -> None:
     """Lets a process and its children keep kernels in a temporary folder if Numba's have no room or are read-only."""
-    user = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
+    if not os.path.isabs(os.environ.get(USER, "/")):
+        del os.environ[USER]  # as the standard says; Numba would take a folder in the working directory
     given = os.environ.get(VARIABLE)
-    if not any(map(_can_be_written, [given] if given else [os.path.dirname(abs_service.__file__), user])):
+    if not (_can_be_written(given) if given else _own_folder() or _folders_of_the_code()):
         os.environ[VARIABLE] = folder = standard_files.temporary_folder("abs-service-kernels-")
         atexit.register(shutil.rmtree, folder, ignore_errors=True)
+
+
+def _own_folder() -> bool:
+    """True if that of the user can be used."""
+    folder = os.environ.get(USER) or os.path.expanduser("~/.cache")
+    return os.path.isabs(folder) and _can_be_written(folder)
+
+
+def _folders_of_the_code() -> bool:
+    """True if those beside the code can be used, all of them: root may have made some."""
+    code = os.path.dirname(abs_service.__file__)
+    if not _can_be_written(code):
+        return False
+    packages = (os.path.join(os.path.dirname(code), name) for name in ("abs_service", "calib", "drivers"))
+    return all(_can_be_written(os.path.join(folder, "__pycache__")) for one in packages for folder, *_ in os.walk(one))
 
 
 def _can_be_written(folder: str) -> bool:

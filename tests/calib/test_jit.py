@@ -6,10 +6,12 @@ import subprocess
 import sys
 from pathlib import Path
 from types import FunctionType
+from typing import Any, cast
 
+import numpy as np
 import pytest
 
-from calib.jit import composed, kernel
+from calib.jit import Kernel, composed, kernel
 
 FACTOR = 2
 
@@ -115,6 +117,40 @@ def test_what_was_compiled_is_found_again_unless_something_that_it_calls_has_cha
         file.write_bytes(file.read_bytes()[:40] if file.suffix == ".nbc" else b"")  # as after a power cut
     mended, found = run(1), run(1)
     assert (mended[0], found) == ("4.0", mended)
+    for file in cache.rglob("*.nbc"):
+        code = bytearray(file.read_bytes())
+        code[500:1000] = bytes(500)  # as of a bad block: loaded, it ends the process
+        file.write_bytes(code)
+    assert (run(1)[0], run(1)[0]) == ("4.0", "4.0")
+
+
+def test_code_that_another_process_has_saved_under_the_same_name_is_not_taken_for_ones_own(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr("numba.core.config.CACHE_DIR", str(tmp_path))
+
+    def halved(x: float) -> float:
+        return x / 2
+
+    one, other = kernel(halved), cast(Any, kernel(halved))
+    assert (one(3.0), other(np.float32(3))) == (1.5, 1.5)
+    (index,), (first, second) = tmp_path.rglob("*.nbi"), sorted(tmp_path.rglob("*.nbc"))
+    second.write_bytes(first.read_bytes())
+    assert index.stat().st_size
+    types = Kernel(halved, {}).types((np.float32(3),))
+    assert not Kernel(halved, {}).load(types)
+    assert Kernel(halved, {}).load(Kernel(halved, {}).types((3.0,)))
+
+
+def test_a_kernel_is_compiled_also_where_no_folder_takes_machine_code(monkeypatch: pytest.MonkeyPatch) -> None:
+    from numba.core.caching import CacheImpl
+
+    monkeypatch.setattr(CacheImpl, "_locator_classes", [])
+
+    def quadrupled(x: float) -> float:
+        return 4 * x
+
+    assert kernel(quadrupled)(2.0) == 8.0
 
 
 def test_a_kernel_is_compiled_also_where_the_disk_takes_no_machine_code(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -18,7 +18,7 @@ def given(monkeypatch, tmp_path):
     monkeypatch.setattr(abs_service, "__file__", "/usr/lib/abs_service/__init__.py")
 
     def given(cache, user="/nonexistent"):
-        monkeypatch.setenv("XDG_CACHE_HOME", str(user))
+        monkeypatch.setenv(kernel_cache.USER, str(user))
         monkeypatch.setenv(kernel_cache.VARIABLE, str(cache))
         kernel_cache.ensure()
         return os.environ[kernel_cache.VARIABLE]
@@ -34,6 +34,20 @@ def test_a_temporary_folder_replaces_one_that_cannot_be_written(given, tmp_path,
 def test_a_folder_that_can_be_written_is_kept(given, tmp_path):
     assert given(tmp_path / "not" / "yet") == str(tmp_path / "not" / "yet")
     assert given("", user=tmp_path) == ""
+
+
+@pytest.mark.parametrize("user", ["", "in/the/working/directory", "/dev/null"])
+def test_folders_beside_the_code_that_another_user_has_made_are_replaced(given, tmp_path, monkeypatch, user):
+    monkeypatch.setenv("HOME", "/nonexistent")
+    code = tmp_path / "installed" / "abs_service"
+    others = tmp_path / "installed" / "calib" / "noise" / "__pycache__"
+    for folder in (code, others):
+        folder.mkdir(parents=True)
+    monkeypatch.setattr(abs_service, "__file__", str(code / "__init__.py"))
+    assert given("", user) == ""
+    monkeypatch.setattr(os, "access", lambda path, mode: str(path).startswith(str(tmp_path)) and path != str(others))
+    assert given("", user).startswith(f"{tmp_path}/abs-service-kernels-")
+    assert os.environ.get(kernel_cache.USER, "/").startswith("/")
 
 
 def test_a_full_temporary_folder_is_replaced_by_one_in_memory(given, monkeypatch):
