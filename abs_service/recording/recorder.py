@@ -12,6 +12,7 @@ from abs_service.bus.health import Health, Level
 from abs_service.bus.queues import BoundedQueue
 from abs_service.bus.stamps import WallClock
 from abs_service.recording.disk import folder
+from abs_service.recording.disk.space import Space
 from abs_service.recording.disk.stall import DiskStall
 from abs_service.recording.losses import Losses
 from abs_service.recording.recorder_settings import RecorderSettings
@@ -33,8 +34,6 @@ RETRY_S = 1.0
 IDLE_S = 0.05
 #: Why a file ends when the trigger does.
 ENDED = "trigger"
-#: Free space at which recording resumes, relative to that at which it ended: or it would end again at once.
-RESUME_FACTOR = 1.5
 
 
 class Recorder:
@@ -71,7 +70,7 @@ class Recorder:
         self._health = health
         self._clock = clock
         self._open_file = open_file
-        self._free_bytes = free_bytes
+        self._space = Space(settings.directory, settings.minimum_free_bytes, free_bytes, health)
         self._retry_s = retry_s
         self._queue: BoundedQueue[Sample] = BoundedQueue(settings.queue_bytes + settings.pre_roll_bytes)
         self._writer = SampleWriter(settings.encode_image, health, clock)
@@ -86,7 +85,6 @@ class Recorder:
         self._stopping = threading.Event()
         self._failed = ""
         self._mount = Path("/")  # of the disk that has the recordings
-        self._is_short_of_space = False
         self._losses = Losses(health)
         self.stall = DiskStall(health, clock.monotonic, lambda: self._queue.size)
         self._finished = (0, 0)
@@ -146,8 +144,8 @@ class Recorder:
         """Records one file; False if the disk is to be left alone for a while."""
         try:
             folder.check_mounted(self._mount)
-            self._settings.directory.mkdir(parents=True, exist_ok=True)
-            self._check_space()
+            folder.make(self._settings.directory)
+            self._space.check()
             self._record_one_file()
         except OSError as error:
             self._fail(str(error))
@@ -157,16 +155,6 @@ class Recorder:
             self._fail(f"{type(error).__name__}: {error}")
             return False
         return True
-
-    def _check_space(self) -> None:
-        settings = self._settings
-        free = self._free_bytes(settings.directory)
-        least = settings.minimum_free_bytes * (RESUME_FACTOR if self._is_short_of_space else 1.0)
-        self._health.gauge("free_bytes", free)
-        self._is_short_of_space = free < least
-        if self._is_short_of_space:
-            resumes = f"recording resumes with {settings.minimum_free_bytes * RESUME_FACTOR / 1e6:.0f} MB"
-            raise OSError(f"only {free / 1e6:.0f} MB free in {settings.directory}; {resumes}")
 
     def _record_one_file(self) -> None:
         settings, started_ns = self._settings, self._clock.monotonic()
@@ -203,7 +191,7 @@ class Recorder:
         """Records until a reason to end the file, which is returned."""
         settings, flush_ns = self._settings, int(self._settings.flush_s * 1e9)
         look_ns = min(flush_ns, int(LOOK_S * 1e9))
-        next_flush_ns, next_look_ns = started_ns + flush_ns, started_ns + look_ns
+        next_flush_ns, next_look_ns, next_look_size = started_ns + flush_ns, started_ns + look_ns, 0
         while True:
             self.stall.alive()
             sample = self._queue.take(max(0.0, (next_look_ns - self._clock.monotonic()) / 1e9))
@@ -214,7 +202,7 @@ class Recorder:
             elif not self._pre_roll.is_open:
                 return ENDED
             now_ns = self._clock.monotonic()
-            if now_ns < next_look_ns:
+            if now_ns < next_look_ns and take.size < next_look_size:
                 continue
             next_look_ns = now_ns + look_ns
             if take.fate:
@@ -222,10 +210,11 @@ class Recorder:
             if now_ns >= next_flush_ns:
                 next_flush_ns = now_ns + flush_ns
                 self._flush(take)
-            free = self._free_bytes(settings.directory)
-            self._health.gauge("free_bytes", free)
-            if free < settings.minimum_free_bytes:
+            room = self._space.left()
+            if room < 0:
                 return "low space"
+            # What has waited in memory may fill a disk within a second.
+            next_look_size = min(take.size + room // 2, settings.rotate_bytes)
             if take.size >= settings.rotate_bytes or now_ns - started_ns >= settings.rotate_s * 1e9:
                 return "rotated"
 

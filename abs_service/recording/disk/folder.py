@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 #: What is wrong with a disk, not with a configuration: recording begins when it is over.
-_OF_THE_DISK = frozenset({errno.EROFS, errno.EIO, errno.ENOSPC, errno.EDQUOT, errno.ESTALE})
+_OF_THE_DISK = frozenset({errno.ENODEV, errno.EROFS, errno.EIO, errno.ENOSPC, errno.EDQUOT, errno.ESTALE})
 
 #: Time that the disk has to answer [s].
 PATIENCE_S = 2.0
@@ -23,7 +23,8 @@ def check(directory: Path) -> None:
 
     Raises:
         FolderError: the configuration or the folder's permissions have to be changed. A disk that is full, broken,
-            mounted to be read only, or does not answer is none of that: the recorder reports it, and all else goes on.
+            mounted to be read only, does not answer, or is not there where a link leads to it, is none of that: the
+            recorder reports it, and all else goes on.
     """
     found: list[FolderError] = []
     # Nothing can end a call that waits for the disk, of a server that is gone, say.
@@ -32,6 +33,21 @@ def check(directory: Path) -> None:
     thread.join(PATIENCE_S)
     if found:
         raise found[0]
+
+
+def make(directory: Path) -> None:
+    """Makes the folder, and those that it is in.
+
+    Raises:
+        OSError: it cannot be made; of ENODEV, since a link leads to nothing, as to a disk that is not there.
+    """
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+    except FileExistsError as error:
+        if os.path.islink(there := error.filename):
+            nothing = f"{there} is a link to {os.readlink(there)}, where nothing is"
+            raise OSError(errno.ENODEV, nothing) from None
+        raise NotADirectoryError(errno.ENOTDIR, f"{there} is no folder") from None
 
 
 def mount_point(directory: Path) -> Path:
@@ -55,7 +71,7 @@ def check_mounted(mount: Path) -> None:
 def _mistakes(directory: Path) -> Iterator[FolderError]:
     action = "made"
     try:
-        directory.mkdir(parents=True, exist_ok=True)
+        make(directory)
         action = "written"
         tempfile.TemporaryFile(dir=directory).close()
     except OSError as error:

@@ -22,6 +22,19 @@ def test_a_mistake_is_explained(tmp_path):
         folder.check(folder.Path("/proc"))
 
 
+def test_a_link_to_a_disk_that_is_not_there_is_said_and_no_mistake(tmp_path):
+    link, disk = tmp_path / "link", tmp_path / "disk"
+    link.symlink_to(disk)
+    for directory in (link, link / "below"):
+        with pytest.raises(OSError, match=f"{link} is a link to {disk}, where nothing is"):
+            folder.make(directory)
+        folder.check(directory)
+    assert not disk.exists()
+    (tmp_path / "taken").write_text("a file")
+    with pytest.raises(FolderError, match=f'taken": cannot be made: {tmp_path}/taken is no folder'):
+        folder.check(tmp_path / "taken")
+
+
 @pytest.mark.parametrize("number", [errno.EROFS, errno.ENOSPC, errno.EIO])
 def test_a_disk_that_has_a_problem_does_not_keep_a_rig_from_tracking(number, tmp_path, monkeypatch):
     tried = []

@@ -8,7 +8,9 @@ import threading
 import pytest
 from absmsg.v1.health_pb2 import Health
 
+from abs_service.recording.recording_file import open_for_writing
 from abs_service.recording.recovery import recover
+from drivers.encoding.mcap_file import Compression
 from tests.abs_service.recording.recorder_rig import DEPTH, RETRY_S, Rig, depth, metadata, read, recordings, sequences
 from tests.waiting import eventually
 
@@ -84,6 +86,29 @@ def test_it_stops_before_the_disk_is_full_with_a_complete_file_and_resumes_when_
     assert sequences(tmp_path) == [1, 2]
 
 
+def test_what_has_waited_in_memory_does_not_fill_the_disk_and_files_keep_their_size(tmp_path):
+    open_now = threading.Event()
+    settings = {"compression": Compression.NONE, "chunk_bytes": 2000, "minimum_free_bytes": 30_000, "flush_s": 60}
+
+    def free(folder):
+        return 150_000 - sum(path.stat().st_size for path in folder.iterdir())
+
+    def slow(path):
+        open_now.wait()
+        return open_for_writing(path)
+
+    rig = Rig(tmp_path, free_bytes=free, open_file=slow, rotate_bytes=50_000, **settings)
+    rig.recorder.start()
+    for seq in range(100):  # 1.5 kB each
+        rig.publish_image(depth(seq))
+    open_now.set()
+    assert eventually(lambda: rig.recorder.failed)
+    assert rig.recorder.failed.startswith("only 0 MB free")
+    assert [metadata(path)["ended"] for path in recordings(tmp_path)] == ["rotated", "rotated", "low space"]
+    assert free(tmp_path) > 20_000
+    rig.recorder.stop(5)
+
+
 def test_where_the_disk_was_unmounted_nothing_is_written_to_the_empty_folder_until_it_is_back(tmp_path, monkeypatch):
     mount, mounted = tmp_path / "disk", [True]
     monkeypatch.setattr(os.path, "ismount", lambda path: path.name == "" or (path == mount and mounted[0]))
@@ -143,7 +168,7 @@ def test_a_folder_that_cannot_be_written_is_said_leaves_no_scraps_and_is_tried_a
     rig = Rig(folder, flush_s=0.005)
     rig.recorder.start()
     assert eventually(lambda: rig.recorder.failed)
-    assert "File exists" in rig.said.message
+    assert rig.said.message == f"RECORD_FAILED [Errno 20] {folder} is no folder"
     rig.publish_image(depth(1))
     folder.unlink()
     assert eventually(lambda: not rig.recorder.failed)
