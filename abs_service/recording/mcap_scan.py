@@ -1,6 +1,5 @@
 """Scans the records of a damaged MCAP file, where the library's reader would stop at the first error."""
 
-import mmap
 import struct
 import zlib
 from collections.abc import Iterator
@@ -11,6 +10,7 @@ from mcap.records import Chunk, McapRecord
 from mcap.stream_reader import StreamReader
 from mcap.writer import MCAP0_MAGIC
 
+from abs_service.recording.disk.file_bytes import FileBytes
 from drivers.encoding import mcap_chunk
 
 _PREFIX = struct.Struct("<BQ")  # opcode, length of what follows
@@ -20,7 +20,7 @@ _OPCODES = frozenset(int(opcode) for opcode in Opcode)
 _COPIED = frozenset({Opcode.ATTACHMENT, Opcode.CHANNEL, Opcode.CHUNK, Opcode.MESSAGE, Opcode.METADATA, Opcode.SCHEMA})
 
 
-Data = bytes | mmap.mmap
+Data = bytes | FileBytes
 
 
 class RecordScanner:

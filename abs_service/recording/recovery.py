@@ -2,7 +2,6 @@
 
 import contextlib
 import fcntl
-import mmap
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -11,6 +10,7 @@ from typing import BinaryIO
 
 from mcap.writer import MCAP0_MAGIC
 
+from abs_service.recording.disk.file_bytes import FileBytes
 from abs_service.recording.mcap_scan import find_chunk
 from abs_service.recording.recording_file import ACTIVE, private
 from abs_service.recording.salvage import Salvage
@@ -73,7 +73,8 @@ def recover(source: Path, directory: Path | None = None) -> RecoveryReport:
     name = source.name.removesuffix(ACTIVE) if was_active else f"{source.name.removesuffix('.mcap')}.recovered.mcap"
     target = (directory or source.parent) / name
     unfinished = target.with_name(target.name + RECOVERING)
-    with _locked(source) as stream, _mapped(source, stream) as data:
+    with _locked(source) as stream:
+        data = _content(source, stream)
         try:
             with open(unfinished, "wb", opener=private) as output:
                 fcntl.flock(output, fcntl.LOCK_EX)  # for `remove_interrupted`
@@ -100,17 +101,26 @@ def recover(source: Path, directory: Path | None = None) -> RecoveryReport:
     )
 
 
-def leftovers(directory: Path) -> list[Path]:
-    """Recordings in `directory` that were not finished, oldest first; some may still be written by another process."""
-    return sorted(directory.glob(f"*.mcap{ACTIVE}"), key=lambda path: path.stat().st_mtime)
+def leftovers(directory: Path) -> dict[Path, float]:
+    """Recordings in `directory` that were not finished, oldest first, with the Unix time of their last change [s].
+
+    Some may still be written by another process. What cannot be looked at, as a link to nothing, is left out.
+    """
+    found: dict[Path, float] = {}
+    with contextlib.suppress(OSError):
+        for path in directory.glob(f"*.mcap{ACTIVE}"):
+            with contextlib.suppress(OSError):
+                found[path] = path.stat().st_mtime
+    return dict(sorted(found.items(), key=lambda one: one[1]))
 
 
 def remove_interrupted(directory: Path) -> None:
     """Removes the output of a killed recovery; the next one begins with the original again."""
-    for path in directory.glob(f"*{RECOVERING}"):
-        with contextlib.suppress(OSError), path.open("rb") as stream:  # somebody else's, or locked by a living one
-            fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            path.unlink()
+    with contextlib.suppress(OSError):
+        for path in directory.glob(f"*{RECOVERING}"):
+            with contextlib.suppress(OSError), path.open("rb") as stream:  # somebody else's, or locked by a living one
+                fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                path.unlink()
 
 
 def set_aside(source: Path) -> Path:
@@ -138,11 +148,10 @@ def _locked(source: Path) -> Iterator[BinaryIO]:
         yield stream
 
 
-@contextlib.contextmanager
-def _mapped(source: Path, stream: BinaryIO) -> Iterator[mmap.mmap]:
-    if os.fstat(stream.fileno()).st_size == 0:
+def _content(source: Path, stream: BinaryIO) -> FileBytes:
+    data = FileBytes(stream.fileno())
+    if not len(data):
         raise RecoveryError(f"{source}: the file is empty; nothing was recorded")
-    with mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as data:
-        if data[: len(MCAP0_MAGIC)] != MCAP0_MAGIC and find_chunk(data, 0) == len(data):
-            raise RecoveryError(f"{source}: holds no MCAP record")
-        yield data
+    if data[: len(MCAP0_MAGIC)] != MCAP0_MAGIC and find_chunk(data, 0) == len(data):
+        raise RecoveryError(f"{source}: holds no MCAP record")
+    return data

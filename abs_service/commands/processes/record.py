@@ -39,6 +39,8 @@ _log = logging.getLogger(__name__)
 DRAIN_S = 2.5
 #: Age of an unfinished file below which the recorder before this one was killed while it recorded [s].
 INTERRUPTED_S = 60.0
+#: Time between two looks whether something is to be recovered [s].
+RECOVERY_S = 10.0
 #: Niceness: capture and tracking go first where cores are scarce; recording has a queue.
 NICE = 5
 
@@ -59,9 +61,10 @@ def run(arguments: argparse.Namespace) -> int:
         health = Health(bus, "record", headers)
         bus.declare_liveliness("record")
         trigger = _trigger(rig, clock)
-        # In parallel: it may take minutes, and the disk may not answer.
-        recovery = threading.Thread(target=recover_leftovers, args=(settings, health, time.time()), daemon=True)
         recorder = Recorder(bus, settings, health, clock, trigger=trigger)
+        # In parallel: it may take minutes, and the disk may not answer.
+        context = recorder, settings, health, stop, time.time()
+        recovery = threading.Thread(target=recover_again_and_again, args=context, name="recovery", daemon=True)
         os.nice(NICE)  # this thread and those that it starts from now on: not those that receive
         tracking = FirstTracking(bus, rig.trackers)
         if rig.record.begin == "tracking":
@@ -121,23 +124,47 @@ def _trigger(rig: config.ServiceConfig, clock: WallClock) -> Trigger:
     if table.when == "always":
         return ALWAYS
     trigger = Asked(table.when == "not_tracking", table.post_roll_s, clock.monotonic)
-    if any(time.time() - path.stat().st_mtime < INTERRUPTED_S for path in leftovers(table.directory)):
+    if any(time.time() - changed_s < INTERRUPTED_S for changed_s in leftovers(table.directory).values()):
         trigger.resume()
     return trigger
 
 
-def recover_leftovers(settings: RecorderSettings, health: Health, begun_s: float) -> None:
-    """Recovers what recorders before this one have left; health and log say what came of it.
+def recover_again_and_again(
+    recorder: Recorder, settings: RecorderSettings, health: Health, stop: threading.Event, begun_s: float
+) -> None:
+    """Recovers what recorders before this one have left, and later what it leaves itself when its disk fails.
+
+    Retention deletes no unfinished file, but counts it: in months, they would take the room of all others.
+
+    Args:
+        recorder: whose failures leave files.
+        settings, health, begun_s: see `recover_leftovers`.
+        stop: ends it.
+    """
+    is_due, failures = not recover_leftovers(settings, health, begun_s), 0
+    while not stop.wait(RECOVERY_S):
+        if is_due and not recorder.failed:
+            is_due = not recover_leftovers(settings, health, time.time() - RECOVERY_S / 2)
+        if recorder.failures > failures:  # the next time, when what was left is old enough
+            is_due, failures = True, recorder.failures
+
+
+def recover_leftovers(settings: RecorderSettings, health: Health, begun_s: float) -> bool:
+    """Recovers what recorders have left; health and log say what came of it.
 
     Args:
         settings: of the recorder.
         health: of the recorder.
-        begun_s: Unix time at which it began [s]; what has been written since is nobody's who has ended.
+        begun_s: Unix time [s]; what has been written since may be a file that somebody has not locked yet.
+
+    Returns:
+        Whether there is nothing to be tried again.
     """
+    lacking = ""
     remove_interrupted(settings.directory)
-    for path in leftovers(settings.directory):
+    for path, changed_s in leftovers(settings.directory).items():
         try:
-            if path.stat().st_mtime >= begun_s:
+            if changed_s >= begun_s:
                 continue
             if shutil.disk_usage(settings.directory).free < path.stat().st_size + settings.minimum_free_bytes:
                 # Recording goes first: the copy must not take the room that it needs.
@@ -152,7 +179,9 @@ def recover_leftovers(settings: RecorderSettings, health: Health, begun_s: float
                     set_aside(path)  # else its size would count for ever, and recordings would be deleted for it
             continue
         except OSError as error:
-            health.report("recovery", Level.WARNING, f"{path} cannot be recovered: {error.strerror}")
+            lacking = f"{path} cannot be recovered: {error.strerror}"
             continue
         health.count("recovered")
         health.label("recovered", str(report))
+    health.report("recovery", Level.WARNING if lacking else Level.OK, lacking)
+    return not lacking

@@ -17,6 +17,7 @@ from mcap_protobuf.decoder import DecoderFactory
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.capture.mcap_writing import write_frame
 from abs_service.commands.recordings import recover as command
+from abs_service.recording.disk import file_bytes
 from abs_service.recording.recovery import RecoveryError, leftovers, recover, remove_interrupted
 from drivers.contract.frame import Frame, Geometry, Kind
 from drivers.encoding.mcap_file import Compression, McapFile
@@ -162,7 +163,33 @@ def test_a_file_that_is_being_written_is_not_recovered(tmp_path):
         fcntl.flock(writer, fcntl.LOCK_EX)
         with pytest.raises(RecoveryError, match="another process"):
             recover(source)
-    assert leftovers(tmp_path) == [source]
+    assert list(leftovers(tmp_path)) == [source]
+
+
+def test_a_bad_block_of_the_disk_costs_its_chunk_and_ends_nothing(tmp_path, monkeypatch):
+    source = write(tmp_path / "a.mcap.active", finish=False)
+    bad, pread = source.stat().st_size // 2, os.pread
+
+    def read(descriptor, size, position):
+        if position <= bad < position + size:
+            raise OSError(5, "Input/output error")
+        return pread(descriptor, size, position)
+
+    monkeypatch.setattr(os, "pread", read)
+    monkeypatch.setattr(file_bytes, "BLOCK", 16)
+    report = recover(source)
+    assert report.source == tmp_path / "a.mcap.broken"
+    assert 0 < report.messages < 2 * FRAMES
+    assert report.damaged + report.skipped_bytes
+
+
+def test_what_cannot_be_looked_at_is_no_leftover(tmp_path):
+    (tmp_path / "a.mcap.active").symlink_to(tmp_path / "gone")
+    source = write(tmp_path / "b.mcap.active", finish=False)
+    (tmp_path / "loop").symlink_to(tmp_path / "loop")
+    assert list(leftovers(tmp_path)) == [source]
+    assert not leftovers(tmp_path / "loop")
+    remove_interrupted(tmp_path / "loop")
 
 
 def test_an_interrupted_recovery_is_repeated(tmp_path, monkeypatch):

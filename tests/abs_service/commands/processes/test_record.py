@@ -1,14 +1,19 @@
 """A recorder that starts says what it cannot recover."""
 
 import logging
+import os
+import shutil
+import threading
 import time
+from types import SimpleNamespace
 
 from abs_service.bus.health import Health
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.commands.processes import record
 from abs_service.recording.recorder_settings import RecorderSettings
 from abs_service.recording.recording_file import RecordingFile
-from tests.abs_service.bus.loopback import LoopbackBus
+from tests.abs_service.bus.loopback import LoopbackBus, health_now
+from tests.waiting import eventually
 
 #: When the recorder begins: after all that the tests have made.
 LATER_S = time.time() + 3600
@@ -45,3 +50,27 @@ def test_a_file_that_a_recorder_has_made_this_moment_stays(tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.mcap.active", "b.mcap.active"]
     record.recover_leftovers(settings, health, LATER_S)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.mcap.active", "b.mcap.broken"]
+
+
+def test_what_a_failing_disk_leaves_is_recovered_when_there_is_room_without_another_start(tmp_path, monkeypatch):
+    free = [0]
+    monkeypatch.setattr(record, "RECOVERY_S", 0.01)
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: SimpleNamespace(free=free[0]))
+    bus = LoopbackBus()
+    health = Health(bus, "record", HeaderFactory("demo", WallClock()))
+    recorder, stop = SimpleNamespace(failures=0, failed=""), threading.Event()
+    context = recorder, RecorderSettings(tmp_path, "demo", ""), health, stop, time.time()
+    thread = threading.Thread(target=record.recover_again_and_again, args=context)
+    thread.start()
+    RecordingFile(tmp_path / "a.mcap", 0, {}).abandon()
+    os.utime(tmp_path / "a.mcap.active", (1e9, 1e9))
+    recorder.failures, recorder.failed = 1, "the disk is full"
+    assert not eventually(lambda: "recovered" in health_now(health, bus).message, 0.1)
+    recorder.failed = ""
+    assert eventually(lambda: health_now(health, bus).message.endswith("cannot be recovered: No space left on device"))
+    free[0] = 1 << 40
+    assert eventually((tmp_path / "a.mcap").exists)
+    assert eventually(lambda: not health_now(health, bus).message)
+    stop.set()
+    thread.join()
+    assert [path.name for path in tmp_path.iterdir()] == ["a.mcap"]
