@@ -91,7 +91,7 @@ class Retention:
             return []
         found: list[Kept] = []
         for name, entry in named.items():
-            with suppress(FileNotFoundError):  # it is deleted at this moment
+            with suppress(OSError):  # it is deleted at this moment, is a loop of links, or its disk does not tell
                 if pattern.fullmatch(name) and name + KEEP not in named and entry.is_file():
                     about = entry.stat()
                     found.append(Kept(name, about.st_size, about.st_mtime_ns))

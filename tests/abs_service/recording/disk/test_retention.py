@@ -56,6 +56,13 @@ def test_the_oldest_are_deleted_until_the_others_fit(week):
     assert names(apply(Retention(week, "demo", "", math.inf, 350))) == [take(day) for day in (1, 2, 3, 4)]
 
 
+def test_a_link_that_leads_nowhere_keeps_nothing_from_being_deleted(week):
+    loop, gone = week / take(20), week / take(21)
+    loop.symlink_to(loop)
+    gone.symlink_to(week / "gone")
+    assert names(apply(Retention(week, "demo", "", math.inf, 350))) == [take(day) for day in (1, 2, 3, 4)]
+
+
 def test_nothing_is_deleted_unless_it_was_asked_for(week):
     assert apply(Retention(week, "demo", "", math.inf, math.inf)) == []
 
