@@ -136,7 +136,8 @@ def assemble(packets, lengths, begin, state, image, gone, base, payload, longest
             state[FIRST_CAUSE + SIZE] += 1
             state[PLACE] = -1
             continue
-        image[offset : offset + size] = packets[row, HEADER_BYTES : HEADER_BYTES + size]
+        for i in range(size):
+            image[offset + i] = packets[row, HEADER_BYTES + i]
         state[PLACE] = place + 1
         if place + 1 == count:
             state[PLACE] = 0

@@ -103,6 +103,20 @@ def test_files_and_functions_are_short_enough_to_read_at_once() -> None:
     assert long == []
 
 
+def test_kernels_copy_no_array_into_another_by_an_assignment() -> None:
+    """It contains a message about their shapes, which takes two seconds to compile; a loop has none."""
+    copies = [
+        f"{path}: {function.name} has {ast.unparse(assignment)}"
+        for path, text in _tracked_texts()
+        if path.endswith(".py") and path.startswith(PACKAGES)
+        for function in ast.walk(ast.parse(text))
+        if isinstance(function, ast.FunctionDef) and "kernel" in map(ast.unparse, function.decorator_list)
+        for assignment in ast.walk(function)
+        if isinstance(assignment, ast.Assign | ast.AugAssign) and _copies(assignment)
+    ]
+    assert copies == []
+
+
 def test_what_the_packages_import_is_required_by_name() -> None:
     wanted = [*PROJECT["project"]["dependencies"], *OPTIONAL]
     declared = {_normal(Requirement(line).name) for line in wanted}
@@ -157,6 +171,13 @@ def _imported(path: Path) -> set[str]:
     nodes = list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
     plain = [alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names]
     return {name.split(".")[0] for name in [*plain, *(n.module or "" for n in nodes if isinstance(n, ast.ImportFrom))]}
+
+
+def _copies(assignment: ast.Assign | ast.AugAssign) -> bool:
+    """True if something else than a constant goes into a slice."""
+    targets = assignment.targets if isinstance(assignment, ast.Assign) else [assignment.target]
+    sliced = any(isinstance(node, ast.Slice) for target in targets for node in ast.walk(target))
+    return sliced and any(isinstance(node, ast.Name) for node in ast.walk(assignment.value))
 
 
 def _lines_of_code(function: ast.FunctionDef) -> int:

@@ -83,7 +83,9 @@ def add_squares(
             last += 1
         left, right, count = np.empty((3 * (last - first), half)), np.empty((3 * (last - first), k - half)), 0
         for v in range(first, last):
-            rest[:] = squares[v]
+            for i in range(3):
+                for j in range(3):
+                    rest[i, j] = squares[v, i, j]
             least = _ROUNDING * (rest[0, 0] + rest[1, 1] + rest[2, 2])
             for _ in range(3):
                 p = 0 if rest[0, 0] >= max(rest[1, 1], rest[2, 2]) else (1 if rest[1, 1] >= rest[2, 2] else 2)

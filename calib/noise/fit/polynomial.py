@@ -170,7 +170,9 @@ def _clip(values: NDArray[np.float64], low: float, high: float, out: NDArray[np.
 def _look_up(plane: NDArray[np.float64], at: NDArray[np.int64], out: NDArray[np.float64]) -> None:
     """Coefficient of every place; a single coefficient for all is read once, so that the loop vectorises."""
     if plane.size == 1:
-        out[: at.size] = plane[0]
+        single = plane[0]
+        for k in range(at.size):
+            out[k] = single
     else:
         for k in range(at.size):
             out[k] = plane[at[k]]

@@ -139,6 +139,7 @@ def _cones(capsules: NDArray[np.float64]) -> NDArray[np.float64]:
         middle = capsules[i, 0:3] + 0.5 * capsules[i, 3:6]
         reach = 0.5 * np.sqrt((capsules[i, 3:6] ** 2).sum()) + capsules[i, 6]
         away = np.sqrt((middle**2).sum())
-        cones[i, 0:3] = middle / away
+        for j in range(3):
+            cones[i, j] = middle[j] / away
         cones[i, 3] = np.sqrt(1 - (reach / away) ** 2) if reach < away else -1.0
     return cones

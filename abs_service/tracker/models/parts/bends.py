@@ -170,7 +170,8 @@ def bend_jacobian(
             scale = per_bend * q * q if abs(parameters[i]) <= FULL else 0.0
             moves[0, i], moves[1, i] = scale * slope.real * sides[i, 0], scale * slope.real * sides[i, 1]
             moves[2, i] = -scale * slope.imag
-        moves[2, :8] *= 1 + 2 * g / half * rise
+        for i in range(8):
+            moves[2, i] *= 1 + 2 * g / half * rise
         moves[2, 8] = -rise * rise / half if g == height else 0.0
         for row in range(3):
             for i in range(9):

@@ -79,7 +79,7 @@ def sample_population(
 def update_distribution(
     z: NDArray[np.float32],
     axes: NDArray[np.float32],
-    costs: NDArray[np.float64],
+    order: NDArray[np.intp],
     weights: NDArray[np.float64],
     rates: NDArray[np.float64],
     generation: int,
@@ -93,7 +93,7 @@ def update_distribution(
     Args:
         z: standard normal numbers (population, dim).
         axes: maps them to Θ, one row for each (dim, dim).
-        costs: of the candidates (population,).
+        order: of the candidates by their costs (population,).
         weights, rates: see `Constants`.
         generation: counts from one.
         sigma: step size.
@@ -105,11 +105,11 @@ def update_distribution(
         The new step size.
     """
     c_c, c_sigma, c_1, c_mu, d_sigma, mu_eff, expected_length = rates
-    population, n = costs.size, mean.size
+    population, n = order.size, mean.size
     ranked = np.empty((population + 1, n), np.float32)  # and in the end the path
-    for rank, k in enumerate(np.argsort(costs, kind="mergesort")):
+    for rank in range(population):
         for i in range(n):
-            ranked[rank, i] = z[k, i]
+            ranked[rank, i] = z[order[rank], i]
     p_sigma, p_c, z_mean = paths[0], paths[1], np.zeros(n)
     for rank in range(population // 2):
         w, step = weights[rank], ranked[rank]
@@ -187,7 +187,7 @@ def update_factor(
             root[i, i] = np.sqrt(abs(learnt[i, i]))
     new_factor, new_axes = np.dot(factor, root), np.dot(root.astype(np.float32).T, axes)
     for i in range(n):
-        for j in range(n):  # an assignment between arrays contains a message about their shapes: 2 s of compiling
+        for j in range(n):
             factor[i, j], axes[i, j] = new_factor[i, j], new_axes[i, j]
         for j in range(i):
             path[i] -= root[i, j] * path[j]

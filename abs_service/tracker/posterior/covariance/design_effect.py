@@ -88,7 +88,9 @@ def _find_clusters(
         numbers: number of a cluster by the hash of its cell (clusters,); −1 if it has none yet.
         clusters: number of every point's cluster (m,).
     """
-    count = numbers.max() + 1
+    count = 0
+    for number in numbers:
+        count = max(count, number + 1)
     for m in range(clusters.size):
         x = np.int64(np.floor(positions[m, 0] * per_metre))
         y = np.int64(np.floor(positions[m, 1] * per_metre))

@@ -75,7 +75,8 @@ def settle(
     elif is_masked:
         texel[6] = np.float32(agreeing)
     else:
-        texel[:] = missing
+        for i in range(missing.size):
+            texel[i] = missing[i]
     return True
 
 

@@ -75,7 +75,7 @@ def test_a_generation_teaches_what_the_tutorial_says(seed):
     wanted = kept * learnt + c_1 * np.outer(p_c, p_c) + c_mu * (ranked.T * shares) @ ranked
     mean_wanted = mean + 0.3 * best @ axes
     taught = learnt.copy()
-    sigma = update_distribution(z, axes, costs, w, constants.rates, g, 0.3, mean, paths, taught)
+    sigma = update_distribution(z, axes, np.argsort(costs), w, constants.rates, g, 0.3, mean, paths, taught)
     np.testing.assert_allclose(mean, mean_wanted, atol=1e-5)
     np.testing.assert_allclose(paths, [p_sigma, p_c], atol=1e-5)
     np.testing.assert_allclose(taught, wanted, atol=1e-4)
