@@ -34,6 +34,7 @@ constraints: .venv/.all ## resolve the pinned requirements again: make constrain
 	@$(COMPILE) --group build --output-file constraints.txt
 	@$(COMPILE) --group dev --group docs --all-extras --constraints constraints.txt --output-file constraints-all.txt
 all: .venv/.all ## install everything: device SDKs, what `make evaluate ARGS=peers` compares with, tools
+	@echo 'Everything is installed; next:  make run ARGS=--view'
 clean: ## remove .venv and every cache
 	rm -rf .venv build dist bench.json .pytest_cache .ruff_cache .hypothesis .benchmarks .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
@@ -46,5 +47,6 @@ clean: ## remove .venv and every cache
 	@echo "Installing the pinned requirements, a few minutes the first time"
 	@$(PIP) --require-hashes --only-binary :all: -r constraints.txt && $(PIP) --no-deps --no-build-isolation -e . && touch $@
 .venv/.all: .venv/.run constraints-all.txt
+	@echo "Installing all drivers, the live page and the tools, some minutes the first time"
 	@$(PIP) --require-hashes --only-binary :all: -r constraints-all.txt && touch $@
 .PHONY: help run test check lint format evaluate faults bench cost docs proto constraints all clean

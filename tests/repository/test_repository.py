@@ -183,3 +183,9 @@ def _copies(assignment: ast.Assign | ast.AugAssign) -> bool:
 def _lines_of_code(function: ast.FunctionDef) -> int:
     first = function.body[1] if ast.get_docstring(function) and len(function.body) > 1 else function.body[0]
     return (function.body[0].lineno - function.lineno) + ((function.end_lineno or 0) - first.lineno + 1)
+
+
+def test_make_says_what_takes_minutes_and_what_comes_next() -> None:
+    lines = subprocess.run(["make", "-B", "-n", "all"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    assert lines.count("minutes the first time") == 2
+    assert "make run ARGS=--view" in lines.splitlines()[-1]

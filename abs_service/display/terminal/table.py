@@ -7,6 +7,7 @@ from absmsg.v1.health_pb2 import Health
 from rich.console import Console, Group, RenderableType
 from rich.live import Live as LiveRegion
 from rich.markup import escape
+from rich.padding import Padding
 from rich.spinner import Spinner
 from rich.table import Table
 from rich.text import Text
@@ -166,16 +167,15 @@ def _theta(name: str, report: EstimateReport) -> Text:
     return text
 
 
-def _recording(view: RigView) -> Text:
+def _recording(view: RigView) -> RenderableType:
     recording = view.recording
     if recording is None:
         return Text(f" recording {view.recording_remark}" if view.recording_remark else " not recording", style="dim")
-    text = Text(no_wrap=True, overflow="ellipsis")
-    text.append(f" recording {recording.file.name}  {size(recording.size)}  {size(recording.rate)}/s  ")
+    text = Text(f"recording {recording.file.name}  {size(recording.size)}  {size(recording.rate)}/s  ")
     text.append(f"{recording.dropped} dropped", style="yellow" if recording.dropped else "")
     text.append(f"  {view.recording_remark}", style="dim")
     text.append(f"  {recording.forecast}", style="dim")
-    return text
+    return Padding(text, (0, 0, 0, 1))  # what does not fit goes on in the next line, indented, too
 
 
 def _processes(view: RigView) -> Text:

@@ -73,6 +73,16 @@ def test_the_recorder_says_that_nothing_is_tracked_yet(live):
     assert "recording begins when something is tracked" in drawn(view(live))
 
 
+def test_the_whole_line_of_the_recorder_is_shown_in_a_narrow_terminal(live):
+    health = live.health("record")
+    health.labels["forecast"] = "17 days on this disk"
+    health.labels["file"] = "demo_2026-11-27T22-02-49Z.mcap.active"
+    health.labels["tracking"] = "nothing is tracked yet"
+    take_health(live, health)
+    text = " ".join(drawn(view(live), width=60).split())
+    assert "3 dropped nothing is tracked yet 17 days on this disk" in text
+
+
 def test_processes_show_their_number_or_state_and_restarts(live):
     assert "processes  capture 4711  record backoff restarted 2×" in drawn(view(live))
 
