@@ -4,6 +4,7 @@ The modules are those of a package such as `abs_service.tracker.models`, and tho
 as entry points of the group of that name (docs/how-to/extending.md).
 """
 
+import difflib
 import json
 import pkgutil
 from collections.abc import Iterator
@@ -35,17 +36,22 @@ def load(package: str, table: Any, base: Path, *others: str) -> Any:
         others: packages that have such modules as well.
 
     Raises:
-        ProblemsError: no such module, unknown keys, or values out of range; all of them.
+        ProblemsError: no such module, one that cannot be imported, unknown keys, or values out of range; all of them.
     """
     packages = (package, *others)
     if not isinstance(table, dict) or not isinstance(table.get("type"), str):
         types = available(*packages)
+        if isinstance(table, dict) and (misspelt := difflib.get_close_matches("type", table.keys() - {"type"}, n=1)):
+            message = f'unknown key, did you mean "type"? types: {", ".join(types)}'
+            raise ProblemsError([Problem((misspelt[0],), message)])
         example = f'{{ type = "{table if isinstance(table, str) and table in types else types[0]}", … }}'
         raise ProblemsError([Problem((), f"must be a table such as {example}; types: {', '.join(types)}", table)])
     name = table["type"]
     module = next(filter(None, (_module(package, name) for package in packages)), None)
     if module is None:
         raise ProblemsError([Problem(("type",), f"no such type, {allowed_instead(name, available(*packages))}", name)])
+    if broken := _broken(packages, module):
+        raise ProblemsError([Problem(("type",), broken, name)])
     return settings(module, {key: value for key, value in table.items() if key != "type"}, base)
 
 
@@ -116,6 +122,18 @@ def _is_part(package: str, name: str) -> bool:
 def _installed(package: str) -> dict[str, str]:
     """Modules by name that installed distributions declare for a package."""
     return {point.name: point.value for point in entry_points(group=package)}
+
+
+def _broken(packages: tuple[str, ...], module: str) -> str:
+    """Message about an installed module that cannot be used; "" if it can, or if it is one of ours."""
+    for point in (point for package in packages for point in entry_points(group=package, value=module)):
+        declared = f"entry point {point.name} = {module} of {point.dist.name if point.dist else 'a distribution'}"
+        try:
+            if not hasattr(import_module(module), "Settings"):
+                return f"{declared} has no Settings"
+        except Exception as error:  # other people's code, run as it is imported
+            return f"{declared} cannot be imported: {type(error).__name__}: {error}"
+    return ""
 
 
 def table(made: Any) -> dict[str, Any]:

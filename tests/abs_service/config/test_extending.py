@@ -18,6 +18,7 @@ from abs_service import config
 ROOT = Path(__file__).parents[3]
 PAGE = (ROOT / "docs" / "how-to" / "extending.md").read_text(encoding="utf-8")
 PARTS = dict(re.findall(r"```python\n# my_parts/(\w+)\.py\n(.*?)```", PAGE, re.DOTALL))
+PYPROJECT = PAGE.partition("```toml\n# pyproject.toml\n")[2].partition("```")[0]
 SERVICE = ("-m", "abs_service")
 SAMPLE = ROOT / "recordings" / "sample.mcap"
 
@@ -137,7 +138,8 @@ print(json.dumps([type(measurement(noise)).__module__ for noise in (grey.Noise()
 @pytest.fixture
 def installed(tmp_path: Path) -> dict[str, str]:
     """An environment in which the examples are a distribution with the page's entry points."""
-    declared = re.findall(r'\[project\.entry-points\."([\w.]+)"\]\n(\w+) = "([\w.]+)"', PAGE)
+    groups = tomllib.loads(PYPROJECT)["project"]["entry-points"].items()
+    declared = [(group, name, module) for group, points in groups for name, module in points.items()]
     return install(tmp_path / "site", PARTS, declared)
 
 
@@ -181,6 +183,20 @@ def printed(environment: dict[str, str], program: str, *arguments: Path) -> list
 def test_the_page_has_an_example_for_each_entry_point() -> None:
     parts = ["translation", "random_search", "left_half", "disc", "depth_only", "linear", "thermal", "plate"]
     assert sorted(PARTS) == sorted(parts)
+
+
+def test_what_the_page_installs_declares_its_parts(tmp_path) -> None:
+    """With the page's own command, but without its dependencies, which are here."""
+    (command,) = re.findall(r"^\.venv/bin/(pip install -e \S+) +#", PAGE, re.MULTILINE)
+    project, site = tmp_path / "my-parts", tmp_path / "site"
+    (project / "my_parts").mkdir(parents=True)
+    (project / "pyproject.toml").write_text(PYPROJECT, encoding="utf-8")
+    for name, text in {"__init__": "", **PARTS}.items():
+        (project / "my_parts" / f"{name}.py").write_text(text, encoding="utf-8")
+    options = ("--target", site, "--no-deps", "--no-build-isolation", "--no-index", "--quiet")
+    run(dict(os.environ), "-m", *command.replace("-e path/to/my-parts", str(project)).split(), *options)
+    (declared,) = site.glob("my_parts-*.dist-info/entry_points.txt")
+    assert declared.read_text().count(" = my_parts.") == len(PARTS)
 
 
 def test_parts_of_another_distribution_track_a_recording(installed, tmp_path) -> None:
@@ -240,6 +256,27 @@ def test_a_declared_measurement_may_have_a_derived_noise_and_a_broken_one_distur
     parts = {"broken": "raise ImportError", "derived": DERIVED}
     environment = install(tmp_path / "site", parts, [(group, name, f"my_parts.{name}") for name in names])
     assert printed(environment, ASKING) == ["abs_service.tracker.measurements.grey", "my_parts.derived"]
+
+
+@pytest.mark.parametrize(
+    ("parts", "message"),
+    [
+        ({}, "cannot be imported: ModuleNotFoundError: No module named 'my_parts.left_half'"),
+        ({"left_half": "1 / 0"}, "cannot be imported: ZeroDivisionError: division by zero"),
+        ({"left_half": ""}, "has no Settings"),
+    ],
+)
+def test_a_declared_part_that_cannot_be_used_is_named(tmp_path, parts, message) -> None:
+    declared = [("abs_service.tracker.detection.regions", "left_half", "my_parts.left_half")]
+    environment = install(tmp_path / "site", parts, declared)
+    rig = tmp_path / "rig.toml"
+    rig.write_text(config.to_toml(config.load_default()).replace('type = "nearest"', 'type = "left_half"'))
+    refused = run(environment, *SERVICE, "check", rig, status=2)
+    assert "Traceback" not in refused.stderr
+    named = (
+        f'trackers.sheet.region.type = "left_half": entry point left_half = my_parts.left_half of my-parts {message}'
+    )
+    assert named in refused.stderr
 
 
 def test_parts_that_are_not_installed_are_refused_with_what_there_is(tmp_path) -> None:

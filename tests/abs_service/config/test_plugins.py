@@ -115,6 +115,10 @@ def test_what_is_no_table_with_a_type_is_answered_with_an_example(package, table
     assert f'must be a table such as {{ type = "{example}"' in problems(package, table)[0]
 
 
+def test_a_misspelt_type_is_named(package):
+    assert problems(package, {"tpye": "bendy"}) == ['tpye: unknown key, did you mean "type"? types: around, bendy']
+
+
 def test_a_part_may_hold_another_part(package):
     inner = {"type": "bendy", "degree": 3, "mask": "a.png"}
     made = plugins.load(package, {"type": "around", "inner": inner}, Path("/rig"))
