@@ -1,5 +1,6 @@
 """From the arguments of a tracker to the configuration of a rig file, with its defaults and checks."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from pathlib import Path
@@ -34,12 +35,22 @@ NoisePart = NoiseSettings | Table
 #: Names in the configuration of a tracker that is made from arguments.
 TRACKER, DEPTH, COLOR = "tracker", "depth", "color"
 
-#: Keys of that configuration by the arguments that give them, for messages.
+#: What messages say of that configuration, and what they have to say of the arguments that gave it.
 _ARGUMENTS = {
-    f"trackers.{TRACKER}.mesh.": "",
-    f"trackers.{TRACKER}.": "",
-    f"sensors.{COLOR}.noise": "color_noise",
-    f"sensors.{DEPTH}.": "",
+    rf"trackers\.{TRACKER}\.mesh\.": "",
+    rf"trackers\.{TRACKER}\.": "",
+    rf"sensors\.{COLOR}\.noise": "color_noise",
+    rf"sensors\.{DEPTH}\.": "",
+    r'\{ type = ("\w+"), … \}': r'{"type": \1, …}',
+    r"region\.file: missing, but needed": r"\g<0>: the path of an image; pixels are given to track(…, mask=array)",
+}
+
+#: Settings as they are written, by the arguments that take no other kind of table.
+_EXAMPLES = {
+    "model": "a.Nurbs(4, 4)",
+    "noise": "a.noise.Constant(0.001)",
+    "color_noise": "a.noise.Color()",
+    "texture": 'a.noise.Intensity("amplitude", 5)',
 }
 
 
@@ -59,7 +70,7 @@ def configuration(
     """
     sensors = {DEPTH: _keys(sensor)}
     if color_noise is not None:
-        sensors[COLOR] = _keys({"noise": color_noise})
+        sensors[COLOR] = {"noise": _plain("color_noise", color_noise)}
     mesh = {} if vertices is None else {"mesh": _keys({"vertices": vertices})}
     tables = {
         "version": 1,
@@ -73,7 +84,7 @@ def configuration(
         settings = config.from_tables(tables, "Tracker", Path.cwd())
         pictures = [table.noise.build() for name, table in settings.sensors.items() if name == COLOR and table.noise]
     except (config.ConfigError, NoiseError) as error:
-        raise ArgumentError(in_arguments(str(error))) from error
+        raise ArgumentError(in_arguments(str(error))) from None
     if any(measurement(noise).frames[0] not in (Kind.COLOR, Kind.BAYER) for noise in pictures):
         raise ArgumentError(f"color_noise = {color_noise}: must be noise.Color(), noise.Grey() or noise.Bayer()")
     return settings
@@ -81,8 +92,8 @@ def configuration(
 
 def in_arguments(message: str) -> str:
     """A message about a configuration in terms of the arguments that it was made from."""
-    for key, argument in _ARGUMENTS.items():
-        message = message.replace(key, argument)
+    for written, argument in _ARGUMENTS.items():
+        message = re.sub(written, argument, message)
     return message
 
 
@@ -96,10 +107,9 @@ def _plain(name: str, value: Any) -> Any:
         return {key: _plain(f"{name}.{key}", part) for key, part in value.items()}
     if is_dataclass(value) and not isinstance(value, type):
         table = {field.name: getattr(value, field.name) for field in fields(value)}
-        return {"type": type(value).__module__.rpartition(".")[2]} | _keys(table)
-    if isinstance(value, (np.ndarray, np.generic)):
-        return value.tolist()
-    if isinstance(value, type) or callable(value):
-        example = "a.Nurbs(4, 4)" if name == "model" else "a.noise.Constant(0.001)"
-        raise ArgumentError(f"{name} = {value!r}: must be settings, such as {name} = {example}, or a table")
-    return value
+        given = {key: part for key, part in table.items() if part is not None}
+        return {"type": type(value).__module__.rpartition(".")[2]} | _plain(name, given)
+    if name in _EXAMPLES or isinstance(value, type) or callable(value):
+        example = f"such as {name}={_EXAMPLES[name]}, or a table" if name in _EXAMPLES else "or a table"
+        raise ArgumentError(f'{name} = {value!r}: must be settings, {example} such as {{"type": "…"}}')
+    return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value

@@ -91,6 +91,12 @@ class FrameBuilder:
         self._last_ns, self._seq = t_ns, self._seq + 1
         return FrameSet(self._seq - 1, t_ns, frames)
 
+    def without_return(self, frames: FrameSet) -> tuple[str, ...]:
+        """A reason for no estimate, if `depth_m` is given and none of its pixels holds a distance; else nothing."""
+        head, _, kind = self._arguments["depth_m"].partition("/")
+        depth = frames.frames.get((head, kind))
+        return () if depth is None or (depth.data > 0).any() else ("depth_m has no return: all of it is 0 or NaN",)
+
     def _uses(self) -> str:
         labels = {stream: name for name, stream in self._arguments.items()}
         return ", ".join(labels.get(stream, f"streams[{stream!r}]") for stream in self._streams)
@@ -123,7 +129,7 @@ class FrameBuilder:
             array = np.full((camera.height, camera.width), array.astype(bool).any(), np.uint8)
         shape = array.shape[:2] if kind == Kind.COLOR and array.ndim == 3 else array.shape
         if shape != (camera.height, camera.width):
-            raise ArgumentError(f"{label} has shape {array.shape}, the camera has {camera.height} × {camera.width}")
+            raise ArgumentError(f"{label} {_misfit(array, camera)}")
         pixels, encoding = self._pixels(head, kind, array, label)
         is_depth = kind == Kind.DEPTH
         return Frame(
@@ -172,15 +178,27 @@ def object_mask(mask: ArrayLike, camera: Camera) -> NDArray[np.bool_]:
     """
     pixels = checks.array("mask", mask)
     if pixels.shape != (camera.height, camera.width):
-        raise ArgumentError(f"mask has shape {pixels.shape}, the depth camera has {camera.height} × {camera.width}")
+        raise ArgumentError(f"mask {_misfit(pixels, camera)}")
     if pixels.dtype.kind not in "buif" or np.isnan(pixels).any():
         content = "NaN" if pixels.dtype.kind == "f" else pixels.dtype
         raise ArgumentError(f"mask holds {content}, must be boolean, or numbers that are 0 beside the object")
     return pixels != 0
 
 
+def _misfit(array: NDArray[Any], camera: Camera) -> str:
+    """Message about an array that does not have the size of its camera's images."""
+    needed = (camera.height, camera.width)
+    turned = "; it is transposed" if array.shape[1::-1] == needed else ""
+    return f"has shape {array.shape}, must be {needed}, (height, width) of its camera{turned}"
+
+
 def _metres(array: NDArray[Any], label: str) -> NDArray[np.float32]:
     """Lengths [m], NaN where there is none: where they are not finite."""
+    if array.dtype == np.uint8:
+        raise ArgumentError(
+            f"{label} holds uint8, must be floating-point metres: 8 bits are too few for distances; cv2.imread makes "
+            "them of a 16-bit image unless it is given cv2.IMREAD_UNCHANGED"
+        )
     if array.dtype.kind != "f":
         raise ArgumentError(f"{label} holds {array.dtype}, must be floating-point metres: millimetres * 0.001")
     some = array[::4, ::4]

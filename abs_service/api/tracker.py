@@ -136,7 +136,7 @@ class Tracker:
             self._region = RegionOrMask(plan.region.build())
             self._session = TrackingSession(rig, replace(plan, region=self._region))
         except (wiring.PlanError, NoiseError, DetectionError) as error:
-            raise ArgumentError(arguments.in_arguments(str(error))) from error
+            raise ArgumentError(arguments.in_arguments(str(error))) from None
         if budget_ms is not None:
             checks.positive("budget_ms", budget_ms, "more than 0, or None for no limit")
         self._budget_ns = np.inf if budget_ms is None else float(budget_ms) * 1e6
@@ -173,7 +173,11 @@ class Tracker:
         given = {"depth_m": depth_m, "image": image, "amplitude": amplitude, "deviation_m": deviation_m}
         self._region.mask = None if mask is None else object_mask(mask, self._rig.sensors[self._plan.reference].camera)
         further = {} if streams is None else checks.mapping("streams", streams, '{"left/depth": array}')
-        return next(self._track([self._frames.frame_set(time_s, given | dict(further))]))
+        frames = self._frames.frame_set(time_s, given | dict(further))
+        estimate = next(self._track([frames]))
+        # A tracker that has lost its object advises to bring it back; here it is the image that is to blame.
+        reasons = estimate.reasons and self._frames.without_return(frames)
+        return replace(estimate, reasons=(*reasons, *estimate.reasons)) if reasons else estimate
 
     def replay(self, recording: Replayable) -> Iterator[Estimate]:
         """The estimates for a recording, frame set by frame set, as `abs-service replay` makes them.
@@ -206,4 +210,4 @@ class Tracker:
             for _, found, _ in track_sets(self._session, frame_sets, time.monotonic_ns, self._budget_ns):
                 yield with_mesh(found, self._session.mesh, self._session.mesh_version)
         except ObservationError as error:
-            raise ArgumentError(str(error)) from error
+            raise ArgumentError(str(error)) from None

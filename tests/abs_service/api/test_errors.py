@@ -16,13 +16,18 @@ DEPTH, IMAGE = Sheet().depth(), Sheet().image(CAMERA)
 @pytest.mark.parametrize(
     ("arrays", "message"),
     [
-        ({"depth_m": DEPTH[:60]}, r"depth_m has shape \(60, 160\), the camera has 120 × 160"),
+        (
+            {"depth_m": DEPTH[:60]},
+            r"depth_m has shape \(60, 160\), must be \(120, 160\), \(height, width\) of its camera$",
+        ),
+        ({"depth_m": DEPTH.T}, r"depth_m has shape \(160, 120\), must be \(120, 160\), .*; it is transposed$"),
+        ({"depth_m": DEPTH.astype(np.uint8)}, r"depth_m holds uint8, .* unless it is given cv2\.IMREAD_UNCHANGED"),
         ({"depth_m": (DEPTH * 1000).astype(np.uint16)}, r"depth_m holds uint16, must be floating-point metres"),
         ({"depth_m": DEPTH * 1000}, r"depth_m has a median of 1\d\d\d.*, must be metres"),
         ({"depth_m": -DEPTH}, r"depth_m holds -1\.\d+: must be positive; NaN or 0 means no return"),
         ({"depth_m": DEPTH, "amplitude": DEPTH}, r"amplitude is given, .* no such image; it uses depth_m, image$"),
         ({"depth_m": DEPTH, "streams": {"left/depth": DEPTH}}, r"left/depth is given, .* it uses depth_m, image$"),
-        ({"depth_m": DEPTH, "mask": np.ones((60, 160))}, r"mask has shape \(60, 160\), the depth camera has 120 × 160"),
+        ({"depth_m": DEPTH, "mask": np.ones((60, 160))}, r"mask has shape \(60, 160\), must be \(120, 160\)"),
         ({"depth_m": DEPTH, "image": DEPTH}, r"image holds float64 of shape \(120, 160\), must be uint8, 0…255"),
         (
             {"depth_m": DEPTH, "image": IMAGE[..., 0]},
@@ -37,7 +42,7 @@ DEPTH, IMAGE = Sheet().depth(), Sheet().image(CAMERA)
         ({"depth_m": np.full_like(DEPTH, 1e300)}, r"depth_m has a median of 1e\+300, must be metres"),
         ({"depth_m": [[1.0], [1.0, 2.0]]}, r"depth_m is no array: .*inhomogeneous"),
         ({"depth_m": np.ma.masked_greater(DEPTH, 1)}, r"depth_m is a masked array: must be a plain one"),
-        ({"depth_m": DEPTH[..., None]}, r"depth_m has shape \(120, 160, 1\), the camera has 120 × 160"),
+        ({"depth_m": DEPTH[..., None]}, r"depth_m has shape \(120, 160, 1\), must be \(120, 160\)"),
         ({"depth_m": DEPTH, "image": IMAGE / 255}, r"image holds float64 of shape .*, must be uint8, 0…255"),
         ({"depth_m": DEPTH, "mask": np.full_like(DEPTH, np.nan)}, r"mask holds NaN, must be boolean, or numbers"),
         ({"depth_m": DEPTH, "mask": np.full(DEPTH.shape, "a")}, r"mask holds <U1, must be boolean, or numbers"),
@@ -80,9 +85,9 @@ def test_what_a_noise_model_depends_on_must_be_given(noise, missing):
     ("arguments", "message"),
     [
         ({"model": a.Nurbs(2, 4)}, r"^Tracker: model\.control_points\[0\] = 2: must be greater than or equal to 3"),
-        ({"model": a.Nurbs}, r"model = <function Nurbs.*must be settings, such as model = a\.Nurbs\(4, 4\)"),
+        ({"model": a.Nurbs}, r"model = <function Nurbs.*must be settings, such as model=a\.Nurbs\(4, 4\)"),
         ({"model": {"type": "nurb"}}, r'model\.type = "nurb": no such type, did you mean "nurbs"\?'),
-        ({"model": "nurbs"}, r'model = "nurbs": must be a table'),
+        ({"model": "nurbs"}, r"model = 'nurbs': must be settings, such as model=a\.Nurbs\(4, 4\), or a table"),
         ({"noise": a.noise.Constant(-1)}, r"^Tracker: noise\.sigma = -1(\.0)?: must be greater than 0"),
         ({"noise": a.noise.Color()}, r'noise: sensor "depth" finds the object, so it needs a noise model of distances'),
         ({"vertices": 2}, r"^Tracker: vertices = 2: must be greater than or equal to 4"),
@@ -107,10 +112,21 @@ def test_what_a_noise_model_depends_on_must_be_given(noise, missing):
             {"color": CAMERA, "color_noise": a.noise.Intensity("amplitude", 5)},
             r"color_noise = .*: must be noise\.Color",
         ),
-        ({"noise": 0}, r"^Tracker: noise = 0: must be a table"),
+        (
+            {"noise": 0.002},
+            r"^noise = 0\.002: must be settings, such as noise=a\.noise\.Constant\(0\.001\), or a table",
+        ),
+        (
+            {"color": CAMERA, "color_noise": 3},
+            r"^color_noise = 3: must be settings, such as color_noise=a\.noise\.Color",
+        ),
+        ({"texture": 3}, r"^texture = 3: must be settings, such as texture=a\.noise\.Intensity"),
+        ({"region": "nearest"}, r'region = "nearest": must be a table such as {"type": "nearest", …}; types'),
+        ({"region": {"typ": "nearest"}}, r'region\.typ: unknown key, did you mean "type"\? types: above_plane'),
+        ({"region": {"type": "mask"}}, r"region\.file: missing, .*; pixels are given to track\(…, mask=array\)"),
         (
             {"noise": a.noise.Constant},
-            r"noise = <class .*must be settings, such as noise = a\.noise\.Constant\(0\.001\)",
+            r"noise = <class .*must be settings, such as noise=a\.noise\.Constant\(0\.001\)",
         ),
         ({"texture": a.noise.Constant(0.001)}, r'texture\.type = "constant": must be intensity, color, grey or bayer'),
         ({"region": np.ones((3, 3))}, r"^Tracker: region = .*: must be a table"),
@@ -120,6 +136,25 @@ def test_what_a_noise_model_depends_on_must_be_given(noise, missing):
 def test_a_tracker_that_cannot_be_made_is_refused(arguments, message):
     with pytest.raises(a.ArgumentError, match=message):
         a.Tracker(**({"depth": CAMERA, "model": a.Rigid(), "noise": NOISE} | arguments))
+
+
+def test_an_error_of_an_argument_hides_the_configuration_that_is_made_of_it():
+    with pytest.raises(a.ArgumentError) as raised:
+        a.Tracker(CAMERA, a.Rigid(), region={"type": "mask"})
+    assert raised.value.__suppress_context__
+    assert raised.value.__cause__ is None
+
+
+@pytest.mark.parametrize("nothing", [0.0, np.nan])
+def test_an_image_without_any_return_is_named_before_all_advice(nothing):
+    tracker = a.Tracker(CAMERA, a.Rigid(), noise=NOISE)
+    empty = np.full_like(DEPTH, nothing)
+    for time_s, depth_m, status in ((0, empty, "INITIALIZING"), (1, DEPTH, "TRACKING"), (2, empty, "LOST")):
+        estimate = tracker.track(depth_m, time_s=time_s)
+        assert estimate.status == status
+        assert estimate.reasons[:1] == (
+            () if status == "TRACKING" else ("depth_m has no return: all of it is 0 or NaN",)
+        )
 
 
 def test_every_error_of_an_argument_is_a_value_error():
