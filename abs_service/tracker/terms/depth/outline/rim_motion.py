@@ -69,7 +69,7 @@ def without_motion(
 
 def _explained(
     away: NDArray[np.float64], directions: NDArray[np.float64], places: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[NDArray[np.floating], NDArray[np.float64]]:
     """Slide [px] along the columns and rows and turn [rad] that explain most, and what is left (k,) [px]."""
     x, y = (places - places.mean(axis=0)).T
     right, down = (directions / np.linalg.norm(directions, axis=1, keepdims=True)).T
