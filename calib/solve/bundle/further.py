@@ -56,7 +56,7 @@ def further(
         own = given - (jacobian @ taken)[: len(clusters)]
         information = _by_cluster(clusters, own[:, :, None] * own[:, None, :])
         scores = _by_cluster(clusters, own * pulls[:, None])
-        variances = linalg.pinvh(information.sum(axis=0))
+        variances = np.linalg.pinv(information.sum(axis=0), hermitian=True)
         found = -variances @ scores.sum(axis=0) / efficiency
         shares = np.einsum("ij,cji->c", variances, information) / given.shape[1]
         left = scores + efficiency * information @ found

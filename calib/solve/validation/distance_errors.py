@@ -1,11 +1,13 @@
 """Mistakes in the distances of a depth sensor: z taken as radial or the other way round, and a displaced depth image.
 
 Both bend or tilt the boards that a sensor measures, which a pose far from the truth explains in part, with residuals
-that look like noise. How large they are follows from one step of the solve with a column for each.
+that look like noise. How large they are follows from one step of the solve with a column for each, beside another
+scale and offset of the distances.
 """
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,8 +20,9 @@ from calib.solve.solution import Solution
 #: Mistakes are named from this many deviations on.
 CERTAIN = 5.0
 
-#: Exponent of the cosine by which distances are divided: 1 if z was taken as radial, -1 the other way round. Nearer to
-#: these than to 0 it is a mistake: what a camera measures wrongly is many times less.
+#: Exponent of the cosine by which distances are divided: 1 if z was taken as radial, -1 the other way round. Nearer
+#: than this to one of these it is a mistake: what a camera measures wrongly is many times less, and what a depth image
+#: of another place does is more.
 MISREAD = 0.5
 
 
@@ -35,14 +38,18 @@ class Misread:
     sensor: str
     exponent: float
 
-    def __str__(self) -> str:
-        """The finding, and what to do."""
+    remedy: ClassVar[str] = "correct the geometry where they are imported or recorded"
+
+    @property
+    def finding(self) -> str:
+        """The finding, without the sensor's name."""
         true, taken = ("z", "radial") if self.exponent > 0 else ("radial", "z")
         where = {"z": "z, along the optical axis", "radial": "radial, from the camera centre"}
-        return (
-            f"{self.sensor}: its distances look like {where[true]}, and are taken as {taken}: correct the geometry "
-            "where they are imported or recorded"
-        )
+        return f"its distances look like {where[true]}, and are taken as {taken}"
+
+    def __str__(self) -> str:
+        """The finding, and what to do."""
+        return f"{self.sensor}: {self.finding}: {self.remedy}"
 
 
 @dataclass(frozen=True)
@@ -58,14 +65,20 @@ class Displaced:
     shift: NDArray[np.float64]
     sigmas: NDArray[np.float64]
 
+    remedy: ClassVar[str] = (
+        "are the two of different cameras or modes, aligned wrongly, cropped or mirrored? Take both as the device "
+        "makes them, or the depth image as a sensor of its own"
+    )
+
+    @property
+    def finding(self) -> str:
+        """The finding, without the sensor's name."""
+        across, down = (f"{a:+.1f} ± {b:.2g}" for a, b in zip(self.shift.tolist(), self.sigmas.tolist(), strict=True))
+        return f"its depth image is displaced by ({across}, {down}) px from the image that shows the corners"
+
     def __str__(self) -> str:
         """The finding, and what to do."""
-        across, down = (f"{a:+.1f} ± {b:.1g}" for a, b in zip(self.shift.tolist(), self.sigmas.tolist(), strict=True))
-        return (
-            f"{self.sensor}: its depth image is displaced by ({across}, {down}) px from the image that shows the "
-            "corners: are they of two cameras or modes, aligned wrongly, or cropped? Take both as the device makes "
-            "them, or the depth image as a sensor of its own"
-        )
+        return f"{self.sensor}: {self.finding}: {self.remedy}"
 
 
 def distance_errors(solution: Solution, needed_px: float) -> list[Misread | Displaced]:
@@ -91,24 +104,40 @@ def distance_errors(solution: Solution, needed_px: float) -> list[Misread | Disp
 def _of_group(
     solution: Solution, sensor: str, columns: Sequence[NDArray[np.float64]], needed_px: float
 ) -> list[Misread | Displaced]:
-    read, *moved = columns
-    of_both = (read[:, None], np.stack(moved, axis=1))
-    for one in further(solution.adjustment.equations, solution.adjustment.residuals, of_both):
-        is_read = len(one.sizes) == 1
-        if np.any(np.abs(one.sizes) > np.maximum(MISREAD if is_read else needed_px, CERTAIN * one.sigmas)):
-            return [Misread(sensor, one.sizes.item()) if is_read else Displaced(sensor, -one.sizes, one.sigmas)]
+    read, across, down, *terms = columns
+    blocks = (np.stack([read, *terms], axis=1), np.stack([across, down, *terms], axis=1))
+    every = further(solution.adjustment.equations, solution.adjustment.residuals, blocks)
+    for block, one in zip(blocks, every, strict=False):  # of too few poses there are none
+        count = block.shape[1] - len(terms)
+        sizes, sigmas = one.sizes[:count], one.sigmas[:count]
+        certain = np.abs(sizes) > CERTAIN * sigmas
+        if count == 1 and certain.all() and abs(abs(sizes.item()) - 1) < MISREAD:
+            return [Misread(sensor, sizes.item())]
+        if count > 1 and np.any(certain & (np.abs(sizes) > needed_px)):
+            return [Displaced(sensor, -sizes, sigmas)]
     return []
 
 
 def _columns(equations: Equations, number: int, measured: Planes) -> Iterator[NDArray[np.float64]]:
-    """Changes of all measured residuals (k,) if one group's distances are divided by the cosine, or moved by 1 px."""
+    """Changes of all measured residuals (k,) by mistakes in one group's distances.
+
+    They are divided by the cosine, or moved across and down by 1 px. Another offset and scale follow, unless they are
+    solved anyway: what is too long everywhere is no mistake of these kinds.
+    """
     group, start = equations.groups[number], np.zeros(equations.layout.size)
     before = equations.residuals(start)
     cosines = equations.base.sensors[group.sensor].camera.directions(measured.pixels)[:, 2]
-    # By the derivative at exponent 0, so that it is the same in both directions.
-    read = replace(measured, distances=measured.distances * (1 - np.log(cosines)))
-    moved = [replace(measured, pixels=measured.pixels + step) for step in np.eye(2)]
-    for changed in (read, *moved):
+    distances, solved = measured.distances, equations.layout.free_parameters[group.sensor].depth
+    terms = {"depth_offset": distances + np.median(distances), "depth_scale": 2 * distances}
+    changed = [
+        # By the derivative at exponent 0, so that it is the same in both directions.
+        replace(measured, distances=distances * (1 - np.log(cosines))),
+        *(replace(measured, pixels=measured.pixels + step) for step in np.eye(2)),
+        *(replace(measured, distances=other) for term, other in terms.items() if term not in solved),
+    ]
+    for one in changed:
         groups = [*equations.groups]
-        groups[number] = replace(group, measured=changed)
-        yield (replace(equations, groups=groups).residuals(start) - before)[: equations.ends[-1]]
+        groups[number] = replace(group, measured=one)
+        change = (replace(equations, groups=groups).residuals(start) - before)[: equations.ends[-1]]
+        # In a solution that is far off, a pixel beside one of them may have no direction.
+        yield np.where(np.isfinite(change), change, 0.0)

@@ -5,9 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from calib.board.views import PlaneView
 from calib.camera import Camera
+from calib.lenses.lens import LensError
 from calib.solve.bundle.tasks import SensorTask, Task
 from calib.solve.calibrate import calibrate
 from calib.solve.solution import Solution
@@ -88,5 +90,24 @@ def test_a_displaced_depth_image_is_named_with_its_shift() -> None:
     assert distance_errors(solution, 10.0) == []
 
 
+@pytest.mark.parametrize(("scale", "offset"), [(1.019, 0.0), (1.0, 0.03)])
+def test_distances_that_are_too_long_are_none_of_these_mistakes(scale: float, offset: float) -> None:
+    too_long = solved(lambda view, _: replace(view, distances=scale * view.distances + offset), True)
+    assert distance_errors(too_long, 1.0) == []
+
+
 def test_a_depth_sensor_without_an_image_may_look_elsewhere() -> None:
     assert distance_errors(solved(displaced, True, own_image=False), 1.0) == []
+
+
+def test_pixels_beside_that_no_lens_can_show_say_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    solution, directions = solved(as_they_are, True), Camera.directions
+    furthest = max(view.pixels[:, 0].max() for view in solution.task.planes)
+
+    def none_beside(camera: Camera, pixels: NDArray[np.float64]) -> NDArray[np.float64]:
+        if pixels[:, 0].max() > furthest:
+            raise LensError("no direction")
+        return directions(camera, pixels)
+
+    monkeypatch.setattr(Camera, "directions", none_beside)
+    assert distance_errors(solution, 1.0) == []
