@@ -14,6 +14,7 @@ from calib.solve.validation.cross_validation import Agreement, TooFewToSplitErro
 from calib.solve.validation.distance_errors import distance_errors
 from calib.solve.validation.free_shape import free_shape
 from calib.solve.validation.groups import groups
+from calib.solve.validation.other_lens import other_lenses
 from calib.solve.validation.projection_uncertainty import UncertaintyMap
 from calib.solve.validation.steadiness import Change, changes_of_optics, changes_of_place, focal_scatter
 from calib.solve.validation.weak_directions import weak_directions
@@ -91,7 +92,7 @@ def assess(
     reasons += _uncertain(known, needed_px)
     reasons += _narrow(solution, images)
     reasons += [str(one) for one in shape if not one.is_misprint]  # why the halves may differ
-    reasons = [*cause, *reasons] if reasons else []
+    reasons = [*other_lenses(solution), *cause, *reasons] if reasons else []
     verdict = f"Do not trust it yet: {reasons[0]}" if reasons else _praise(agreements, images, known, distance)
     return Assessment(not reasons, verdict, reasons, contradicting, agreements, images, pairs, distance)
 
