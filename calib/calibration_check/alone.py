@@ -9,7 +9,9 @@ from calib.calibration_check.board_poses import solve
 from calib.calibration_check.changes import MIN_SHOTS
 from calib.calibration_check.stored import Stored, Views
 from calib.solve.bundle import robust
+from calib.solve.bundle.adjustment import NotSolvedError
 from calib.solve.start.board_poses import pose_candidates
+from calib.solve.validation.distance_errors import Displaced, Misread, distance_errors
 
 
 @dataclass(frozen=True)
@@ -74,3 +76,26 @@ def distance_bias(stored: Stored, views: Views, sensor: str) -> DistanceBias | N
     return DistanceBias(
         float(np.mean(excesses)), float(np.std(excesses, ddof=1) / np.sqrt(len(excesses))), len(excesses)
     )
+
+
+def distance_error(stored: Stored, views: Views, sensor: str, needed_px: float) -> Misread | Displaced | None:
+    """Mistake in the distances of a sensor, by its own corners, or by those of all others if it makes no image.
+
+    None without any, and if the other sensors contradict each other.
+
+    Args:
+        stored, views, sensor: as above.
+        needed_px: displacement of its depth image beyond which that is a mistake [px].
+    """
+    planes = [view for view in views.planes if view.sensor == sensor]
+    shots = {view.shot for view in planes}
+    own = [view for view in views.corners if view.sensor == sensor and view.shot in shots]
+    corners = own or [view for view in views.corners if view.shot in shots]
+    seen = {view.shot for view in corners}
+    used = Views(corners, [view for view in planes if view.shot in seen])
+    if not used.planes:
+        return None
+    try:
+        return next(iter(distance_errors(solve(stored, used, ()), needed_px)), None)
+    except NotSolvedError:
+        return None

@@ -13,6 +13,7 @@ from calib.calibration_check.mistakes import Mistake
 from calib.calibration_check.stored import Views
 from calib.solve.validation.board_shape import ShapeError
 from calib.solve.validation.contradictions import Contradiction
+from calib.solve.validation.distance_errors import Displaced, Misread
 
 #: Distance bias that is as good as any depth camera's, and that is unacceptable [m].
 UNNOTICED_M, WRONG_M = 0.002, 0.01
@@ -113,6 +114,11 @@ def of_misprint(found: ShapeError) -> Verdict:
     """Verdict on a board whose print is not as described."""
     text = f"{found.finding[0].upper()}{found.finding[1:]}. Nothing else can be said of the calibration."
     return Verdict(Level.BAD, text, f"{found.shape.value[0].upper()}{found.shape.value[1:]}.")
+
+
+def of_distance_error(found: Misread | Displaced) -> Verdict:
+    """Verdict on distances of another geometry, or on a displaced depth image."""
+    return Verdict(Level.BAD, f"{found.finding}.", f"{found.remedy[0].upper()}{found.remedy[1:]}.", found.sensor)
 
 
 def _of_mistakes(found: Sequence[Mistake]) -> Verdict:

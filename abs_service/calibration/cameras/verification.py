@@ -13,13 +13,14 @@ from abs_service.calibration.shots.corner_extraction import BoardObservations
 from abs_service.report.content import Level, Report, Verdict
 from abs_service.report.provenance import Provenance
 from calib.calibration_check import mistakes
-from calib.calibration_check.alone import CornerFit, DistanceBias, corner_fit, distance_bias
+from calib.calibration_check.alone import CornerFit, DistanceBias, corner_fit, distance_bias, distance_error
 from calib.calibration_check.board_size import gross_size
 from calib.calibration_check.changes import PairChange, contradicting, pair_changes
 from calib.calibration_check.comparison import NOT_COMPARED, Comparison, compare
 from calib.calibration_check.hypotheses import TERMS, Kind
 from calib.calibration_check.misprint import misprint
 from calib.calibration_check.stored import Stored, Views, usable
+from calib.solve.validation.distance_errors import Displaced, Misread
 
 #: Expected reprojection error if the calibration does not contain its own [px].
 BASELINE_PX = 0.5
@@ -46,6 +47,7 @@ class Verification:
         focal_px: their focal lengths.
         expected_px: their reprojection errors at calibration.
         biases: distance bias of sensors with corners and distances.
+        errors: mistakes in the distances of sensors, by sensor.
         changes: relative motion of all pairs.
         comparison: explanations of the shots; `NOT_COMPARED` without two sensors that saw the board together.
         reaches: distances of the boards that sensors measured.
@@ -58,6 +60,7 @@ class Verification:
     focal_px: Mapping[str, float]
     expected_px: Mapping[str, float]
     biases: Mapping[str, DistanceBias]
+    errors: Mapping[str, Misread | Displaced]
     changes: tuple[PairChange, ...]
     comparison: Comparison
     reaches: Mapping[str, Reach]
@@ -105,10 +108,11 @@ def verdicts(found: Verification) -> list[Verdict]:
     scatter = _of_scatter(found, max(one.level for one in fits))
     # Shots that do not agree with each other say nothing of a change that lasts.
     disagree = any(one.level == Level.BAD for one in scatter)
-    lasting = [] if disagree else causes.verdicts(found.comparison, motion, found.reaches)
+    lasting = [] if disagree or found.errors else causes.verdicts(found.comparison, motion, found.reaches)
     is_board = bool(lasting) and found.comparison.chosen.hypothesis.kind == Kind.BOARD
-    named = {*found.biases} if is_board else {one.about for one in lasting}
-    said = [*lasting, *(scatter or causes.of_contradictions(contradicting(found.changes))), *fits]
+    named = {*found.biases} if is_board else {one.about for one in lasting} | {*found.errors}
+    said = [causes.of_distance_error(error) for error in found.errors.values()]
+    said += [*lasting, *(scatter or causes.of_contradictions(contradicting(found.changes))), *fits]
     said += [_of_bias(name, bias) for name, bias in found.biases.items() if name not in named]
     changes = [change for change in found.changes if not (disagree or _is_explained(change, found))]
     said += [_of_pair(change, found.comparison) for change in changes]
@@ -124,6 +128,8 @@ def _found(known: RigCalibration, stored: Stored, seen: BoardObservations, used:
     views = new_views.thinned(used)
     observers = dict.fromkeys(view.sensor for view in views.corners)
     biases = {name: distance_bias(stored, views, name) for name in observers}
+    reaches = causes.reaches(views)
+    errors = {name: distance_error(stored, views, name, SPOILT_PX) for name in reaches}
     changes = tuple(pair_changes(stored, views))
     baseline = {name: known.sensors[name].residuals.corners_px for name in observers}
     return Verification(
@@ -131,9 +137,10 @@ def _found(known: RigCalibration, stored: Stored, seen: BoardObservations, used:
         {name: sensors[name].camera.fx for name in observers},
         {name: BASELINE_PX if px is None else px for name, px in baseline.items()},
         {name: bias for name, bias in biases.items() if bias is not None},
+        {name: error for name, error in errors.items() if error is not None},
         changes,
         _compared(stored, views, changes),
-        causes.reaches(views),
+        reaches,
         {name: mistakes.likelier(stored, views, name) for name in observers},
         tuple(new_views.verdicts(stored, seen, used)),
         len(sensors),

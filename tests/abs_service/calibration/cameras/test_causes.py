@@ -49,6 +49,27 @@ def test_a_print_that_is_longer_along_one_axis_is_named_and_no_other_size_of_its
     assert "% longer than described, compared with its columns" in only.text
 
 
+@pytest.mark.parametrize("mistake", ["geometry", "displaced"])
+def test_mistakes_in_the_distances_are_named_and_no_other_scale_of_them(mistake: str) -> None:
+    random = np.random.default_rng(4)
+    heads = {name: head for name, head in three_heads().items() if name != "light"}
+    seen = look(heads, random_boards(10, random), random)
+    cosines = [heads[view.sensor].camera.directions(view.pixels)[:, 2] for view in seen.planes]
+    planes = [
+        replace(view, distances=view.distances * cosine)
+        if mistake == "geometry"
+        else replace(view, pixels=view.pixels + np.array([6, 0]))
+        for view, cosine in zip(seen.planes, cosines, strict=True)
+    ]
+    sensors = {name: rig_file.SensorCalibration(head.camera) for name, head in heads.items()}
+    known = rig_file.RigCalibration("lab", sensors, ORIGIN, "good")
+    worst, *others = verification.verify(known, BoardObservations(tuple(seen.corners), tuple(planes)), ORIGIN).verdicts
+    said = {"geometry": "its distances look like z", "displaced": "its depth image is displaced by (+"}[mistake]
+    assert (worst.level, worst.about) == (Level.BAD, "tof")
+    assert worst.text.startswith(said)
+    assert all(other.level == Level.GOOD for other in others)
+
+
 def aligned() -> dict[str, Head]:
     color = three_heads()["color"]
     return {"color": color, "depth": Head(color.camera, depth_sigma=0.004)}
