@@ -112,7 +112,7 @@ class CmaEsSampler:
         self._sigma = update_distribution(
             self._z,
             self._axes,
-            np.argsort(costs, kind="stable"),
+            costs.argsort(kind="stable"),
             self._constants.weights,
             self._constants.rates,
             self._generation,

@@ -71,21 +71,19 @@ def add_squares(
     local: NDArray[np.float64],
     total: NDArray[np.float64],
 ) -> None:
-    """Adds DᵀMD of points with matrices M (n, 3, 3), symmetric and not negative, to a matrix (dim, dim).
+    """Adds DᵀMD of points with matrices M (n, 3, 3), symmetric and not negative, to a matrix (dim, dim); uses M up.
 
     M is CᵀC with as many rows C as its rank, by a Cholesky decomposition with pivots, and DᵀMD the square of CD.
     """
     n, k, half, first = group.size, local.shape[2], local.shape[2] // 2, 0
-    rest, row = np.empty((3, 3)), np.empty(3)
+    row = np.empty(3)
     while first < n:
         last = first + 1
         while last < n and group[last] == group[first]:
             last += 1
         left, right, count = np.empty((3 * (last - first), half)), np.empty((3 * (last - first), k - half)), 0
         for v in range(first, last):
-            for i in range(3):
-                for j in range(3):
-                    rest[i, j] = squares[v, i, j]
+            rest = squares[v]
             least = _ROUNDING * (rest[0, 0] + rest[1, 1] + rest[2, 2])
             for _ in range(3):
                 p = 0 if rest[0, 0] >= max(rest[1, 1], rest[2, 2]) else (1 if rest[1, 1] >= rest[2, 2] else 2)
