@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from abs_service.config import ServiceConfig, plugins
+from abs_service.config.problems import Problem, allowed_instead
 from abs_service.config.tables.service import TrackerTable
 from abs_service.pairing.synchroniser import Synchroniser
 from abs_service.tracker.detection.templates import first_image
@@ -104,6 +105,22 @@ def noises(config: ServiceConfig, tracker: str) -> dict[str, Noise]:
             made = texture(table.texture)
             models[f"{name}/{measurement(made).frames[0]}"] = made
     return models
+
+
+def reference_problem(config: ServiceConfig, tracker: str, models: Mapping[str, Noise]) -> Problem | None:
+    """The problem of a reference that is none of the images that a tracker uses: it would wait for it for ever.
+
+    Args:
+        config: the rig.
+        tracker: name of the tracker.
+        models: see `noises`.
+    """
+    used = {f"{name.partition('/')[0]}/{kind}" for name, model in models.items() for kind in measurement(model).frames}
+    reference = "/".join(config.reference(tracker))
+    if reference in used:
+        return None
+    key = ("trackers", tracker, "reference") if config.trackers[tracker].reference else ("synchronisation", "reference")
+    return Problem(key, f'tracker "{tracker}" uses no such images, {allowed_instead(reference, used)}', reference)
 
 
 def noise(settings: Any, range_m: float | None, no_return: NoReturn) -> Noise:

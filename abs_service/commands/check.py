@@ -140,7 +140,9 @@ def _unusable_parts(rig: config.ServiceConfig, streams: Mapping[str, list[Stream
     for name, tracker in rig.trackers.items():
         with _noting(("trackers", name), problems):
             wiring.plan(rig, name)
-            device_checks.check_noises(wiring.noises(rig, name), streams)
+            device_checks.check_noises(noises := wiring.noises(rig, name), streams)
+            problem = wiring.reference_problem(rig, name, noises)
+            problems += [problem] if problem and problem not in problems else []
         with _noting(("trackers", name, "region"), problems):
             tracker.region.build()
         with _noting(("trackers", name, "template"), problems):

@@ -25,7 +25,7 @@ from abs_service.bus.session import Role
 from abs_service.bus.stamps import WallClock
 from abs_service.commands.parts import logs, rig_process
 from abs_service.commands.parts.rig_in_memory import RigInMemory, in_memory
-from abs_service.commands.running import settled_file, view
+from abs_service.commands.running import outcome, settled_file, view
 from abs_service.display.terminal import choice
 from abs_service.recording.disk import folder
 from abs_service.supervision import forked, log_lines, metrics, systemd
@@ -33,7 +33,7 @@ from abs_service.supervision.child import Child
 from abs_service.supervision.child_process import ChildProcess, Process, Spawn
 from abs_service.supervision.exit_codes import Exit
 from abs_service.supervision.repeats import Tracebacks
-from abs_service.supervision.rig_view import Display, RigView
+from abs_service.supervision.rig_view import Display
 from abs_service.supervision.run_session import Renewal, RunSession
 from abs_service.supervision.supervisor import Limits, Supervisor
 from abs_service.wire.commands import RefusedError
@@ -97,13 +97,18 @@ def run(arguments: argparse.Namespace) -> int:
             notifier.stopping()
             session.stop()
         last = session.view()
+        untracked = outcome.untracked(last.live.trackers)
+        if untracked and last.activity and session.elapsed_s >= arguments.duration:
+            display.note(f"{', '.join(untracked)} had no time to track anything: {last.activity}")
         lost = display.close(last)
     refused = supervisor.misconfigured()
     if refused is not None:
         # The child has read a temporary file of ours.
         reason = log_lines.final_error(refused.reason)
         raise ChildError(reason.replace(str(file.path), str(arguments.config or "demo.toml")))
-    return supervisor.exit_code() or recording_code(last) or (Exit.FAILED if lost else Exit.OK)
+    # Who ends a rig before it has found its object is not told of a failure: systemd would start it again.
+    failed = lost or (untracked and not stop.is_set())
+    return supervisor.exit_code() or outcome.recording_code(last) or (Exit.FAILED if failed else Exit.OK)
 
 
 def effective(rig: config.ServiceConfig, arguments: argparse.Namespace) -> config.ServiceConfig:
@@ -208,12 +213,6 @@ def starting(display: Display, arguments: argparse.Namespace) -> Spawn:
 def spawn(pass_on: PassOn, log_options: Sequence[str], component: str, arguments: Sequence[str]) -> Process:
     """Starts a child process."""
     return ChildProcess(component, [*arguments, *log_options], pass_on)
-
-
-def recording_code(view: RigView) -> Exit:
-    """FAILED if a recorder has said, at its end or before, that something is missing, though all else went well."""
-    worst = any(child.component == "record" and child.worst_code for child in view.children)
-    return Exit.FAILED if worst or view.live.counters("record")["failures"] else Exit.OK
 
 
 def _pass_on(display: Display, as_json: bool, tracebacks: Tracebacks, component: str, written: str) -> None:

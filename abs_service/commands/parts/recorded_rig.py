@@ -4,6 +4,7 @@ from pathlib import Path
 
 from abs_service import config, wiring
 from abs_service.commands.parts import preview_option
+from abs_service.config.problems import allowed_instead
 from abs_service.pairing.synchroniser import Synchroniser
 from abs_service.tracking.observer import missing_streams
 from calib.rig import Rig
@@ -38,6 +39,9 @@ def recorded_rig(settings: config.ServiceConfig, name: str, recording: Recording
     there = [f"{sensor}/{stream}" for sensor, stream in recording.counts]
     if missing := missing_streams(rig.sensors.values(), there):
         raise ReplayOptionError(f'{recording.path}: tracker "{name}" needs {", ".join(missing)}, which is not there')
+    if (reference := "/".join(settings.reference(name))) not in there:
+        message = f'tracker "{name}" is paced by {reference}, which is not there; {allowed_instead(reference, there)}'
+        raise ReplayOptionError(f"{recording.path}: {message}")
     return rig, wiring.synchroniser(settings, name, rig.sensors.values())
 
 

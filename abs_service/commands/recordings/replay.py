@@ -8,6 +8,7 @@
   abs-service replay recordings/x.mcap --speed 1                in real time, through the processes of `run`
 
 The configuration's devices are not opened. Cameras come from the recording, unless the configuration has its own.
+Exit code 1 if a tracker tracked nothing.
 """
 
 import argparse
@@ -29,6 +30,7 @@ from abs_service.commands.parts import logs, preview_option, progress
 from abs_service.commands.parts.recorded_rig import ReplayOptionError, draw_previews, recorded_rig
 from abs_service.commands.parts.rig_in_memory import in_memory
 from abs_service.commands.recordings.image_copies import image_copies
+from abs_service.commands.running import outcome
 from abs_service.supervision.exit_codes import Exit
 from abs_service.tracking.replay import OfflineTracker, free_path, replay
 from abs_service.tracking.session import TrackingSession
@@ -82,7 +84,7 @@ def run(arguments: argparse.Namespace) -> int:
     if recording.unpaired:
         print(f"{recording.unpaired} images or descriptions without their counterpart", file=output)
     print(f"wrote {out}", file=output)
-    return Exit.OK
+    return Exit.FAILED if outcome.untracked({name: tracker.log for name, tracker in trackers.items()}) else Exit.OK
 
 
 def notes(recording: Recording) -> list[str]:

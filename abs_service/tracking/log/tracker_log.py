@@ -106,6 +106,11 @@ class TrackerLog:
         self._topology_mesh: tuple[str, int] | None = None  # and the last topology
 
     @property
+    def has_tracked(self) -> bool:
+        """True if an estimate was of use: TRACKING or DEGRADED."""
+        return bool(self.statuses["TRACKING"] + self.statuses["DEGRADED"])
+
+    @property
     def lacks_topology(self) -> bool:
         """True if the topology of the last estimate did not arrive."""
         return self._estimate_mesh != self._topology_mesh
@@ -138,7 +143,7 @@ class TrackerLog:
             yield self._report(state, mesh)
 
     def summary(self) -> list[str]:
-        """Summary in one to three lines."""
+        """Summary in one to four lines."""
         line = f"{self.estimates} estimates, {self.skipped} frame sets skipped"
         if self.estimates:
             line += f", {self.solve_ms.mean:.1f} ms each"
@@ -146,6 +151,8 @@ class TrackerLog:
         lines = [line]
         if self.last and self.last.reasons:
             lines.append(f"{self.last.status} at the end: {'; '.join(self.last.reasons)}")
+        if not self.has_tracked:
+            lines.append("nothing was tracked")
         error, surface = self.error_mm, self.surface_mm
         if error.count:
             lines.append(

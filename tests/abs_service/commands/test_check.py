@@ -223,3 +223,13 @@ def test_a_recording_that_is_not_there_is_named(checked, tmp_path):
     code, _, err = checked(FOR_REPLAY, "--replay", str(tmp_path / "no.mcap"))
     assert code == Exit.USER
     assert f"--replay: {tmp_path / 'no.mcap'}: No such file" in err
+
+
+def test_a_reference_that_no_tracker_uses_is_refused(checked):
+    wrong = 'synchronisation.reference = "tof/dept": tracker "sheet" uses no such images, did you mean "tof/depth"? '
+    code, _, err = checked(RIG.replace('"tof/depth"', '"tof/dept"'))
+    assert (code, err.count(wrong)) == (Exit.USER, 1)
+    own = RIG.replace('sensors = ["tof"]\n', 'sensors = ["tof"]\nreference = "tof/amplitude"\n')
+    code, _, err = checked(own)
+    assert code == Exit.USER
+    assert 'trackers.sheet.reference = "tof/amplitude": tracker "sheet" uses no such images' in err

@@ -1,18 +1,20 @@
-"""The exit code of `run` says whether its recordings are complete."""
+"""The exit code of `run` says whether its recordings are complete, and whether anything was tracked."""
 
 from pathlib import Path
 
 import pytest
 from absmsg.v1.common_pb2 import Header
+from absmsg.v1.deformation_state_pb2 import DeformationState
 from absmsg.v1.health_pb2 import Health
 
 from abs_service.bus import keys
 from abs_service.bus.contract import Sample
-from abs_service.commands import run
+from abs_service.commands.running import outcome
 from abs_service.supervision.child import Child, State
 from abs_service.supervision.exit_codes import Exit
 from abs_service.supervision.rig_state import RigState
 from abs_service.supervision.rig_view import RigView
+from abs_service.tracking.log.tracker_log import TrackerLog
 
 
 def view(code, *failures):
@@ -27,9 +29,24 @@ def view(code, *failures):
 
 @pytest.mark.parametrize(("code", "expected"), [(0, Exit.OK), (1, Exit.FAILED), (137, Exit.FAILED)])
 def test_the_recorders_own_code_counts(code, expected):
-    assert run.recording_code(view(code, 0)) is expected
+    assert outcome.recording_code(view(code, 0)) is expected
 
 
 def test_a_failure_counts_though_the_recorder_that_had_it_was_killed():
-    assert run.recording_code(view(0, 1, 0)) is Exit.FAILED
-    assert run.recording_code(view(0, 0, 0)) is Exit.OK
+    assert outcome.recording_code(view(0, 1, 0)) is Exit.FAILED
+    assert outcome.recording_code(view(0, 0, 0)) is Exit.OK
+
+
+def log(*statuses):
+    """A tracker that said these statuses."""
+    made = TrackerLog()
+    for status in (*statuses, DeformationState.STATUS_LOST):  # the last one still waits for its mesh
+        list(made.take_state(DeformationState(status=status)))
+    return made
+
+
+def test_trackers_that_never_tracked_are_named():
+    found, lost = log(DeformationState.STATUS_DEGRADED), log(DeformationState.STATUS_INITIALIZING)
+    assert outcome.untracked({"hat": found, "sheet": lost, "scarf": TrackerLog()}) == ["sheet", "scarf"]
+    assert "nothing was tracked" in lost.summary()
+    assert "nothing was tracked" not in found.summary()

@@ -154,13 +154,23 @@ def test_one_json_object_per_estimate(recording, tmp_path, capsys):
     assert "vertex error mean" in captured.err
 
 
-def test_the_last_reason_is_told_in_the_summary(recording, tmp_path, capsys):
+def test_a_replay_that_tracks_nothing_fails_and_tells_the_last_reason_in_the_summary(recording, tmp_path, capsys):
     rig = tmp_path / "rig.toml"
     rig.write_text(TOML.replace("minimum_pixels = 200", "minimum_pixels = 1000000"))
-    assert cli.main(["replay", str(recording), "--config", str(rig), "--out", str(tmp_path / "out.mcap")]) == Exit.OK
+    code = cli.main(["replay", str(recording), "--config", str(rig), "--out", str(tmp_path / "out.mcap")])
+    assert code == Exit.FAILED
     summary = capsys.readouterr().out
+    assert "sheet: nothing was tracked\n" in summary
     assert "20 INITIALIZING\n" in summary
     assert "sheet: INITIALIZING at the end: no connected surface of at least minimum_pixels" in summary
+
+
+def test_a_reference_that_is_not_in_the_recording_is_named(recording, tmp_path, capsys):
+    rig = tmp_path / "rig.toml"
+    rig.write_text(TOML.replace('"tof/depth"', '"tof/dept"'))
+    assert cli.main(["replay", str(recording), "--config", str(rig)]) == Exit.USER
+    message = 'tracker "sheet" is paced by tof/dept, which is not there; did you mean "tof/depth"? allowed: color/color'
+    assert message in capsys.readouterr().err
 
 
 def test_what_exists_is_not_overwritten(recording, tmp_path, capsys):

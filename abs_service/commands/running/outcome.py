@@ -1,0 +1,18 @@
+"""Outcome of a run or a replay for its exit code: a recorder that lacks something, trackers that never tracked."""
+
+from collections.abc import Mapping
+
+from abs_service.supervision.exit_codes import Exit
+from abs_service.supervision.rig_view import RigView
+from abs_service.tracking.log.tracker_log import TrackerLog
+
+
+def recording_code(view: RigView) -> Exit:
+    """FAILED if a recorder has said, at its end or before, that something is missing, though all else went well."""
+    worst = any(child.component == "record" and child.worst_code for child in view.children)
+    return Exit.FAILED if worst or view.live.counters("record")["failures"] else Exit.OK
+
+
+def untracked(trackers: Mapping[str, TrackerLog]) -> list[str]:
+    """Names of the trackers none of whose estimates was of use."""
+    return [name for name, log in trackers.items() if not log.has_tracked]
