@@ -85,10 +85,10 @@ def _result(scheme: str, search: Future[list[Found]], timeout_s: float) -> list[
     try:
         return search.result(timeout_s)
     except TimeoutError:
-        reason = f"the driver has not answered for {timeout_s:g} s"
+        reason, remedy = f"the driver has not answered for {timeout_s:g} s", "on a slow or busy machine: --timeout 30"
     except Exception as error:
-        reason = f"the driver broke while looking: {error!r}"
-    return [Found(DeviceInfo(f"{scheme}://", scheme, ""), Availability.FAULTY, reason, "please report this")]
+        reason, remedy = f"the driver broke while looking: {error!r}", "please report this"
+    return [Found(DeviceInfo(f"{scheme}://", scheme, ""), Availability.FAULTY, reason, remedy)]
 
 
 @cache

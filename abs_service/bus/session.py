@@ -111,7 +111,10 @@ def check_endpoint(endpoint: str, security: NoSecurity | MutualTls = NO_SECURITY
 
 def _explain(error: str, role: Role, connect_timeout_ms: int) -> str:
     if "in use" in error:
-        return "the address is in use; is another abs-service running? Stop it or choose another port"
+        return (
+            "the address is in use; is another abs-service running? Stop it, or set endpoint in the table [bus] of the "
+            "rig file to another port; `abs-service new` writes a file"
+        )
     if role is Role.CLIENT:
         return f"nothing answers there within {connect_timeout_ms / 1000:g} s; start `abs-service run` or use --listen"
     # zenoh appends its own source lines, which are of no use here.

@@ -145,6 +145,7 @@ def _unusable_parts(rig: config.ServiceConfig, streams: Mapping[str, list[Stream
             problems += [problem] if problem and problem not in problems else []
         with _noting(("trackers", name, "region"), problems):
             tracker.region.build()
+        problems += device_checks.outside(rig, name, streams)
         with _noting(("trackers", name, "template"), problems):
             build_template(tracker.template, tracker.mesh.vertices)
     return problems

@@ -27,10 +27,12 @@ for await (const [name, state] of events(`${server}/states/${tracker}`)) {
   if (name !== "state") continue; // "topology" has the faces of the vertices that follow
   const vertices = new Float32Array(Uint8Array.from(Buffer.from(state.vertices, "base64")).buffer);
   // On the host of the cameras; elsewhere only the age that abs-web measured before it sent the estimate, state.age_s.
-  const age = Number(process.hrtime.bigint() - BigInt(state.t_host_ns)) / 1e6;
+  // Before the first estimate there is none: STALE, with age_s null.
+  const age_ms = Number(process.hrtime.bigint() - BigInt(state.t_host_ns)) / 1e6;
+  const age = state.age_s === null ? "–" : age_ms.toFixed(1);
   const theta = state.theta.slice(0, 6).map((value) => value.toFixed(3));
   console.log(
-    `${state.seq} ${state.status} here ${age.toFixed(1)} ms, ${vertices.length / 3} vertices, Θ[${state.theta.length}] = ${theta.join(" ")}`,
+    `${state.seq} ${state.status} here ${age} ms, ${vertices.length / 3} vertices, Θ[${state.theta.length}] = ${theta.join(" ")}`,
   );
   if (++printed >= count) process.exit();
 }

@@ -35,6 +35,8 @@ class FrameNumbers:
             ImageFolderError: there is none.
         """
         chosen = [file for file in files if file.seq in self]
+        if not chosen and all(last is not None and last < first for first, last, _ in self.ranges):
+            raise ImageFolderError(f"--frames {self.text}: the first number is larger than the last one")
         if not chosen:
             numbers = f"{files[0].seq} to {files[-1].seq}"
             raise ImageFolderError(f"--frames {self.text}: no image has such a number; there are {numbers}")

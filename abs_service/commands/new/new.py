@@ -93,7 +93,9 @@ def answered(arguments: argparse.Namespace, name: str, found: list[Found], ask: 
     if thing == "known-sheet":
         size = size or _size(ask("size", "Width and height of the sheet in metres, such as 0.297 0.21?", {}))
         if not all(0 < side < 100 for side in size):
-            raise NewFileError(f"--size {size[0]:g} {size[1]:g}: sides are lengths in metres, above 0")
+            sides = f"{size[0]:g} {size[1]:g}"
+            smaller = f"; did you mean {size[0] / 1000:g} {size[1] / 1000:g}?" if min(size) >= 1 else ""
+            raise NewFileError(f"--size {sides}: sides are lengths in metres, above 0 and less than 100{smaller}")
     color = arguments.color
     if device.color is None:
         if color:

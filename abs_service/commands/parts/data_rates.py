@@ -46,6 +46,8 @@ def text(rates: Mapping[str, Any]) -> str:
     without = f"; without {', '.join(rates['unknown'])}, known once open" if rates["unknown"] else ""
     shares = ", ".join(f"{sensor} {rate:g}" for sensor, rate in rates["sensors_mb_s"].items())
     each = f" ({shares})" if len(rates["sensors_mb_s"]) > 1 else ""
+    if rates["unknown"] and not rates["sensors_mb_s"]:
+        return "images: how much is known once the devices are open"
     return f"images: {rates['sent_mb_s']:g} MB/s sent{each}, recorded {written}{without}"
 
 

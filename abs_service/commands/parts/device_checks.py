@@ -5,14 +5,17 @@ from collections.abc import Mapping
 from pathlib import Path
 from urllib.parse import quote
 
+import numpy as np
+
 from abs_service import config
 from abs_service.commands.parts.harmless_devices import HARMLESS
-from abs_service.config.problems import allowed_instead
+from abs_service.config.problems import Problem, allowed_instead
 from abs_service.tracker.measurements import measurement
 from calib.rig import Noise
 from drivers import opening
 from drivers.contract.capabilities import StreamInfo
 from drivers.contract.device import AddressError
+from drivers.contract.frame import Kind
 
 
 class CheckError(Exception):
@@ -84,6 +87,21 @@ def check_noises(noises: Mapping[str, Noise], streams: Mapping[str, list[StreamI
             raise CheckError(
                 f"{name}: its noise model needs the stream {missing[0]}, {allowed_instead(missing[0], there)}"
             )
+
+
+def outside(rig: config.ServiceConfig, tracker: str, streams: Mapping[str, list[StreamInfo]]) -> list[Problem]:
+    """Pixels of a tracker's region that its depth image, whose size is known, does not have."""
+    region, reference = rig.trackers[tracker].region, rig.reference(tracker)[0]
+    depth = next((info for info in streams.get(reference, []) if info.kind == Kind.DEPTH), None)
+    given = {key: value for key in ("pixel", "seed", "polygon") if (value := getattr(region, key, None)) is not None}
+    if depth is None:
+        return []
+    message = f"lies outside the depth image of {reference}, which has {depth.width} × {depth.height} pixels"
+    return [
+        Problem(("trackers", tracker, "region", key), message, value)
+        for key, value in given.items()
+        if np.any(np.min(np.atleast_2d(value), axis=0) >= (depth.width, depth.height))
+    ]
 
 
 def _head_streams(infos: tuple[StreamInfo, ...], head: str, sensor: str) -> list[StreamInfo]:

@@ -24,7 +24,9 @@ def test_endpoints_that_are_fine(endpoint):
 
 def test_a_port_in_use_is_explained(open_bus, endpoint):
     open_bus()
-    with pytest.raises(BusError, match=f'bus.endpoint = "{endpoint}": the address is in use'):
+    with pytest.raises(
+        BusError, match=rf'bus.endpoint = "{endpoint}": the address is in use; .* set endpoint in the table \[bus\]'
+    ):
         open_session(endpoint, Role.ROUTER)
 
 

@@ -59,6 +59,7 @@ def test_a_failing_or_hanging_driver_does_not_hide_the_others(monkeypatch: pytes
     assert (broken.availability, hanging.availability) == (Availability.FAULTY, Availability.FAULTY)
     assert "OSError('no bus')" in broken.reason
     assert hanging.reason == "the driver has not answered for 0.2 s"
+    assert hanging.remedy == "on a slow or busy machine: --timeout 30"
     assert working is ONE
 
 

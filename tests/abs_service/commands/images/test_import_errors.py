@@ -85,6 +85,8 @@ def test_frames_that_are_not_there_are_refused(
 ) -> None:
     assert run(folder, "--camera", str(folder / "camera.toml"), "--frames", "7:9") == Exit.USER
     assert "--frames 7:9: no image has such a number; there are 0 to 2" in capsys.readouterr().err
+    assert run(folder, "--camera", str(folder / "camera.toml"), "--frames", "2:0") == Exit.USER
+    assert "--frames 2:0: the first number is larger than the last one" in capsys.readouterr().err
     arguments = ["import", str(tmp_path), "--layout", "o3r", "--out", str(tmp_path / "x.mcap"), "--frames", "0:2"]
     assert cli.main(arguments) == Exit.USER
     assert "--frames: layout o3r takes no options but --out" in capsys.readouterr().err
