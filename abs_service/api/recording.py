@@ -117,10 +117,10 @@ class Recording:
         """
         if not tracker and len(self.trackers) == 1:
             tracker = self.trackers[0]
+        if not self.trackers:
+            raise ArgumentError(f"{self.path} has no estimates; `abs-service replay` makes them")
         if tracker not in self.trackers:
-            raise ArgumentError(
-                f"tracker = {tracker!r}: {self.path} has estimates of {', '.join(self.trackers) or 'none'}"
-            )
+            raise ArgumentError(f"tracker = {tracker!r}: {self.path} has estimates of {', '.join(self.trackers)}")
         return estimates(self.path, self._contents, tracker)
 
     def frames(self) -> Iterator[Frame]:

@@ -30,6 +30,7 @@ WAITING = 4
 #: By when receiving threads have ended after their session has [s].
 END_S = 2.0
 
+_LIVE = "live/track/"
 _ENDPOINT = re.compile(r"(tcp|tls|quic|udp|ws)/.+:\d{1,5}([?#]\S*)?")
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
 
@@ -113,8 +114,13 @@ class Link:
 
     def trackers(self) -> set[str]:
         """Names of the trackers that live."""
-        prefix = self.key("live/track/")
-        return {key.removeprefix(prefix) for key in self.tokens("live/track/*")}
+        prefix = self.key(_LIVE)
+        return {key.removeprefix(prefix) for key in self.tokens(f"{_LIVE}*")}
+
+    def ask_living(self, on_message: Callable[[Received], None]) -> None:
+        """Asks for the trackers of all rigs and returns at once; a message of each has the key of its token."""
+        tokens = f"abs/*/{_LIVE}*"
+        self._start(_receive_answers, lambda: self._session.liveliness().get(tokens, timeout=QUERY_S), on_message)
 
     def key(self, topic: str) -> str:
         """The zenoh key of a topic of the rig."""

@@ -77,6 +77,8 @@ class StateSource:
         # What receives holds neither the source nor the link, so that both end with their stream.
         self._subscriptions = _subscribe(link, tracker, self._assembly, wake)
         self._asked_ns = clock()
+        self._living: set[str] = set()
+        link.ask_living(_keys_into(self._living))
         link.ask(f"{tracker}/topology", _topology_into(self._assembly, wake))  # there is one already, most often
 
     @property
@@ -119,11 +121,23 @@ class StateSource:
 
     def _stale(self) -> State:
         if self._last is _NOTHING:
-            return replace(_NOTHING, reasons=(f"nothing was received of tracker {self._tracker} yet",))
+            return replace(_NOTHING, reasons=(self._nothing(),))
         age_s = self._ages.age_s(self._last.message, self._arrived_ns)
         return replace(
             self._last, status=Status.STALE, reasons=(f"the newest estimate is {age_s:.1f} s old",), age_s=age_s
         )
+
+    def _nothing(self) -> str:
+        """Reason for no estimate so far, with the trackers that live, if this one does not: its name may be wrong."""
+        reason, living = (
+            f"nothing was received of tracker {self._tracker} of rig {self._link.rig} yet",
+            set(self._living),
+        )
+        self._link.ask_living(_keys_into(self._living))  # for the next time
+        if not living or self._link.key(f"live/track/{self._tracker}") in living:
+            return reason
+        names = (key.split("/") for key in sorted(living))
+        return f"{reason}; there are {', '.join(f'{parts[-1]} of rig {parts[1]}' for parts in names)}"
 
     def _ask_for_topology(self) -> None:
         if self._assembly.lacks_topology and self._clock() - self._asked_ns > PAUSE_NS:
@@ -154,3 +168,7 @@ def _topology_into(assembly: Assembly, wake: Wake) -> Callable[[Received], None]
         wake.signal()
 
     return on_topology
+
+
+def _keys_into(living: set[str]) -> Callable[[Received], None]:
+    return lambda one: living.add(one.key)

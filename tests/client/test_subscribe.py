@@ -50,6 +50,19 @@ def test_a_topology_from_before_the_subscription_is_asked_for(endpoint, tracker)
         assert len(first(states, Status.TRACKING).faces) == 2
 
 
+def test_a_misspelt_rig_or_tracker_is_answered_with_those_that_live(endpoint, bus):
+    bus.declare_liveliness("track/sheet")
+    for names, wrong in (
+        ({"rig": "dmo", "tracker": "sheet"}, "sheet of rig dmo"),
+        ({"tracker": "shet"}, "shet of rig demo"),
+    ):
+        with subscribe(endpoint, **names) as states:
+            stale = first(states, Status.STALE)
+        assert stale.reasons == (f"nothing was received of tracker {wrong} yet; there are sheet of rig demo",)
+    with subscribe(endpoint, tracker="sheet") as states:
+        assert first(states, Status.STALE).reasons == ("nothing was received of tracker sheet of rig demo yet",)
+
+
 def test_a_slow_reader_gets_the_newest_and_the_rest_is_counted(endpoint, tracker):
     with subscribe(endpoint) as states, estimating(tracker):
         first(states, Status.TRACKING)

@@ -162,4 +162,4 @@ def _estimates(recording: Recording, tracker: str) -> Iterable[Estimate]:
     try:
         return recording.estimates(tracker)
     except ArgumentError as error:
-        raise ExportError(f"{error}; `abs-service replay` makes estimates") from None
+        raise ExportError(str(error)) from None

@@ -101,7 +101,7 @@ def test_a_file_that_is_no_recording_is_refused(tmp_path):
 
 
 def test_estimates_of_a_tracker_that_was_not_recorded():
-    with pytest.raises(a.ArgumentError, match=r"tracker = 'sheet': .*sample\.mcap has estimates of none"):
+    with pytest.raises(a.ArgumentError, match=r"sample\.mcap has no estimates; `abs-service replay` makes them"):
         a.open_recording(SAMPLE).estimates("sheet")
 
 

@@ -105,6 +105,6 @@ def test_a_recording_without_estimates_says_so_and_leaves_nothing(tmp_path, caps
     simulation = parse("simulated://sheet?tof=32x24&sensors=tof").build()
     recording = write_take(tmp_path / "x.mcap", simulation, range(2), {"tof": "tof"})
     assert cli.main(["export", str(recording), "--out", str(tmp_path / "x.csv")]) == Exit.USER
-    assert "has estimates of none; `abs-service replay` makes estimates" in capsys.readouterr().err
+    assert "x.mcap has no estimates; `abs-service replay` makes them" in capsys.readouterr().err
     assert cli.main(["export", str(recording), "--out", str(tmp_path / "x.npz"), "--tracker", "y"]) == Exit.USER
     assert sorted(path.name for path in tmp_path.iterdir()) == ["x.mcap"]

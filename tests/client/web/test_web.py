@@ -80,7 +80,7 @@ def test_a_new_mesh_has_new_faces(tracker, address):
 def test_a_tracker_without_estimates_is_stale_and_has_no_age(address):
     ((name, state),) = received(address, "cloth", 1)
     assert (name, state["status"], state["age_s"], state["vertices"]) == ("state", "STALE", None, "")
-    assert state["reasons"] == ["nothing was received of tracker cloth yet"]
+    assert state["reasons"] == ["nothing was received of tracker cloth of rig demo yet; there are sheet of rig demo"]
 
 
 def test_the_trackers_that_live(address):
