@@ -97,18 +97,13 @@ def run(arguments: argparse.Namespace) -> int:
             notifier.stopping()
             session.stop()
         last = session.view()
-        untracked = outcome.untracked(last.live.trackers)
-        if untracked and last.activity and session.elapsed_s >= arguments.duration:
-            display.note(f"{', '.join(untracked)} had no time to track anything: {last.activity}")
         lost = display.close(last)
     refused = supervisor.misconfigured()
     if refused is not None:
         # The child has read a temporary file of ours.
         reason = log_lines.final_error(refused.reason)
         raise ChildError(reason.replace(str(file.path), str(arguments.config or "demo.toml")))
-    # Who ends a rig before it has found its object is not told of a failure: systemd would start it again.
-    failed = lost or (untracked and not stop.is_set())
-    return supervisor.exit_code() or outcome.recording_code(last) or (Exit.FAILED if failed else Exit.OK)
+    return supervisor.exit_code() or (Exit.FAILED if lost else outcome.code(last, stop.is_set()))
 
 
 def effective(rig: config.ServiceConfig, arguments: argparse.Namespace) -> config.ServiceConfig:

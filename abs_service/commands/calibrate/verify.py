@@ -107,13 +107,15 @@ def _see_all(
     arguments: argparse.Namespace, target: Target, shots: Iterable[Shot], cameras: Mapping[str, Camera]
 ) -> BoardObservations:
     """Observations in all shots, with progress on standard error."""
-    seen, shown = BoardObservations(), list[Shot]()
+    seen, shown, progress = BoardObservations(), list[Shot](), ""
     kept = skipping.kept(shots, arguments.skip, arguments.source)
     for number, shot in enumerate(image_sizes.checked_for(kept, cameras, arguments.calibration), start=1):
         shown = [*shown[:1], shot]
         seen += see(target, _of(cameras, shot), cameras)
-        print(f"\r{number} shots, {len(seen.corners)} images show the board", end="", file=sys.stderr)
-    print(file=sys.stderr)
+        progress = f"{number} shots, {len(seen.corners)} images show the board"
+        if sys.stderr.isatty():
+            print(f"\r{progress}", end="", file=sys.stderr)
+    print("" if sys.stderr.isatty() else progress, file=sys.stderr)
     if shown and not seen.corners:
         raise UnusableImagesError(unseen.reason(target, seen, shown))
     return seen

@@ -17,6 +17,7 @@ from pathlib import Path
 from abs_service.bus import keys
 from abs_service.commands.new import recorded, rig_text
 from abs_service.commands.new.rig_text import BEHIND, DEVICES, OBJECTS, Answers, Device
+from abs_service.config.problems import allowed_instead
 from abs_service.supervision.exit_codes import Exit
 from drivers import opening
 from drivers.contract.discovery import Found
@@ -36,7 +37,7 @@ class NewFileError(Exception):
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the arguments of `abs-service new`."""
     parser.add_argument("file", metavar="RIG.toml", type=Path, help="file to write")
-    parser.add_argument("--device", choices=DEVICES, help="what is attached")
+    parser.add_argument("--device", choices=DEVICES, type=_known, help="what is attached")
     parser.add_argument("--uri", help="address of one of several cameras (default: the only one)")
     parser.add_argument(
         "--recording", metavar="FILE", type=Path, help="instead of a device: a recording, such as `import` makes"
@@ -49,6 +50,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--behind", choices=BEHIND, help="what is behind the object")
     parser.add_argument("--name", help="of the rig on the wire (default: that of the file)")
     parser.add_argument("--force", action="store_true", help="replace a file that exists")
+
+
+def _known(device: str) -> str:
+    """The name of a device that a file can be written for; argparse tells the message of any other."""
+    if device not in DEVICES:
+        others = "ifm O3R and GenICam: copy examples/rigs/o3r.toml or genicam.toml; others: `abs-service import` their "
+        others += "images, then `new --recording FILE`"
+        raise argparse.ArgumentTypeError(f"{device!r}: no such device, {allowed_instead(device, DEVICES)}; {others}")
+    return device
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -7,6 +7,15 @@ from abs_service.supervision.rig_view import RigView
 from abs_service.tracking.log.tracker_log import TrackerLog
 
 
+def code(view: RigView, is_told: bool) -> Exit:
+    """FAILED if the recording lacks something, or nothing was tracked before the rig ended without being told to.
+
+    Who ends a rig before it has found its object is not told of a failure: systemd would start it again.
+    """
+    failed = not is_told and untracked(view.live.trackers)
+    return Exit.FAILED if failed else recording_code(view)
+
+
 def recording_code(view: RigView) -> Exit:
     """FAILED if a recorder has said, at its end or before, that something is missing, though all else went well."""
     worst = any(child.component == "record" and child.worst_code for child in view.children)

@@ -129,3 +129,12 @@ def test_a_person_is_asked(tmp_path):
     table = tomllib.loads(rig.read_text())
     assert table["trackers"]["object"]["model"]["width_m"] == 0.3
     assert table["trackers"]["object"]["region"]["type"] == "above_plane"
+
+
+def test_a_device_that_no_file_is_written_for_is_told_the_way(tmp_path, capsys):
+    with pytest.raises(SystemExit) as ended:
+        cli.main(["new", str(tmp_path / "rig.toml"), "--device", "zed"])
+    assert ended.value.code == Exit.USER
+    message = capsys.readouterr().err
+    assert "'zed': no such device, allowed: " in message
+    assert "copy examples/rigs/o3r.toml or genicam.toml; others: `abs-service import` their images" in message
