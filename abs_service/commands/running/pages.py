@@ -65,6 +65,7 @@ def _open(arguments: argparse.Namespace, opened: ExitStack) -> tuple[Page, Healt
     references = {name: rig.reference(name)[0] for name in rig.trackers}
     to_rig = Commands(reinitialize, record, control, references, tuple(rig.devices))
     page = Page(feed, silence, arguments.port, arguments.view_only, to_rig, time.monotonic_ns)
+    page.gui.set_panel_label(rig.name)
     opened.callback(page.close)
     return page, health, Neighbour(rig.name, page.url, feed, silence)
 
@@ -75,6 +76,7 @@ def play(recording: Path, port: int) -> None:
     stop = rig_process.stop_on_signals()
     feed = Feed(playback, playback.now_ns)
     page = Page(feed, f"{recording.name} has no messages of this time.", port, True, NONE, time.monotonic_ns)
+    page.gui.set_panel_label(recording.name)
     player = Player(page.gui, playback)
     print(f"page of {recording}: {page.url}", flush=True)
     try:

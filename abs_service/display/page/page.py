@@ -16,7 +16,7 @@ from abs_service.display.page.acting.choosing import Choosing, Measured
 from abs_service.display.page.acting.commands import Commands
 from abs_service.display.page.acting.controls import DeviceControls
 from abs_service.display.page.acting.gestures import Gestures, Ray
-from abs_service.display.page.acting.recording import ask
+from abs_service.display.page.acting.recording import ask, unavailable
 from abs_service.display.page.acting.reinitialization import Reinitialization
 from abs_service.display.page.feed import Feed
 from abs_service.display.page.panel import Button, Panel
@@ -36,6 +36,9 @@ MESH_S, IMAGES_S, WORDS_S, IDLE_S = 1 / 30, 0.25, 1.0, 0.5
 
 #: A residual compares a mesh with images of its exposure: those at most so far from it [ns].
 SAME_NS = 20_000_000
+
+#: Buttons that the recorder may have no use for.
+RECORDING = "Start recording", "Stop recording"
 
 #: The page listens here only.
 HOST = "127.0.0.1"
@@ -65,7 +68,7 @@ class Page:
         self.neighbours: Sequence[Neighbour] = ()
         self._scene = Scene(self._server)
         self._gestures, self._trails = Gestures(self._server.scene), Trails()
-        self._panel = Panel(self._server, self._trail_buttons() | ({} if view_only else self._buttons()))
+        self._panel = Panel(self._server, ({} if view_only else self._buttons()) | self._trail_buttons())
         self._reinitialization = Reinitialization(feed, commands.reinitialize, self._panel.answer)
         self._choosing = Choosing(self._gestures, self._look, self._panel.answer, self._reinitialization.ask)
         self._record = commands.record
@@ -192,7 +195,9 @@ class Page:
         numbers = self._feed.numbers(tracker)
         self._panel.show_status(status.lines(self._feed, tracker, self._silence))
         self._panel.show_neighbours(links(self.neighbours))
-        self._panel.show_legend(self._scales[self._panel.field].end)
+        if self._drawn:
+            self._panel.show_legend(self._scales[self._panel.field].end)
+        self._panel.grey(RECORDING, unavailable(self._feed))
         self._panel.show_table(table.rows(self._feed, tracker))
         self._panel.show_plots(plots(numbers, self._feed.now_s))
         self._reinitialization.look()
@@ -228,8 +233,8 @@ class Page:
             "Draw a lasso": Button(
                 "Detect the object that you click around", lambda: self._choosing.by_lasso(self._panel.tracker)
             ),
-            "Start recording": Button("Record from now on, with the seconds before", lambda: record(True)),
-            "Stop recording": Button("End the recording", lambda: record(False)),
+            RECORDING[0]: Button("Record from now on, with the seconds before", lambda: record(True)),
+            RECORDING[1]: Button("End the recording", lambda: record(False)),
         }
 
     def _look(self, tracker: str) -> Measured | None:

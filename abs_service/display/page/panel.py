@@ -11,22 +11,11 @@ from viser import uplot
 
 from abs_service.display.page.pictures import Picture
 from abs_service.display.page.readouts.plots import Curves, complete
-from abs_service.display.page.readouts.words import STALE_COLOR, Words
+from abs_service.display.page.readouts.words import Words
 from abs_service.display.page.scene.fields import FIELDS, PALETTES
+from abs_service.display.page.style import GONE, STYLE
 
 _LINES = ("#3b82f6", "#f59e0b", "#10b981", "#ef4444", "#a78bfa")
-
-#: A status that is not renewed for so long [s] is grey, and a line above it says why: the browser does this by itself.
-GONE_S = 5
-
-_GONE = f"""<style>
-@keyframes abs-gone {{ to {{ visibility: visible; max-height: 20em; padding: 8px 12px; margin: 6px 8px }} }}
-@keyframes abs-old {{ to {{ filter: grayscale(1) opacity(.5) }} }}
-.abs-gone {{ visibility: hidden; max-height: 0; animation: abs-gone 0s {GONE_S}s forwards; background: {STALE_COLOR};
-  color: white; border-radius: 6px; overflow: hidden }}
-.abs-status {{ animation: abs-old 0s {GONE_S}s forwards }}
-</style><div class='abs-gone'><b>This page has lost its connection</b><br>Does abs-service still run?
-It connects again by itself; what it shows is old.</div>"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,20 +38,24 @@ class Panel:
         self._server, gui = server, server.gui
         gui.main_panel.dock_right()
         gui.configure_theme(control_width="large", dark_mode=True, show_logo=False, show_share_button=False)
+        gui.add_html(STYLE, order=-1.0)
         self._status, self._renewed = gui.add_html("", order=0.0), 0
         self._neighbours = gui.add_html("", order=0.1, visible=False)
         self._tracker = gui.add_dropdown("Tracker", list[str](["–"]), visible=False)
         self._tabs = tabs = gui.add_tab_group()
         with tabs.add_tab("View"):
+            # First, so that they stay where they are whatever is told below them.
+            self._buttons = {label: gui.add_button(label, hint=button.hint) for label, button in buttons.items()}
+            self._reason = gui.add_markdown("", visible=False)
+            self._answer = gui.add_markdown("", visible=False)
             self._field = gui.add_dropdown("Colour of the mesh", tuple(FIELDS))
-            self._legend = gui.add_image(np.zeros((16, 512, 3), np.uint8))
+            self._legend = gui.add_image(np.zeros((16, 512, 3), np.uint8), visible=False)
             self._first = gui.add_checkbox("First pose", True)
             self._points = gui.add_checkbox("Measured points", True)
             self._cameras = gui.add_checkbox("Cameras", True)
-            for label, button in buttons.items():
-                gui.add_button(label, hint=button.hint).on_click(partial(_press, button))
-            self._answer = gui.add_markdown("", visible=False)
             self._table = gui.add_markdown("")
+        for label, button in buttons.items():
+            self._buttons[label].on_click(partial(_press, button))
         self._image_tab = tabs.add_tab("Images")
         with self._image_tab:
             self._residual = gui.add_checkbox("Residual", False, hint="Measured minus expected distance, in colours")
@@ -100,9 +93,9 @@ class Panel:
             self._tracker.options, self._tracker.visible = tuple(trackers), len(trackers) > 1
 
     def show_status(self, words: Iterable[Words]) -> None:
-        """Shows the status; the first line is the largest. To be called at least every `GONE_S` seconds."""
+        """Shows the status; the first line is the largest. To be called at least every `style.GONE_S` seconds."""
         self._renewed += 1
-        lines = [f"<!-- {self._renewed} -->", _GONE]
+        lines = [f"<!-- {self._renewed} -->", GONE]
         for number, one in enumerate(words):
             title = f"<b style='font-size:{1.0 if number else 1.25}em'>{escape(one.title)}</b>"
             text = f"<div style='margin-top:2px'>{escape(one.text)}</div>" if one.text else ""
@@ -117,13 +110,22 @@ class Panel:
 
     def show_legend(self, end: float) -> None:
         """Shows the colours of the mesh; `end` has the last one."""
-        field = FIELDS[self.field]
+        field, self._legend.visible = FIELDS[self.field], True
         label = f"−{end:g} … +{end:g} {field.unit}" if field.signed else f"0 … {end:g} {field.unit}"
         if self._legend.label != label:
             self._legend.label, self._legend.image = (
                 label,
                 np.tile(PALETTES[field.signed].repeat(2, axis=0), (16, 1, 1)),
             )
+
+    def grey(self, labels: Iterable[str], reason: str) -> None:
+        """Disables buttons, those of them that are there, and says why below all; enables them without a reason."""
+        shown = [self._buttons[label] for label in labels if label in self._buttons]
+        for button in shown:
+            if button.disabled != bool(reason):
+                button.disabled = bool(reason)
+        if shown and self._reason.content != reason:
+            self._reason.content, self._reason.visible = reason, bool(reason)
 
     def show_table(self, rows: Mapping[str, str]) -> None:
         """Shows numbers by name."""

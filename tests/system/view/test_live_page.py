@@ -10,6 +10,9 @@ import pytest
 from tests.system.running import START_S, RigListener, abs_service, wait_until
 from tests.system.view.browsing import PATIENCE_S, chosen_by_a_click, opened, picture_of, says
 
+#: Name of the rig of `run`.
+RIG = "demo"
+
 #: A rig with two trackers, called left and right.
 PAIR = Path(__file__).parents[3] / "examples" / "rigs" / "two_trackers.toml"
 
@@ -28,8 +31,9 @@ def test_the_page_shows_a_mesh_that_moves_acts_and_connects_again(run, rig_file,
     wait_until(lambda: picture_of(page) != before, PATIENCE_S, "motion of the mesh")
     meshes_are_made_anew(page, listener, rig_file)
 
-    page.get_by_role("button", name="Start recording").click()
-    says(page, "it records as long as it runs")
+    says(page, "Always recording")
+    assert page.get_by_role("button", name="Start recording").is_disabled()
+    assert page.get_by_text(RIG, exact=True).first.is_visible()
     page.get_by_role("tab", name="Images").click()
     page.get_by_text("Residual", exact=True).wait_for()
     page.locator("input[type=checkbox]:visible").first.click()

@@ -33,11 +33,22 @@ def test_on_a_phone_the_panel_leaves_half_of_the_scene_and_its_controls_are_in_r
     says(page, "Tracking")
     play = page.get_by_role("button", name="Play", exact=True)
     play.wait_for()
-    assert place_of(page.locator("canvas").first)["width"] == 390
+    scene, panel = place_of(page.locator("canvas").first), place_of(page.locator(".mantine-Paper-root").first)
+    assert scene["width"] == panel["width"] == 390
+    assert 844 / 2 <= scene["y"] + scene["height"] <= panel["y"]  # it hides nothing of the scene
     for box in (place_of(page.locator(".abs-status").first), place_of(play)):
         assert 0 <= box["x"] <= 390 - box["width"]
-        assert 844 / 3 <= box["y"] <= 844 - box["height"]
+        assert 844 / 2 <= box["y"] <= 844 - box["height"]
+    buttons_stay_where_they_are(page, play)
     page.get_by_role("button", name="Back").tap()
     says(page, "Object lost")
     page.get_by_role("tab", name="Images").tap()
     says(page, "tof/depth")
+
+
+def buttons_stay_where_they_are(page, button):
+    """The status scrolls, and does not push what is below it."""
+    before = place_of(button)
+    page.add_style_tag(content=".abs-status { min-height: 300px }")
+    assert page.locator(".abs-status").first.evaluate("one => one.offsetHeight") >= 300
+    assert place_of(button) == before

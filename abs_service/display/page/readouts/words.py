@@ -15,7 +15,7 @@ STATUS = {
     "LOST": ("Object lost", "#dc2626", "Bring the object back into view, or press Reinitialise."),
 }
 
-STALE_COLOR = "#6b7280"
+STALE_COLOR, STARTING = "#6b7280", STATUS["INITIALIZING"][1]
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +34,17 @@ def age(seconds: float) -> str:
     return f"{seconds:.0f} s" if seconds < 120 else f"{seconds / 60:.0f} min"
 
 
-def tracker(status: str, reasons: Sequence[str], warnings: Sequence[str], age_s: float, sigma_mm: float) -> Words:
+def preparing(kernels: str) -> Words:
+    """A tracker that compiles its kernels, with the progress of that, or loads them."""
+    if not kernels:
+        return Words("Loading kernels", "The first start on a computer compiles them, which takes minutes.", STARTING)
+    text = f"{kernels[:1].upper()}{kernels[1:]}. This takes minutes, once on each computer; tracking begins by itself."
+    return Words("Compiling kernels for this rig", text, STARTING)
+
+
+def tracker(
+    status: str, reasons: Sequence[str], warnings: Sequence[str], age_s: float, sigma_mm: float, slow: str = ""
+) -> Words:
     """A tracker's state.
 
     Args:
@@ -42,6 +52,7 @@ def tracker(status: str, reasons: Sequence[str], warnings: Sequence[str], age_s:
         reasons, warnings: of its last estimate.
         age_s: since that came [s].
         sigma_mm: median deviation of its vertices [mm]; NaN if unknown.
+        slow: warning of `slow`; the first reason, since a tracker that misses images gets into all other trouble.
     """
     if not status:
         return Words("No estimate yet", "The tracker is starting, or its sensors deliver nothing.", STALE_COLOR)
@@ -50,7 +61,8 @@ def tracker(status: str, reasons: Sequence[str], warnings: Sequence[str], age_s:
         text = f"The last estimate said: {title.lower()}. Check that the tracker runs and its sensors deliver."
         return Words(f"No estimate for {age(age_s)}", text, STALE_COLOR)
     precise = f", σ {sigma_mm:.2f} mm" if status in ("TRACKING", "DEGRADED") and math.isfinite(sigma_mm) else ""
-    text = ". ".join(one[:1].upper() + one[1:] for one in [*reasons, *warnings])
+    text = ". ".join(one[:1].upper() + one[1:] for one in [*([slow] if slow else []), *reasons, *warnings])
+    color = STATUS["DEGRADED"][1] if slow and status == "TRACKING" else color
     return Words(title + precise, f"{text}. {remedy}".strip(". ") if text or remedy else "", color)
 
 
@@ -66,7 +78,7 @@ def slow(rate_hz: float, camera_hz: float, skipped: int) -> str:
         return ""
     return (
         f"Only {rate_hz:.0f} estimates a second of {camera_hz:.0f} images, {skipped} skipped in the last minute: "
-        "the tracker gets too little processor time. Close other programs, or choose fewer vertices."
+        "the tracker is slow, or gets too little processor time. Close other programs, or choose fewer vertices"
     )
 
 

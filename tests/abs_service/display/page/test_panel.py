@@ -45,6 +45,21 @@ def test_buttons_are_those_that_are_given_and_act(server, pressed):
     assert acted == ["Start recording"]
 
 
+def test_buttons_without_use_are_grey_and_say_why(server, monkeypatch, added):
+    buttons, add = {}, server.gui.add_button
+    monkeypatch.setattr(
+        server.gui, "add_button", lambda label, **options: buttons.setdefault(label, add(label, **options))
+    )
+    panel = Panel(server, {name: Button("", print) for name in ("Reinitialise", "Start recording")})
+    for reason in ("Always recording", ""):
+        panel.grey(("Start recording", "Stop recording"), reason)
+        assert {name: button.disabled for name, button in buttons.items()} == {
+            "Reinitialise": False,
+            "Start recording": bool(reason),
+        }
+        assert next(one.visible for one in added if getattr(one, "content", None) == reason) == bool(reason)
+
+
 def test_a_page_that_only_shows_has_none(server, pressed):
     Panel(server, {})
     assert pressed == {}
@@ -93,8 +108,11 @@ def test_numbers_are_a_table_whose_cells_hold_any_text(server, added):
 
 
 def test_the_legend_has_the_colours_and_the_end_of_the_chosen_quantity(server, added):
-    Panel(server, {}).show_legend(5.0)
-    (legend,) = added[:1]
+    panel = Panel(server, {})
+    assert not any(one.visible for one in added if isinstance(one, viser.GuiImageHandle))
+    panel.show_legend(5.0)
+    legend = next(one for one in added if isinstance(one, viser.GuiImageHandle))
+    assert legend.visible
     assert legend.label == "0 … 5 mm"
     assert (legend.image[0, ::2] == PALETTES[False]).all()
 
@@ -106,7 +124,7 @@ def test_links_to_other_rigs_are_shown_if_there_are_some(server, monkeypatch):
     )
     panel = Panel(server, {})
     panel.show_neighbours("")
-    assert not added[1].visible
+    assert not added[-1].visible
     panel.show_neighbours("<a>right</a>")
-    assert added[1].visible
-    assert added[1].content == "<a>right</a>"
+    assert added[-1].visible
+    assert added[-1].content == "<a>right</a>"

@@ -1,10 +1,14 @@
 """The page starts and ends recordings, and says what the recorder answers."""
 
 import pytest
+from absmsg.v1.sensor_model_pb2 import Config
 
+from abs_service.bus import keys
+from abs_service.bus.contract import EVENTS
 from abs_service.bus.health import Health
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.display.page.acting import recording
+from abs_service.display.page.feed import Feed
 from abs_service.recording.triggers.trigger import ALWAYS, Asked
 from abs_service.wire import commands
 from tests.abs_service.bus.loopback import LoopbackBus
@@ -34,6 +38,27 @@ def test_a_recorder_with_a_trigger_begins_and_ends():
 @pytest.mark.parametrize("wanted", [True, False])
 def test_a_recorder_that_records_always_says_so(wanted):
     assert Bench(ALWAYS).ask(wanted) == ('The recorder refuses: record.when = "always": it records as long as it runs.')
+
+
+@pytest.mark.parametrize(
+    ("toml", "said"),
+    [
+        ('[record]\nwhen = "always"', 'record.when = "always"'),
+        ("", 'With `"asked"`'),
+        ('[record]\nwhen = "asked"', ""),
+        ("record = 3", ""),
+        ("[", ""),
+    ],
+)
+def test_recording_is_offered_where_the_recorder_takes_commands(toml, said):
+    bench = Bench(ALWAYS)
+    feed = Feed(bench.bus, lambda: 0)
+    assert "No recorder runs" in recording.unavailable(feed)
+    Health(bench.bus, "record", bench.headers).publish()
+    assert recording.unavailable(feed) == ""
+    bench.bus.publisher(keys.CONFIG, Config.DESCRIPTOR.full_name, EVENTS).put(Config(toml=toml).SerializeToString())
+    reason = recording.unavailable(feed)
+    assert (said in reason) if said else not reason
 
 
 def test_without_a_recorder_there_is_no_answer():

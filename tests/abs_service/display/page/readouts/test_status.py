@@ -69,6 +69,41 @@ def test_what_a_status_says_is_not_said_again_as_health(rig):
     assert len(rig.titles()) == 2
 
 
+def test_health_does_not_contradict_a_newer_estimate(rig):
+    rig.state("left", "TRACKING")
+    rig.health("track/left", "LOST: hardly any vertex agrees")
+    rig.health("run", "track/left running: no health for 2 s")
+    assert rig.titles() == ["Tracking"]
+    rig.health("run", "track/left running: no health for 2 s; capture running: no health for 3 s")
+    assert [(line.title, line.text) for line in status.lines(rig.feed, "left", "")[1:]] == [
+        ("run", "capture running: no health for 3 s")
+    ]
+    rig.now_ns = 2_000_000_000
+    rig.health("run", "track/left backoff: killed by signal 9", Health.LEVEL_ERROR)
+    assert rig.titles() == ["No estimate for 2.0 s", "run"]
+
+
+def test_doubts_of_an_estimate_are_told_once(rig):
+    doubts = ["it fills the image", "it is small"]
+    rig.send("left/state", DeformationState(tracker="left", status="STATUS_TRACKING", warnings=doubts))
+    rig.health("track/left", "; ".join(doubts))
+    assert len(rig.titles()) == 1
+
+
+def test_progress_of_the_compilation_is_told_for_each_tracker_that_compiles(rig):
+    labels = {"phase": "preparing", "kernels": "6 of 63, about 364 s"}
+    rig.health("track/left", "", Health.LEVEL_OK, labels=labels)
+    (line,) = status.lines(rig.feed, "–", "Start it.")
+    assert line.title == "Compiling kernels for this rig"
+    assert line.text.startswith("6 of 63, about 364 s. ")
+    rig.state("right", "TRACKING")
+    assert rig.titles("right") == ["right: Tracking", "left: Compiling kernels for this rig"]
+    rig.health("track/left", "", Health.LEVEL_OK, labels={"phase": "preparing"})
+    assert rig.titles("right")[1] == "left: Loading kernels"
+    rig.health("track/left", "", Health.LEVEL_OK, labels={"phase": "waiting"})
+    assert rig.titles("right") == ["Tracking"]
+
+
 def test_a_slow_tracker_is_told_while_it_has_estimates(rig):
     rig.send("tof/depth/image", DeformationState())  # no image, but its stream is there
     rig.feed.watch_images(True)
@@ -77,6 +112,8 @@ def test_a_slow_tracker_is_told_while_it_has_estimates(rig):
     rig.state("left", "TRACKING")
     assert rig.titles() == ["Tracking"]
     rig.state("left", "TRACKING", skipped=2)
-    assert rig.titles() == ["Tracking", "The tracker is slow"]
+    (line,) = status.lines(rig.feed, "left", "Start it.")
+    assert line.title == "Tracking"
+    assert line.text.startswith("Only 1 estimates a second of 30 images, 2 skipped")
     rig.now_ns = 2_000_000_000
     assert rig.titles() == ["No estimate for 2.0 s"]

@@ -25,6 +25,13 @@ def test_reasons_warnings_and_the_remedy_are_said():
     assert "Reinitialise" in words.tracker("LOST", ["hardly any vertex agrees"], [], 0.1, 2.0).text
 
 
+def test_a_tracker_that_misses_images_says_that_before_its_other_reasons():
+    said = words.tracker("LOST", ["only 46 % agree"], [], 0.1, 2.0, slow="only 7 estimates")
+    assert said.text.startswith("Only 7 estimates. Only 46 % agree. Bring")
+    good, slow = (words.tracker("TRACKING", [], [], 0.1, 2.0, slow=text) for text in ("", "only 7 estimates"))
+    assert (slow.text, slow.color != good.color) == ("Only 7 estimates", True)
+
+
 def test_an_old_estimate_is_grey_and_says_how_old_whatever_it_said():
     said = words.tracker("TRACKING", [], [], 19.0, 0.77)
     assert said.title == "No estimate for 19 s"

@@ -1,0 +1,32 @@
+"""Looks of the page for which viser has no setting: a status of fixed height, and room for the scene on a phone."""
+
+from abs_service.display.page.readouts.words import STALE_COLOR
+
+#: A status that is not renewed for so long [s] is grey, and a line above it says why: the browser does this by itself.
+GONE_S = 5
+
+#: Width of a screen up to which viser's panel lies at its bottom [em], and the most that it then takes [%].
+NARROW_EM, SHEET = 36, 50
+
+#: What holds the scene and, on a narrow screen, viser's panel, which is put below the scene and no more over it.
+_ROOM = "div:has(> .mantine-Paper-root .abs-status)"
+
+STYLE = f"""<style>
+@keyframes abs-gone {{ to {{ visibility: visible; max-height: 20em; padding: 8px 12px; margin: 6px 8px }} }}
+@keyframes abs-old {{ to {{ filter: grayscale(1) opacity(.5) }} }}
+.abs-gone {{ visibility: hidden; max-height: 0; animation: abs-gone 0s {GONE_S}s forwards; background: {STALE_COLOR};
+  color: white; border-radius: 6px; overflow: hidden }}
+.abs-status {{ animation: abs-old 0s {GONE_S}s forwards }}
+div:has(> .abs-status) {{ height: 8.5em; overflow-y: auto; overscroll-behavior: contain; scrollbar-width: thin }}
+@media (max-width: {NARROW_EM}em) {{
+  div:has(> .abs-status) {{ height: 7em }}
+  {_ROOM} {{ flex-direction: column }}
+  {_ROOM} > div:has(canvas):not(.mantine-Paper-root) {{ height: auto !important; min-height: 0 }}
+  {_ROOM} > .mantine-Paper-root {{ position: relative !important; flex: none; width: 100% !important;
+    max-height: {SHEET}% !important }}
+  {_ROOM} > .mantine-Paper-root [style*="width: 20em"] {{ width: 100% !important }}
+}}
+</style>"""
+
+GONE = """<div class='abs-gone'><b>This page has lost its connection</b><br>Does abs-service still run?
+It connects again by itself; what it shows is old.</div>"""
