@@ -1,4 +1,4 @@
-"""What docs/how-to/extending.md installs is declared, and what cannot be used is named."""
+"""Parts that docs/how-to/extending.md installs are declared, and those that cannot be used are named."""
 
 import os
 import re

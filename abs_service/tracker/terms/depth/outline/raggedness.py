@@ -52,7 +52,7 @@ class Raggedness:
         self.deviation, self.off_px = least, 0.0
 
     def update(self, away: NDArray[np.float64], directions: NDArray[np.float64], places: NDArray[np.float64]) -> None:
-        """Takes another frame in; one with too few edges changes nothing.
+        """Takes another frame in; one with too few edges, or with most of them elsewhere, changes nothing.
 
         Args:
             away: distances (k,) of the predicted edges from the outline [px], NaN where unknown.
@@ -60,7 +60,8 @@ class Raggedness:
             places: of the edges in the image (k, 2) [px].
         """
         known = np.flatnonzero(~np.isnan(away))
-        if self._most <= self._least or len(known) < LEAST_OF_A_SIDE:
+        near = np.count_nonzero(np.abs(away[known]) < LIMIT_PX)
+        if self._most <= self._least or near < max(LEAST_OF_A_SIDE, len(known) / 2):
             return
         left = without_motion(np.clip(away[known], -LIMIT_PX, LIMIT_PX), directions[known], places[known])
         scatter = median(np.abs(left)) / MEDIAN_DEVIATION
