@@ -109,7 +109,7 @@ def test_a_folder_that_is_taken_away_and_comes_back_costs_no_frame(rig, endpoint
         print(f"noticed after {time.monotonic() - at_s:.2f} s")
         assert time.monotonic() - at_s < 2.0
         assert health.message.endswith(".mcap was moved while it was written")
-        stream.wait_for(lambda health: "File exists" in health.message)
+        stream.wait_for(lambda health: f"{kept} is no folder" in health.message)
         kept.unlink()
         at_s = time.monotonic()
         stream.wait_for(lambda health: health.level == Health.LEVEL_OK)
