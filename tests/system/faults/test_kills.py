@@ -130,7 +130,8 @@ def test_a_folder_that_cannot_be_written_ends_neither_tracking_nor_recording_for
     def says(level, text):
         return lambda: any(last.level == level and text in last.message for last in listener.health("record")[-1:])
 
-    wait_until(says(Health.LEVEL_ERROR, "RECORD_FAILED [Errno 17] File exists"), 30, "the failure in health")
+    failed = f"RECORD_FAILED [Errno 20] {tmp_path / 'takes'} is no folder"
+    wait_until(says(Health.LEVEL_ERROR, failed), 30, "the failure in health")
     wait_until(listener.tracks_since(killed_ns, 30), 10, "estimates meanwhile")
     (tmp_path / "takes").unlink()
     wait_until(says(Health.LEVEL_OK, ""), 5, "recording again")
