@@ -75,7 +75,9 @@ def meshes_are_made_anew(page, listener, rig_file):
 
 def test_all_trackers_of_a_rig_are_shown(endpoint, launch, browser, port, tmp_path):
     rig_file = tmp_path / "pair.toml"
-    rig_file.write_text(f'{PAIR.read_text("utf-8")}\n[bus]\nendpoint = "{endpoint}"\n', encoding="utf-8")
+    # Two trackers and a browser that renders in software are too much for two slow cores at 30 Hz.
+    pair = PAIR.read_text("utf-8").replace("seed=1", "seed=1&rate=5")
+    rig_file.write_text(f'{pair}\n[bus]\nendpoint = "{endpoint}"\n', encoding="utf-8")
     launch("run", rig_file, "--no-record", "--json")
     launch("view", rig_file, "--port", port)
     page, _ = opened(browser, port)
