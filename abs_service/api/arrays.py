@@ -95,11 +95,9 @@ class FrameBuilder:
         """A reason for no estimate, if `depth_m` is given and none of its pixels holds a distance; else nothing."""
         head, _, kind = self._arguments["depth_m"].partition("/")
         depth = frames.frames.get((head, kind))
-        return (
-            ()
-            if depth is None or np.greater(depth.data, 0).any()
-            else ("depth_m has no return: all of it is 0 or NaN",)
-        )
+        if depth is None or np.greater(depth.data, 0).any():
+            return ()
+        return ("depth_m has no return: all of it is 0 or NaN",)
 
     def _uses(self) -> str:
         labels = {stream: name for name, stream in self._arguments.items()}

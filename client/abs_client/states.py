@@ -129,10 +129,8 @@ class StateSource:
 
     def _nothing(self) -> str:
         """Reason for no estimate so far, with the trackers that live, if this one does not: its name may be wrong."""
-        reason, living = (
-            f"nothing was received of tracker {self._tracker} of rig {self._link.rig} yet",
-            set(self._living),
-        )
+        reason = f"nothing was received of tracker {self._tracker} of rig {self._link.rig} yet"
+        living = set(self._living)  # answers come in another thread
         self._link.ask_living(_keys_into(self._living))  # for the next time
         if not living or self._link.key(f"live/track/{self._tracker}") in living:
             return reason

@@ -2,8 +2,8 @@
 
 No setting was chosen on these images but two. The 4 mm of noise and the extended outline were added on 2026-11-27, when
 a tracker had learnt to take noise and outlines from its images, and had been looked at with this sheet, 2 to 8 mm of
-noise and outlines that wander by 2 to 6 px. Each change is tracked with colour and
-by depth alone, before nothing, by `nurbs` with all defaults, and compared with the measured points.
+noise and outlines that wander by 2 to 6 px. Each change is tracked with colour and by depth alone, before nothing, by
+`nurbs` with all defaults, and compared with the measured points.
 
 Statistic and goals, those of the unchanged sheet (`recordings`): over all of them, median frame at most 3 mm, worst
 15 mm, 85 to 99 % of the points in their 95 % region, no frame TRACKING and wrong.

@@ -47,9 +47,8 @@ class Misfit:
             distance: signed distances of the vertices from their measurements (n,) [m].
             deviation: of independent noise of these (n,) [m].
         """
-        variance = deviation**2
-        excess = self._common.excess(distance, variance)
-        across = self._common.mean @ excess + self._common.unnoticed(distance, variance)
+        excess, unnoticed = self._common.excess_and_unnoticed(distance, deviation**2)
+        across = self._common.mean @ excess + unnoticed
         missing = np.count_nonzero(excess) / len(excess)
         of_most = float(across.mean()) if missing > MOST else 0.0
         kept = self._along if missing > HARDLY_ANY else 0.0
@@ -79,21 +78,38 @@ class CommonDistance:
             distance: of the vertices (n,) [m].
             variance: of independent noise of these (n,) [m²].
         """
-        return np.maximum((self.mean @ distance) ** 2 - INLIER_DEVIATIONS**2 * (self._squared @ variance), 0.0)
+        squares, noise = self._squares(distance, variance)
+        return _beyond(squares, noise)
 
-    def unnoticed(self, distance: NDArray[np.float64], variance: NDArray[np.float64]) -> float:
-        """Mean square [m²] of the mean distances up to `excess`, less noise; 0 unless beyond its own deviations.
+    def excess_and_unnoticed(
+        self, distance: NDArray[np.float64], variance: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], float]:
+        """`excess`, and the mean square [m²] of the mean distances up to it, less noise.
+
+        The latter is 0 unless beyond its own deviations.
 
         Args:
             distance, variance: as for `excess`.
         """
-        noise = self._squared @ variance
-        within = np.minimum((self.mean @ distance) ** 2, INLIER_DEVIATIONS**2 * noise)
+        squares, noise = self._squares(distance, variance)
+        within = np.minimum(squares, INLIER_DEVIATIONS**2 * noise)
         expected = float(noise.mean())
         # Rings overlap: so many are independent as there are rings without a vertex in common.
         independent = len(distance) / self._vertices_of_ring
         common = float(within.mean()) - expected
-        return common if common > INLIER_DEVIATIONS * expected * np.sqrt(2 / independent) else 0.0
+        is_certain = common > INLIER_DEVIATIONS * expected * np.sqrt(2 / independent)
+        return _beyond(squares, noise), common if is_certain else 0.0
+
+    def _squares(
+        self, distance: NDArray[np.float64], variance: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Squares of the mean distances, and their means by noise alone, each (n,) [m²]."""
+        return (self.mean @ distance) ** 2, self._squared @ variance
+
+
+def _beyond(squares: NDArray[np.float64], noise: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Squares beyond `INLIER_DEVIATIONS` of noise, 0 below."""
+    return np.maximum(squares - INLIER_DEVIATIONS**2 * noise, 0.0)
 
 
 def mean_around(mesh: Mesh) -> "scipy.sparse.csr_array":

@@ -27,7 +27,7 @@ USUAL_PX = 1.5
 
 #: Share of the raggedness beyond the usual one that is added to the deviation. The edges of a side wander to either
 #: side, and less of it is left in their mean; with half of it, a print in colour let a sheet slide to the wrong place
-#: in single frames of fast motion (docs/explanation/posterior.md).
+#: in single frames of fast motion (docs/explanation/visibility.md).
 SHARE = 1 / 3
 
 #: An edge is off the outline if it is farther from it than so many times what is usual for this outline.

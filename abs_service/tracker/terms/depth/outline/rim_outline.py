@@ -94,8 +94,8 @@ class RimOutline:
             self._is_round = is_round(self._camera, edges, self._inwards, self._corner)
             self._begun = True
         self._hidden = len(free) - len(visible)
-        places = project_with_jacobian(self._camera, self._locate(predicted)[0].astype(np.float64))[0]
-        self._raggedness.update(self._inside(places), self._directions(predicted, places), places)
+        _, places, away = self._edges(predicted)
+        self._raggedness.update(away, self._directions(predicted, places), places)
         beside = np.zeros(distance.shape, np.bool_)
         beside[part] = (seen.free_m[part] > 0) & (self._inwards > -UNJUDGED_DEVIATIONS * self._deviation)
         return beside
@@ -124,9 +124,7 @@ class RimOutline:
 
     def fit(self, surface: Surface) -> RimFit:
         """Agreement of the edges of a population of one with the outline."""
-        points = self._locate(surface)[0].astype(np.float64)
-        places = project_with_jacobian(self._camera, points)[0]
-        away = self._inside(places)
+        points, places, away = self._edges(surface)
         known = ~np.isnan(away)
         pixel_m = np.linalg.norm(points - self._camera.center, axis=1) / self._camera.fx
         covered = np.flatnonzero(self.classes == RimClass.OCCLUDED)
@@ -140,6 +138,12 @@ class RimOutline:
             covered=len(covered),
             uncovered=int(np.count_nonzero(beyond > 0)),
         )
+
+    def _edges(self, surface: Surface) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Free edges in sight (k, 3) [m], places in the image (k, 2) and distances inside the outline (k,) [px]."""
+        points = self._locate(surface)[0].astype(np.float64)
+        places = project_with_jacobian(self._camera, points)[0]
+        return points, places, self._inside(places)
 
     def _displacement(
         self, surface: Surface, places: NDArray[np.float64], away: NDArray[np.float64], pixel_m: NDArray[np.float64]
