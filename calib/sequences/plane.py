@@ -48,6 +48,8 @@ def find(
     triples = generator.integers(0, len(r), (_TRIALS, 3))
     matrices = along[triples]
     sound = np.abs(np.linalg.det(matrices)) > 1e-9
+    if not sound.any():
+        raise NoiseError("the static pixels lie on a line")
     planes = np.linalg.solve(matrices[sound], (1 / r[triples[sound]])[..., None])[..., 0]
     with np.errstate(divide="ignore", invalid="ignore"):
         off = np.abs(1 / (planes @ along[judges].T) - r[judges])

@@ -12,18 +12,11 @@ from abs_service.tracker.detection.depth_view import DepthView, limited
 from abs_service.tracker.detection.initial_detection import DetectionError
 from abs_service.tracker.detection.plausibility import lining
 from abs_service.tracker.detection.segments.depth_segments import deepest_pixel, large_surfaces, surface_at
+from abs_service.tracker.detection.segments.dominant_plane import CLEARANCE_M, heights
 from abs_service.tracker.detection.segments.within import Polygon, Restricted, restricted
-from calib.noise.base import NoiseError
-from calib.sequences import plane
-
-#: Minimum share of the returns on a plane for it to be what the object lies on.
-MIN_SHARE = 0.2
 
 #: A surface with less than this share of a wall's pixels says nothing against it.
 SPECK = 0.02
-
-#: Number of pixels of the subsampled image in which the plane is found; more are slower but not more accurate.
-MAX_PIXELS = 20_000
 
 
 @dataclass(frozen=True)
@@ -42,7 +35,7 @@ class Settings:
             except for finding the plane.
     """
 
-    clearance_m: Annotated[float, Gt(0)] = 0.01
+    clearance_m: Annotated[float, Gt(0)] = CLEARANCE_M
     seed: tuple[Annotated[int, Ge(0)], Annotated[int, Ge(0)]] | None = None
     largest_step_m: Annotated[float, Gt(0)] = 0.04
     minimum_pixels: Annotated[int, Ge(16)] = 200
@@ -82,16 +75,9 @@ class Settings:
 
     def _above(self, view: DepthView) -> DepthView:
         """The view without the plane and everything beyond it; DetectionError if there is no plane."""
-        q = _dominant_plane(view, self.clearance_m)
-        height = _height(view, q)
+        height = heights(view, self.clearance_m)
         with np.errstate(invalid="ignore"):
-            share = np.count_nonzero(np.abs(height) <= self.clearance_m) / np.count_nonzero(view.measured)
             above = height > self.clearance_m
-        if share < MIN_SHARE:
-            raise DetectionError(
-                f"no plane: the largest has {share:.0%} of the returns within clearance_m = {self.clearance_m:g} m, "
-                f"{MIN_SHARE:.0%} needed"
-            )
         return limited(view, above)
 
     def _selected(self, view: DepthView) -> NDArray[np.bool_]:
@@ -113,26 +99,3 @@ class Settings:
 
     def _nothing(self, error: DetectionError) -> DetectionError:
         return DetectionError(f"more than clearance_m = {self.clearance_m:g} m above the plane: {error}")
-
-
-def _dominant_plane(view: DepthView, tolerance: float) -> NDArray[np.float64]:
-    """The plane q (3,) [1/m] with the most pixels within a tolerance [m]: q · X = 1 in the sensor's frame.
-
-    The generator is seeded, so that the same image has the same plane.
-
-    Raises:
-        DetectionError: there is no plane.
-    """
-    step = int(np.ceil(np.sqrt(view.distance.size / MAX_PIXELS)))
-    distance, rays = view.distance[::step, ::step], view.camera.rays()[::step, ::step]
-    tolerances = np.full(distance.shape, tolerance)
-    try:
-        return plane.find(distance, rays, np.isfinite(distance), tolerances, np.random.default_rng(0))[0]
-    except NoiseError:
-        raise DetectionError(f"no plane: too few returns within clearance_m = {tolerance:g} m of one") from None
-
-
-def _height(view: DepthView, q: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Height (height, width) [m] of every pixel above a plane, positive on the camera's side; NaN without return."""
-    points_s = view.camera.rays() * view.distance[..., None]
-    return (1 - points_s @ q) / np.linalg.norm(q)

@@ -53,7 +53,7 @@ class Settings:
 
         def select(view: DepthView) -> NDArray[np.bool_]:
             seeded = seed(view, surfaces)
-            return seeded.surface if self.grow == "depth" else grown_by_color(seeded, view.colors.rgb)
+            return seeded.surface if self.grow == "depth" else grown_by_color(seeded, view)
 
         return restricted(select, self.within, self.polygon)
 

@@ -1,10 +1,14 @@
 """The part of a surface with an object's colours, for objects that touch others and do not differ in depth."""
 
+from dataclasses import dataclass
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from abs_service.tracker.detection.depth_view import DepthView
 from abs_service.tracker.detection.initial_detection import DetectionError
+from abs_service.tracker.detection.segments.dominant_plane import CLEARANCE_M, heights
 from abs_service.tracker.detection.segments.seeds import Seeded, alike, joined
 
 #: Number of colours that the core of an object is described by: of its print, in light and shade.
@@ -17,28 +21,78 @@ SEAM = 1 / 40
 ROUNDS, COMPONENTS = 5, 5
 
 
-def grown_by_color(seeded: Seeded, rgb: NDArray[np.float32]) -> NDArray[np.bool_]:
+@dataclass(frozen=True, slots=True, eq=False)
+class _Picture:
+    """Colours of a depth image's pixels in 0…255.
+
+    Attributes:
+        rgb: (height, width, 3), NaN where unknown.
+        filled: the same, rounded, with those of the nearest known pixel where unknown.
+    """
+
+    rgb: NDArray[np.float32]
+    filled: NDArray[np.uint8]
+
+
+def grown_by_color(seeded: Seeded, view: DepthView) -> NDArray[np.bool_]:
     """Pixels (height, width) of the object: those connected to the core that look like it, up to edges of colour.
 
     First all that is alike in colour, then GrabCut in a seam around its outline (C. Rother, V. Kolmogorov, A. Blake,
     SIGGRAPH 2004, as in OpenCV). From a small core alone GrabCut does not grow: outlines cost more than pixels.
+    What stands on a table, or before a wall, grows once more, with all the colours that were found, but above the
+    plane only: colours of many things are found somewhere on a table.
 
     Args:
         seeded: core and surface.
-        rgb: colours (height, width, 3) in 0…255, NaN where unknown.
+        view: the depth image, with its colours.
 
     Raises:
         DetectionError: no colour of the core is known.
     """
+    rgb = view.colors.rgb
     known = np.isfinite(rgb[..., 0])
     core, surface = seeded.core & known, seeded.surface & known
     if not core.any():
         raise DetectionError('no colour camera (noise type "color") sees the seed: grow = "depth" needs none')
-    inner = ~_dilated(~core, 1)  # pixels at its rim may be mixed with what is beside it
-    colors = _main_colors(rgb[inner if inner.any() else core])
-    first = _part_with(joined(surface & alike(rgb, colors)) | core, core) & surface
-    last = _cut(first, core, surface, _filled(rgb, known))
-    return _part_with(last, core) & seeded.surface
+    picture = _Picture(rgb, _filled(rgb, known))
+    object_ = _grown(core, core, surface, surface, picture)
+    above = _above_plane(view)
+    if np.count_nonzero(object_ & above) > np.count_nonzero(object_) / 2 and (core & above).any():
+        standing = _part_with(surface & above, core & above) & surface & above
+        object_ = _grown(core & standing, (object_ | core) & standing, standing, surface, picture)
+    return object_ & seeded.surface
+
+
+def _above_plane(view: DepthView) -> NDArray[np.bool_]:
+    """Pixels (height, width) above the dominant plane; none if there is no plane."""
+    try:
+        height = heights(view, CLEARANCE_M)
+    except DetectionError:
+        return np.zeros(view.distance.shape, np.bool_)
+    with np.errstate(invalid="ignore"):
+        return np.asarray(height > CLEARANCE_M)
+
+
+def _grown(
+    core: NDArray[np.bool_],
+    like: NDArray[np.bool_],
+    first: NDArray[np.bool_],
+    surface: NDArray[np.bool_],
+    picture: _Picture,
+) -> NDArray[np.bool_]:
+    """The part (height, width) of a surface that is connected to the core and looks like some pixels.
+
+    Args:
+        core: pixels that are the object's.
+        like: pixels whose colours the object has.
+        first: pixels that are taken if they are alike.
+        surface: pixels in which the outline is looked for.
+        picture: the colours.
+    """
+    inner = ~_dilated(~like, 1)  # pixels at its rim may be mixed with what is beside it
+    colors = _main_colors(picture.rgb[inner if inner.any() else like])
+    guess = _part_with(joined(first & alike(picture.rgb, colors)) | core, core) & first
+    return _part_with(_cut(guess, core, surface, picture.filled), core)
 
 
 def _main_colors(rgb: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -1,8 +1,9 @@
-"""The region seed: by pixel, by colour and by motion; where depth cannot separate an object, its colours can."""
+"""The region seed: by pixel and by colour; where depth cannot separate an object, its colours can."""
 
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
@@ -11,7 +12,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from abs_service.tracker.detection.depth_view import DepthView
-from abs_service.tracker.detection.initial_detection import DetectionError, UndecidedError
+from abs_service.tracker.detection.initial_detection import DetectionError
 from abs_service.tracker.detection.regions import mask, seed
 from abs_service.tracker.detection.segments.color_growth import grown_by_color
 from abs_service.tracker.detection.segments.seeds import Seeded
@@ -85,12 +86,44 @@ def test_a_print_is_part_of_what_it_is_on():
     assert overlap(selected, covers(RED, DEPTH)) > 0.9
 
 
+def standing(thing: np.ndarray, height: np.ndarray, colors: np.ndarray) -> DepthView:
+    """A view of the table with a thing on it, a colour camera in the depth camera's place.
+
+    Args:
+        thing: its pixels (height, width).
+        height: of the surface above the table (height, width) [m].
+        colors: of the thing (height, width, 3).
+    """
+    generator = np.random.default_rng(5)
+    distance = (TABLE_M - height) * DEPTH.lookup.ray_length + generator.normal(0, NOISE_M, height.shape)
+    picture = np.where(thing[..., None], colors, WOOD) + generator.normal(0, COLOR_NOISE, (*height.shape, 3))
+    return DepthView.of(distance.astype(np.float32), DEPTH, [(DEPTH, np.clip(picture, 0, 255).astype(np.uint8))])
+
+
+def test_a_thing_on_a_table_is_found_in_light_and_shade():
+    thing = np.zeros((120, 160), bool)
+    thing[30:90, 20:120] = True
+    light = np.linspace(0.4, 1, 100)[None, :, None] * np.ones((120, 1, 3))
+    colors = np.zeros((120, 160, 3))
+    colors[:, 20:120] = light * (200, 120, 60)
+    view = standing(thing, np.where(thing, 0.03, 0.0), colors)
+    for column in (30, 70, 110):
+        assert overlap(seed.Settings((column, 60), grow="color").build().select(view), thing) > 0.8
+
+
+def test_a_sheet_is_whole_that_is_the_dominant_plane_and_bends_out_of_it():
+    sheet = np.ones((120, 160), bool)
+    height = 0.1 * np.clip((np.arange(160) - 100) / 60, 0, None)[None] ** 2 * np.ones((120, 1))
+    view = standing(sheet, height, np.full((120, 160, 3), (170.0, 60.0, 60.0)))
+    assert overlap(seed.Settings((150, 60), grow="color").build().select(view), sheet) > 0.9
+
+
 @given(
     hidden=st.floats(0, 0.9), unseen=st.floats(0, 0.9), rows=st.integers(1, 120), columns=st.integers(1, 160),
-    levels=st.integers(1, 255), generator=st.integers(0, 2**32 - 1),
+    levels=st.integers(1, 255), generator=st.integers(0, 2**32 - 1), bend=st.floats(0, 0.1),
 )  # fmt: skip
 def test_whatever_the_colours_the_object_is_on_the_surface_and_has_the_seed(
-    hidden, unseen, rows, columns, levels, generator
+    hidden, unseen, rows, columns, levels, generator, bend
 ):
     drawn = np.random.default_rng(generator)
     surface = drawn.uniform(size=(120, 160)) >= hidden
@@ -100,7 +133,10 @@ def test_whatever_the_colours_the_object_is_on_the_surface_and_has_the_seed(
     rgb = drawn.integers(0, levels, (120, 160, 3)).astype(np.float32)
     rgb[drawn.uniform(size=surface.shape) < unseen] = np.nan
     assume((core & np.isfinite(rgb[..., 0])).any())
-    selected = grown_by_color(Seeded(core, surface), rgb)
+    lengths = DEPTH.lookup.ray_length - bend * drawn.uniform(size=surface.shape)
+    colors = SimpleNamespace(rgb=rgb)
+    view = replace(DepthView.of(np.where(surface, lengths, np.nan).astype(np.float32), DEPTH), colors=colors)
+    selected = grown_by_color(Seeded(core, surface), view)
     assert (selected & core).any()
     assert not (selected & ~surface).any()
 
@@ -163,45 +199,6 @@ def test_a_colour_that_is_not_in_sight_is_named():
 def test_one_seed_is_wanted(keys, found):
     with pytest.raises(DetectionError, match=f"one of pixel, color and motion_s .* not {found}"):
         seed.Settings(**keys)
-
-
-def moving(k: int, column: int, row: int = 40) -> DepthView:
-    """Image k of 30 in a second: a thing at 1 m in a column, another that rests, and a wall at 2 m; with noise."""
-    distance = 2.0 + np.random.default_rng(k).normal(0, 0.003, (120, 160))
-    distance[70:110, 100:140] -= 0.8
-    distance[row : row + 30, column : column + 30] -= 1.0
-    distance[np.random.default_rng(k + 1).uniform(size=distance.shape) < 0.02] = np.nan
-    return DepthView.of(distance.astype(np.float32), DEPTH, t_ns=round(k * 1e9 / 30))
-
-
-def test_what_moves_is_found_and_what_rests_is_not():
-    region = seed.Settings(motion_s=1.0).build()
-    for k in range(30):
-        with pytest.raises(UndecidedError, match=r"in the images of 1 s, of which \d\.\d\d s are there"):
-            region.select(moving(k, 20))
-    for k in range(30, 40):
-        with pytest.raises(DetectionError, match=r"nothing moved by 0\.02 m .* in 1 s"):
-            region.select(moving(k, 20))
-    for k in range(40, 55):
-        column = 20 + (k - 40)
-        try:
-            selected = region.select(moving(k, column))
-        except DetectionError:
-            continue
-        truth = np.zeros((120, 160), bool)
-        truth[40:70, column : column + 30] = True
-        assert overlap(selected, truth) > 0.7
-        return
-    pytest.fail("nothing moved")
-
-
-def test_motion_is_compared_anew_after_a_break():
-    region = seed.Settings(motion_s=1.0).build()
-    for k in range(31):
-        with pytest.raises(DetectionError):
-            region.select(moving(k, 20))
-    with pytest.raises(UndecidedError, match=r"0\.00 s"):
-        region.select(moving(300, 60))
 
 
 @pytest.mark.parametrize("number", [200, 229, 258, 287, 316])

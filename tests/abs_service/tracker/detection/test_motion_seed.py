@@ -1,0 +1,50 @@
+"""The region seed by motion: what moves in front of the scene."""
+
+import numpy as np
+import pytest
+
+from abs_service.tracker.detection.depth_view import DepthView
+from abs_service.tracker.detection.initial_detection import DetectionError, UndecidedError
+from abs_service.tracker.detection.regions import seed
+from calib.camera import Camera
+
+DEPTH = Camera(160, 120, 140.0, 140.0, 79.5, 59.5)
+
+
+def moving(k: int, column: int, row: int = 40) -> DepthView:
+    """Image k of 30 in a second: a thing at 1 m in a column, another that rests, and a wall at 2 m; with noise."""
+    distance = 2.0 + np.random.default_rng(k).normal(0, 0.003, (120, 160))
+    distance[70:110, 100:140] -= 0.8
+    distance[row : row + 30, column : column + 30] -= 1.0
+    distance[np.random.default_rng(k + 1).uniform(size=distance.shape) < 0.02] = np.nan
+    return DepthView.of(distance.astype(np.float32), DEPTH, t_ns=round(k * 1e9 / 30))
+
+
+def test_what_moves_is_found_and_what_rests_is_not():
+    region = seed.Settings(motion_s=1.0).build()
+    for k in range(30):
+        with pytest.raises(UndecidedError, match=r"in the images of 1 s, of which \d\.\d\d s are there"):
+            region.select(moving(k, 20))
+    for k in range(30, 40):
+        with pytest.raises(DetectionError, match=r"nothing moved by 0\.02 m .* in 1 s"):
+            region.select(moving(k, 20))
+    for k in range(40, 55):
+        column = 20 + (k - 40)
+        try:
+            selected = region.select(moving(k, column))
+        except DetectionError:
+            continue
+        truth = np.zeros((120, 160), bool)
+        truth[40:70, column : column + 30] = True
+        assert np.count_nonzero(selected & truth) > 0.7 * np.count_nonzero(selected | truth)
+        return
+    pytest.fail("nothing moved")
+
+
+def test_motion_is_compared_anew_after_a_break():
+    region = seed.Settings(motion_s=1.0).build()
+    for k in range(31):
+        with pytest.raises(DetectionError):
+            region.select(moving(k, 20))
+    with pytest.raises(UndecidedError, match=r"0\.00 s"):
+        region.select(moving(300, 60))
