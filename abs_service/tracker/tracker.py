@@ -108,6 +108,7 @@ class Tracker:
         vertex_covariance = self._vertex_covariance.update(optimum, frame, covariance)
         shape = self._shape.compare(optimum.vertices, vertex_covariance, single_frame_deviation(optimum, frame.motion))
         fits = outcome.compared(frame).fits
+        frame.learn(optimum.surface)
         verdict, reasons = status.judge(fits, observation.missing, shape, motion.innovation, self._limits)
         if verdict == Status.TRACKING:
             self._last_tracked = optimum.theta

@@ -52,6 +52,10 @@ class ObservedObjective(Protocol):
         """Signed distance of each vertex from its measurements, and its deviation by noise (2, n) [m]."""
         ...
 
+    def learn(self, surface: Surface) -> None:
+        """Takes the estimate in, a population of one: later observations may be compared otherwise."""
+        ...
+
 
 class TermSum:
     """The sum of all sensors' terms (eq. 16); a sensor without a frame contributes nothing."""
@@ -104,6 +108,11 @@ class ObservedTerms:
         """Signed distance of each vertex from its measurements, the largest, and its deviation by noise (2, n) [m]."""
         none = np.zeros((2, surface.vertices.shape[2]))
         return reduce(_larger, (term.misfit(surface) for term in self._terms), none)
+
+    def learn(self, surface: Surface) -> None:
+        """Passes the estimate to every term."""
+        for term in self._terms:
+            term.learn(surface)
 
     @property
     def _terms(self) -> Sequence[Term]:

@@ -128,6 +128,9 @@ class ObservedSquares:
         """See `ObservedObjective`."""
         return self.terms.misfit(surface)
 
+    def learn(self, surface: Surface) -> None:
+        """Learns nothing: weights are no noise model that measurements could contradict."""
+
 
 def _deviation(weight: float) -> float:
     return float(1 / np.sqrt(2 * weight))

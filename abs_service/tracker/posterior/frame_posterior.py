@@ -94,6 +94,10 @@ class FramePosterior:
         """Signed distance of each vertex from its measurements, and its deviation by noise (2, n) [m]."""
         return self.objective.misfit(surface)
 
+    def learn(self, surface: Surface) -> None:
+        """Takes the estimate in: what it shows of the sensors counts from the next frame on."""
+        self.objective.learn(surface)
+
     def _priors(self, surface: Surface, sparse_jacobian: SparseJacobian, theta: NDArray[np.float64]) -> Quadratic:
         rows, precision = self.stretch.linearize(surface, sparse_jacobian), self.motion.precision
         motion = Quadratic(precision @ (theta - self.motion.theta), precision)

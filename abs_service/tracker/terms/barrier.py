@@ -60,6 +60,9 @@ class BarrierTerm:
         """Zero: a beam has no vertex."""
         return np.zeros((2, 1))
 
+    def learn(self, surface: Surface) -> None:
+        """Learns nothing."""
+
     def _crossing(self, surface: Surface) -> NDArray[np.bool_]:
         crossing = np.zeros(len(surface.vertices), np.bool_)
         _crossing(surface.vertices, self._faces, self._beam[0], self._beam[1], crossing)

@@ -221,3 +221,7 @@ class Term(Protocol):
     def misfit(self, surface: Surface) -> NDArray[np.float64]:
         """Signed distance of each vertex from its measurement, its deviation by noise (2, n) [m]; or zeros (2, 1)."""
         ...
+
+    def learn(self, surface: Surface) -> None:
+        """Takes the estimate of the frame in, a population of one: later frames may be compared otherwise."""
+        ...

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from numba.core.event import install_recorder
+from scipy.ndimage import gaussian_filter
 
 import abs_service as a
 from tests.abs_service.api.scenes import CAMERA, NOISE, Sheet
@@ -58,6 +59,17 @@ def test_a_sensor_that_is_noisier_than_its_noise_model_is_tracked_with_its_own_n
     assert warning.startswith(
         "distances scatter by 0.9 mm about flat things as far away as the object, and not by 0.2 mm"
     )
+
+
+def test_noise_that_neighbours_share_is_learnt_from_frame_to_frame():
+    tracker, generator = a.Tracker(CAMERA, a.Nurbs(4, 4), noise=NOISE), np.random.default_rng(4)
+    found = []
+    for k in range(40):
+        shared = gaussian_filter(generator.standard_normal((120, 160)), 8)
+        depth = Sheet(2.0).depth(seed=k) + 3e-3 * shared / shared.std()
+        found.append(tracker.track(depth.astype(np.float32), time_s=k / 30))
+    assert {estimate.status for estimate in found[10:]} == {a.Status.TRACKING}
+    assert 0.8 < np.median([estimate.residuals["depth"] for estimate in found[10:]]) < 1.5
 
 
 def test_nan_zero_and_infinity_mean_no_return():

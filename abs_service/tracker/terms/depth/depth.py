@@ -19,6 +19,7 @@ from abs_service.tracker.terms.depth.depth_cost import (
     missing_cost,
     normalize,
 )
+from abs_service.tracker.terms.depth.fluctuation import Fluctuation
 from abs_service.tracker.terms.depth.outline.base import NoOutline, Outline
 from abs_service.tracker.terms.depth.outline.continuation import Continuation, NoContinuation
 from abs_service.tracker.terms.depth.texels import Unusable, texels
@@ -62,6 +63,7 @@ class DepthTerm:
         self._continuation = continuation(self._view.camera)
         self._classifier = Classifier(self._view.camera.fx)
         self._missing = np.zeros((1, vertices), np.float32)
+        self._fluctuation = Fluctuation()
         self._texels = texels(sensor, synthesizer, noise, bounds)
         self._images = Placed(np.bool_), Placed(np.bool_), Placed(np.float32), Placed(np.bool_), Placed(np.bool_)
         self._lost = self._covered = self._outside = np.zeros(0, np.bool_)
@@ -77,7 +79,7 @@ class DepthTerm:
         # What the background is, and where the field of view ends, is learnt from a whole image.
         window = self._synthesizer.window(self.sensor, predicted, reach_m if self._begun else np.inf)
         self._begun = True
-        distance = self._texels.observe(image, window)
+        distance = self._texels.observe(image, window, self._fluctuation.scale)
         expected = np.ascontiguousarray(self._view.render(predicted)[window])
         self._view.look(predicted)
         seen = self._classifier.classify(distance, expected, window, self._texels.shape)
@@ -202,6 +204,11 @@ class DepthTerm:
         usable = (seen.pixel[0] > 0) & ~(self._lost[pixel] | self._covered[pixel] | self._doubtful[pixel])
         measured = cost < np.inf
         return np.stack([np.where(measured, signed, free), np.where(measured, deviation, 0.0)]) * usable
+
+    def learn(self, surface: Surface) -> None:
+        """Learns how much the distances fluctuate."""
+        distance, deviation = self.misfit(surface)
+        self._fluctuation.update(distance, deviation / self._fluctuation.scale)
 
     def _residuals(self, seen: Synthesis) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Normalised residual, inverse deviation, and unbounded cost, infinite without a measurement, each (n,)."""

@@ -17,6 +17,7 @@ from abs_service.tracker.terms.depth.depth_cost import distances, median_inlier_
 from abs_service.tracker.terms.median import median
 from calib.jit import kernel
 from calib.noise.base import DepthNoise
+from calib.noise.scaled import Scaled
 from calib.noise.texture import corrected_distances, write_pixels, write_texture
 
 #: The cost of an inlier is the median of about so many pixels on the object.
@@ -41,12 +42,13 @@ class Unusable:
 class Texels(Protocol):
     """The texture of one sensor's frame in its view."""
 
-    def observe(self, image: DepthImage, window: Window) -> NDArray[np.float32]:
+    def observe(self, image: DepthImage, window: Window, scale: float) -> NDArray[np.float32]:
         """Begins a frame; distances (rows, columns) in the window of the view [m], without mean offset, NaN if unknown.
 
         Args:
             image: the depth image.
             window: of the view.
+            scale: on the deviations of the noise model.
         """
         ...
 
@@ -91,10 +93,10 @@ class WholeTexels:
         self._window: Window = image.window
         self._distance = np.zeros((0, 0), np.float32)
 
-    def observe(self, image: DepthImage, window: Window) -> NDArray[np.float32]:
+    def observe(self, image: DepthImage, window: Window, scale: float) -> NDArray[np.float32]:
         """Renders the noise model over the window."""
         texture = self._image.begin(image.shape, window)
-        write_texture(self._noise, *image.within(window), corner(window), texture)
+        write_texture(Scaled(self._noise, scale), *image.within(window), corner(window), texture)
         self._texture, self._window = self._synthesizer.texture(self._sensor, texture), window
         part = within(self._texture, window)
         self._distance = np.empty(part.shape[:2], np.float32)
@@ -126,7 +128,7 @@ class TexelsOnDemand:
     """
 
     def __init__(self, noise: DepthNoise, image: Bordered):
-        self._noise, self._image = noise, image
+        self._noise, self._scaled, self._image = noise, Scaled(noise, 1), image
         self._texture = np.zeros((2, 2, 8), np.float32)
         self._window: Window = image.window
         self._distance = self._amplitude = self._corrected = self._free_m = np.zeros((0, 0), np.float32)
@@ -134,9 +136,10 @@ class TexelsOnDemand:
         self._missing = image.border
         self._agreeing = 0.0
 
-    def observe(self, image: DepthImage, window: Window) -> NDArray[np.float32]:
+    def observe(self, image: DepthImage, window: Window, scale: float) -> NDArray[np.float32]:
         """Corrects the distances in the window, and renders nothing yet."""
         self._texture, self._window = self._image.move(image.shape, window), window
+        self._scaled = Scaled(self._noise, scale)
         self._distance, self._amplitude = image.within(window)
         self._corrected = corrected_distances(self._noise, self._distance, self._amplitude, corner(window))
         shape = self._corrected.shape
@@ -166,7 +169,7 @@ class TexelsOnDemand:
         if count:
             row, column = wanted[:, :count]
             measured, amplitude = (part[row, column].astype(np.float64) for part in (self._distance, self._amplitude))
-            write_pixels(self._noise, measured, amplitude, (row + place[0], column + place[1]), self._texture)
+            write_pixels(self._scaled, measured, amplitude, (row + place[0], column + place[1]), self._texture)
         return self._texture.reshape(-1, 8)
 
     @property

@@ -155,6 +155,9 @@ class ChannelTerm:
         """Zero: brightness carries no distance."""
         return np.zeros((2, 1))
 
+    def learn(self, surface: Surface) -> None:
+        """Learns nothing."""
+
     def _by_channel(self, seen: Synthesis) -> NDArray[np.float64]:
         """Measured values at each sample (m, channels), NaN in the channels that its pixel does not show."""
         texels = self._texture[seen.pixel[0]]

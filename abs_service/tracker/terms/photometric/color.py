@@ -145,6 +145,9 @@ class ColorTerm:
         """Zero: colours carry no distance."""
         return np.zeros((2, 1))
 
+    def learn(self, surface: Surface) -> None:
+        """Learns nothing."""
+
     def _residuals(self, seen: Synthesis) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
         """Normalised residuals (n, 3) and mask of the measured samples (n,)."""
         colors = seen.attributes[0].T.astype(np.float64)

@@ -29,10 +29,10 @@ def test_single_candidates_and_populations_read_what_the_whole_texture_holds(see
     whole = WholeTexels("tof", sparse(CAMERA), NOISE, Bordered(BORDER, BEYOND))
     on_demand = TexelsOnDemand(NOISE, Bordered(BORDER, BEYOND))
     for _ in range(3):  # of the frame before, nothing is left
-        image, (top, left) = drawn(generator), generator.integers(0, 8, 2)
+        image, (top, left), scale = drawn(generator), generator.integers(0, 8, 2), generator.uniform(1, 3)
         window = slice(top, top + generator.integers(1, 6)), slice(left, left + generator.integers(1, 8))
-        distance = whole.observe(image, window)
-        np.testing.assert_array_equal(on_demand.observe(image, window), distance)
+        distance = whole.observe(image, window, scale)
+        np.testing.assert_array_equal(on_demand.observe(image, window, scale), distance)
         known, chance = np.isfinite(distance), generator.random(distance.shape)
         free_m = np.where(chance < 0.2, chance, 0).astype(np.float32)
         unusable = Unusable((chance > 0.2) & (chance < 0.4), free_m, known & (chance > 0.4))
