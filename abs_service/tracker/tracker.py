@@ -25,6 +25,10 @@ from abs_service.tracker.posterior.relocation import fit_to_points
 from abs_service.tracker.shape_quality import ShapeComparison
 from abs_service.tracker.terms.base import inlier_share
 
+#: Frames after a start that are searched from scratch: in the first, nothing is known, and in the second, not how fast
+#: the object moves.
+COLD_FRAMES = 2
+
 
 class Tracker:
     """For each observation, finds the parameters Θ of the largest posterior density.
@@ -58,7 +62,7 @@ class Tracker:
         self._theta_covariance = ThetaCovariance(model, registration_m)
         self._vertex_covariance = VertexCovariance(model, registration_m, centers)
         self._shape = ShapeComparison(model.mesh)
-        self._is_warm = False
+        self._followed = 0
         self._last_tracked = model.rest
 
     def track(self, observation: Observation, in_time: Callable[[], bool]) -> Estimate:
@@ -69,13 +73,14 @@ class Tracker:
             in_time: False when the time is up; the first frame is searched to the end.
         """
         frame = self._posterior.observe(observation)  # predicts Θ; renders the noise models per pixel
-        budget = Budget(self._evaluations, in_time if self._is_warm else _without_end)
-        start = self._optimizer.follow if self._is_warm else self._optimizer.explore  # warm or cold start
+        is_warm = self._followed >= COLD_FRAMES
+        budget = Budget(self._evaluations, in_time if self._followed else _without_end)
+        start = self._optimizer.follow if is_warm else self._optimizer.explore  # warm or cold start
         outcome = self._minimize(frame, start(frame, frame.motion.theta, budget), budget)
         if frame.motion.is_too_narrow(outcome.theta):  # a sudden motion
             frame = frame.with_motion(frame.motion.widened(outcome.theta))
             outcome = self._minimize(frame, self._optimizer.follow(frame, outcome.theta, budget), budget)
-        self._is_warm = True
+        self._followed += 1
         return self._estimate(observation, frame, outcome, budget)
 
     def relocate(self, points: NDArray[np.float64]) -> None:
@@ -84,7 +89,7 @@ class Tracker:
         motion.restart(fit_to_points(self.model, self._last_tracked, points))
         self._theta_covariance.restart(motion.longest_covariance)
         self._vertex_covariance.restart()
-        self._is_warm = False
+        self._followed = 0
 
     def _minimize(self, frame: FramePosterior, search: Search, budget: Budget) -> Outcome:
         """Analysis by synthesis: ask, deform, synthesise and score, tell, until the search returns."""

@@ -180,8 +180,10 @@ class DepthTerm:
         sight = Sight.of(pixel, facing(self._view, surface), *masks)
         mean = -float(self._measured_cost(surface, seen)[0]) / residual.size
         size = np.where(free, np.inf, np.abs(residual))
+        found = summarize(self.sensor, sight, measured | free, size, mean)
         return replace(
-            summarize(self.sensor, sight, measured | free, size, mean),
+            found,
+            normalized_residual=found.normalized_residual * self._fluctuation.scale,  # by the model as it is stated
             rim=self._outline.fit(surface),
             remainder=self._continuation.remainder(surface),
             is_surprised=self._is_surprised,
