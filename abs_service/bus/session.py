@@ -44,6 +44,10 @@ class BusError(Exception):
     """The bus cannot be opened; the message names the key, its value and the remedy."""
 
 
+class UnansweredError(BusError, ConnectionError):
+    """Nobody answers at the endpoint; who does not yet, or stands still, may do so later."""
+
+
 class Role(StrEnum):
     """Role of a process in the zenoh network."""
 
@@ -70,7 +74,8 @@ def open_session(
         routers: endpoints of other routers that a router connects to, whenever they are there.
 
     Raises:
-        BusError: the endpoint is malformed or in use, or nothing listens there.
+        BusError: the endpoint is malformed or in use, or its owner refuses this process.
+        UnansweredError: nothing answers there.
         TlsError: a file of `security` cannot be used.
     """
     check_endpoint(endpoint, security)
@@ -86,10 +91,10 @@ def open_session(
         )
         return zenoh.open(zenoh.Config.from_json5(json.dumps(settings)))
     except zenoh.ZError as error:
-        reason = _explain(str(error), role, connect_timeout_ms)
-        if role is Role.CLIENT:
-            reason = security.refusal(endpoint) or reason
-        raise BusError(f'bus.endpoint = "{endpoint}": {reason}') from error
+        refusal = security.refusal(endpoint) if role is Role.CLIENT else ""
+        kind = UnansweredError if role is Role.CLIENT and not refusal else BusError
+        reason = refusal or _explain(str(error), role, connect_timeout_ms)
+        raise kind(f'bus.endpoint = "{endpoint}": {reason}') from error
 
 
 def check_endpoint(endpoint: str, security: NoSecurity | MutualTls = NO_SECURITY, key: str = "bus.endpoint") -> str:

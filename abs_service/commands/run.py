@@ -90,7 +90,7 @@ def run(arguments: argparse.Namespace) -> int:
         watchers = (notifier.update, measure, lambda _: forked.ensure_running())
         session = RunSession(bus, *about, rig.trackers, supervisor, display, WallClock(), watchers)
         session.answer_reloads(partial(renewal, file, arguments, page))
-        rig_process.on_hangup(session.reload)
+        rig_process.on_hangup(session.reload, stop)
         try:
             session.run_until(lambda: stop.is_set() or session.elapsed_s >= arguments.duration)
         finally:

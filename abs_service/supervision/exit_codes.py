@@ -21,7 +21,7 @@ class Exit(IntEnum):
     OK = 0
     FAILED = 1  # something broke; starting again may help
     USER = 2  # the command line, the configuration or the surroundings have to be changed first
-    NOTHING = 3  # nothing answers
+    NOTHING = 3  # nothing answers; starting again may help
     ENDED = 4  # of `capture`: its devices have ended by themselves, as a recording does; OK if it was told to end
     INTERRUPTED = 130  # Ctrl-C before the command could end in order
     PIPE_CLOSED = 141  # the reader of the output has closed it
@@ -30,6 +30,14 @@ class Exit(IntEnum):
 def is_for_user(error: Exception) -> bool:
     """True for exceptions of this project, which are user errors with an actionable message; others are bugs."""
     return type(error).__module__.partition(".")[0] in ("abs_service", "drivers", "calib")
+
+
+def code_for(error: Exception) -> Exit:
+    """The exit code of a command that an error ends."""
+    if not is_for_user(error):
+        return Exit.FAILED
+    # Whoever does not answer yet may do so soon, which nobody has to change anything for.
+    return Exit.NOTHING if isinstance(error, ConnectionError) else Exit.USER
 
 
 def lack_of_host(error: Exception) -> str:

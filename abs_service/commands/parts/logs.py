@@ -10,7 +10,7 @@ from typing import IO, cast
 
 import abs_service
 from abs_service.display.terminal import output
-from abs_service.supervision.exit_codes import Exit, is_for_user
+from abs_service.supervision.exit_codes import code_for, is_for_user
 from abs_service.supervision.log_lines import ERROR, JsonFormatter
 from drivers.contract.text import printable
 
@@ -90,8 +90,7 @@ def end_with(error: Exception, arguments: argparse.Namespace) -> int:
     Raises:
         Exception: the error itself, if it is our own mistake and standard error is for people.
     """
-    user = is_for_user(error)
-    code = Exit.USER if user else Exit.FAILED
+    user, code = is_for_user(error), code_for(error)
     if not isinstance(error, LogFileError) and (arguments.log_file or arguments.log_format == "json"):
         text = str(error) if user else f"{type(error).__name__}: {error}"
         _log.critical("%s", text, extra={"fields": {"exit_code": int(code)}}, exc_info=None if user else error)

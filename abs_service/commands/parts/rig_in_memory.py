@@ -57,6 +57,8 @@ class RigInMemory:
             if is_for_user(error):
                 raise RefusedError(str(error)) from None
             raise
+        if self._stream.closed:
+            raise RefusedError("the rig ends")
         found = changes.between(self.rig, new)
         if found.fixed:
             keys = ", ".join(found.fixed)

@@ -128,16 +128,23 @@ def stop_on_signals() -> threading.Event:
     return stop
 
 
-def on_hangup(act: Callable[[], object]) -> None:
+def on_hangup(act: Callable[[], object], stop: threading.Event) -> None:
     """Lets SIGHUP call a function, from a thread and once for all that have arrived, in a process without a terminal.
 
-    There it says nothing of a terminal, but is the usual wish that a service reads its configuration again.
+    There it says nothing of a terminal, but is the usual wish that a service reads its configuration again. When `stop`
+    is set, it has no effect any more.
     """
+
+    def unless_it_ends() -> None:
+        if not stop.is_set():
+            act()
+            stop.wait(HANGUP_PERIOD_S)
+
     with suppress(OSError):
         os.close(os.open("/dev/tty", os.O_RDONLY))
         return
     if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
-        signal.signal(signal.SIGHUP, _in_thread(lambda: (act(), time.sleep(HANGUP_PERIOD_S))))
+        signal.signal(signal.SIGHUP, _in_thread(unless_it_ends))
 
 
 def _in_thread(act: Callable[[], object]) -> Callable[[int, FrameType | None], None]:

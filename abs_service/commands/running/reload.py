@@ -37,8 +37,14 @@ def run(arguments: argparse.Namespace) -> int:
 def request(bus: Bus, headers: HeaderFactory) -> int:
     """Sends the command and prints the answer."""
     answer = commands.reload(bus, headers, TIMEOUT_S)
-    if answer is None or not answer.accepted:
-        print(f"the rig refuses: {answer.reason if answer else 'it gives no answer; is it `abs-service run`?'}")
+    if answer is None:
+        print(
+            f'no `abs-service run` of a rig "{headers.rig}" answers there. '
+            "If `name` or `bus.endpoint` has changed, stop the rig and start it again"
+        )
+        return Exit.FAILED
+    if not answer.accepted:
+        print(f"the rig refuses: {answer.reason}")
         return Exit.FAILED
     said = (("starts again", answer.restarts), ("ends", answer.ends))
     print("; ".join(f"{what}: {', '.join(names)}" for what, names in said if names) or "nothing has changed")

@@ -5,7 +5,7 @@ import threading
 import pytest
 import zenoh
 
-from abs_service.bus.session import BusError, Role, check_endpoint, open_session
+from abs_service.bus.session import BusError, Role, UnansweredError, check_endpoint, open_session
 
 
 @pytest.mark.parametrize(
@@ -32,7 +32,7 @@ def test_a_port_in_use_is_explained(open_bus, endpoint):
 
 def test_a_router_that_is_not_there_is_explained(endpoint, monkeypatch):
     monkeypatch.setattr("abs_service.bus.session.CONNECT_TIMEOUT_MS", 200)
-    with pytest.raises(BusError, match=f'bus.endpoint = "{endpoint}": nothing answers there'):
+    with pytest.raises(UnansweredError, match=f'bus.endpoint = "{endpoint}": nothing answers there'):
         open_session(endpoint, Role.CLIENT)
 
 

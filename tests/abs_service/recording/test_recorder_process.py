@@ -197,7 +197,7 @@ def test_sigterm_while_frames_come_ends_with_a_complete_file(rig, endpoint, laun
 
 def test_a_rig_that_does_not_run_is_explained(rig, launch):
     recorder = launch("record", rig)
-    assert recorder.wait(20) == 2
+    assert recorder.wait(20) == 3
     assert "nothing answers there" in recorder.stderr.read()
 
 

@@ -123,6 +123,14 @@ def test_exit_code_2_of_anyone_stops_everything_and_keeps_the_message(world):
     assert supervisor.exit_code() is Exit.USER
 
 
+def test_a_child_that_cannot_connect_at_first_since_this_process_stood_still_is_started_again(world):
+    supervisor = world.supervisor("capture", "track/a", "record")
+    for component in ("capture", "track/a", "record"):
+        ends(world, supervisor, component, Exit.NOTHING)
+    assert (supervisor.misconfigured(), supervisor.exit_code()) == (None, None)
+    assert all(child.state is State.RUNNING for child in supervisor.children.values())
+
+
 def test_when_the_devices_have_no_more_images_the_run_is_over(world):
     supervisor = world.supervisor("capture", "track/a")
     ends(world, supervisor, "capture", Exit.ENDED)

@@ -4,6 +4,7 @@ import argparse
 import errno
 import os
 import signal
+import threading
 from queue import SimpleQueue
 
 import pytest
@@ -35,9 +36,9 @@ def test_many_hangups_without_a_terminal_are_one_wish(monkeypatch):
 
     monkeypatch.setattr(os, "open", no_terminal)
     signal.signal(signal.SIGHUP, signal.SIG_DFL)  # the tests themselves may run with nohup
-    called, go_on = SimpleQueue(), SimpleQueue()
-    monkeypatch.setattr(rig_process.time, "sleep", lambda seconds: go_on.get(timeout=1.0))
-    rig_process.on_hangup(lambda: called.put("reload"))
+    called, go_on, stop = SimpleQueue(), SimpleQueue(), threading.Event()
+    monkeypatch.setattr(stop, "wait", lambda seconds: go_on.get(timeout=1.0))
+    rig_process.on_hangup(lambda: called.put("reload"), stop)
     signal.raise_signal(signal.SIGHUP)
     assert called.get(timeout=1.0) == "reload"
     for _ in range(100):
@@ -45,7 +46,10 @@ def test_many_hangups_without_a_terminal_are_one_wish(monkeypatch):
     for _ in range(2):
         go_on.put(None)
     assert called.get(timeout=1.0) == "reload"
-    assert called.empty()
+    stop.set()
+    signal.raise_signal(signal.SIGHUP)
+    go_on.put(None)
+    assert called.empty(), "the bus may be closed by now"
 
 
 def parse(*arguments):

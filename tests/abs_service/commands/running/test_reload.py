@@ -60,6 +60,13 @@ def test_what_cannot_be_used_is_refused_and_changes_nothing(rig):
         assert config.load(file.path) == rig
 
 
+def test_a_rig_that_ends_takes_nothing_over(rig):
+    with in_memory(rig) as file:
+        pass
+    with pytest.raises(RefusedError, match="the rig ends"):
+        file.exchange(lambda: rig)
+
+
 def test_a_mistake_of_ours_is_not_taken_for_one_of_the_file(rig):
     def wrong():
         raise ZeroDivisionError
@@ -92,4 +99,4 @@ def test_the_answer_is_told(capsys, changed, refusal, code, words):
 
 def test_a_rig_that_gives_no_answer_is_said(capsys):
     assert reload.request(LoopbackBus(), HeaderFactory("demo", WallClock())) == 1
-    assert "it gives no answer" in capsys.readouterr().out
+    assert 'no `abs-service run` of a rig "demo" answers there. If `name`' in capsys.readouterr().out
