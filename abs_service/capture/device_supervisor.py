@@ -80,6 +80,7 @@ class DeviceSupervisor:
         self._stop = threading.Event()
         self._abandoned = False
         self._thread = threading.Thread(target=self._run, name=f"device {name}", daemon=True)
+        self._failure = ""  # for which it was opened again, until all its streams deliver
         self._previous: Counter[str] = Counter()  # counters of earlier openings
         self._repeated_images = RepeatedImages()
         self.finished = False
@@ -142,6 +143,7 @@ class DeviceSupervisor:
                 self._report_state(DeviceState.CLOSED, reason)
                 return
             backoff_s = FIRST_BACKOFF_S if delivered else min(2 * backoff_s, LONGEST_BACKOFF_S)
+            self._failure = reason
             self._report_state(DeviceState.RECONNECTING, f"{reason}; trying again in {backoff_s:g} s")
             self._health.count(f"device.{self._name}.reconnects")
             self._stop.wait(backoff_s)
@@ -198,15 +200,17 @@ class DeviceSupervisor:
             self._uri, self._serial = info.uri, info.serial
 
     def _watch(self, device: Device, stall_detector: StallDetector) -> str:
-        shown = (DeviceState.OPENING, "")
+        shown = (DeviceState.OPENING, "", self._failure)
         while not self._stop.wait(0.1):
             self._measure(device, stall_detector)
             self._returned_ns = self._clock()
             state, reason = stall_detector.check()
             if state != shown[0]:
                 self._health.count(f"device.{self._name}.stalls", int(state == DeviceState.STALLED))
-            if (state, reason) != shown:
-                shown = (state, reason)
+            if state == DeviceState.STREAMING and stall_detector.all_delivered:
+                self._failure = ""
+            if (state, reason, self._failure) != shown:
+                shown = (state, reason, self._failure)
                 self._report_state(state, reason)
             if state == DeviceState.BROKEN:
                 raise FinalError(reason)
@@ -234,4 +238,8 @@ class DeviceSupervisor:
         _log.info("device %s: %s %s", self._name, state.value, reason, extra={"fields": {"device": self._name}})
         self._health.label(f"device.{self._name}", state.value)
         level = _LEVELS[state]
+        if self._failure and state != DeviceState.CLOSED:
+            # A camera that can be opened is not yet one that delivers.
+            reason = reason if level > Level.OK else f"{self._failure}; opened again, waits for its images"
+            level = Level.ERROR
         self._health.report(f"device {self._name}", level, f"{self._name}: {reason}" if level > Level.OK else "")

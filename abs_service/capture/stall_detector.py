@@ -53,6 +53,7 @@ class StallDetector:
         self._repeating: set[tuple[str, str]] = set()
         self._empty_since_ns: dict[tuple[str, str], int] = {}
         self._latest_ns: dict[tuple[str, str], int] = {}
+        self._awaited = set(self._streams)  # without a frame so far
         self._warnings: dict[str, str] = {}
         self._lock = threading.Lock()
         self.delivered = False
@@ -72,6 +73,7 @@ class StallDetector:
             return
         self._repeating.discard(frame.key)
         self._latest_ns[frame.key] = self._clock()
+        self._awaited.discard(frame.key)
         self.delivered = True
         self._sink.on_frame(replace(frame, sensor=sensor, epoch=self._first_epoch + frame.epoch))
 
@@ -92,6 +94,11 @@ class StallDetector:
         with self._lock:
             self._warnings[condition] = message
         self._sink.on_warning(condition, message)
+
+    @property
+    def all_delivered(self) -> bool:
+        """True after the first frame of each stream that is monitored."""
+        return not self._awaited
 
     @property
     def counters(self) -> Mapping[str, int]:

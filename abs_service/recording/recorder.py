@@ -179,6 +179,7 @@ class Recorder:
                 self._writer.pause()
                 self._health.label("file", "")
             take.finish({"ended": reason, **self._writer.summary(self._queue.dropped)})
+            self._measure(take)
         except BaseException:
             self._health.label("file", take.abandon().name)
             self._health.count("unsaved", self._writer.unsaved)
@@ -221,12 +222,15 @@ class Recorder:
     def _flush(self, take: Take) -> None:
         take.flush()
         self._writer.saved()
-        self._health.gauge("file_bytes", take.size)
-        self.written = (self._finished[0] + take.size, self._finished[1] + take.estimates_size)
+        self._measure(take)
         if self._failed:
             _log.warning("recording again, to %s", take.path.name)
             self._failed = ""
             self._health.report("record", Level.OK)
+
+    def _measure(self, take: Take) -> None:
+        self._health.gauge("file_bytes", take.size)
+        self.written = (self._finished[0] + take.size, self._finished[1] + take.estimates_size)
 
     def _fail(self, reason: str) -> None:
         is_new, self._failed = not self._failed, reason

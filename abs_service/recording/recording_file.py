@@ -56,6 +56,7 @@ class RecordingFile:
     ) -> None:
         self.path = path
         self._active = self.path.with_name(self.path.name + ACTIVE)
+        self._whole = 0  # size of the finished file
         self._begun = 0  # size up to which the disk has been told to write
         self._stream = open_file(self._active)
         try:
@@ -70,8 +71,8 @@ class RecordingFile:
 
     @property
     def size(self) -> int:
-        """Bytes written so far, but for the open chunk."""
-        return self._stream.tell()
+        """Bytes written so far, but for the open chunk; of a finished file, all."""
+        return self._whole or self._stream.tell()
 
     @property
     def fate(self) -> str:
@@ -118,6 +119,7 @@ class RecordingFile:
         self._file.describe("abs.recording", summary)
         self._file.finish()
         os.fsync(self._stream.fileno())
+        self._whole = self.size
         now = Path(os.readlink(f"/proc/self/fd/{self._stream.fileno()}"))
         self._stream.close()
         with contextlib.suppress(FileNotFoundError):  # it was deleted

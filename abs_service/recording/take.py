@@ -54,7 +54,7 @@ class Take:
 
     @property
     def size(self) -> int:
-        """Bytes of the file with everything so far, but for the open chunk."""
+        """Bytes of the file with everything so far, see `RecordingFile.size`."""
         return self._all.size
 
     @property

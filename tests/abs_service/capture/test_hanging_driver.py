@@ -1,6 +1,10 @@
-"""A driver that does not return, from opening or from a command, is said, and holds up as little as possible."""
+"""A driver that does not return, from opening or from a command, is said, and holds up as little as possible.
+
+So is a device that can be opened, and delivers nothing.
+"""
 
 import threading
+from dataclasses import replace
 
 import pytest
 from absmsg.v1.health_pb2 import Health as Message
@@ -9,7 +13,9 @@ from abs_service.bus.health import Health
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.capture import device_supervisor
 from abs_service.capture.device_supervisor import DeviceSupervisor
+from drivers.contract.capabilities import Capabilities, StreamInfo
 from drivers.contract.device import DeviceError, DeviceState
+from drivers.contract.frame import Kind
 from tests.abs_service.bus.loopback import LoopbackBus, health_now
 from tests.abs_service.capture.fake_device import FakeDevice, failing, frame, working
 from tests.waiting import eventually
@@ -95,12 +101,31 @@ def test_a_driver_that_hangs_is_an_error_until_it_returns(go_on):
         return working()
 
     rig = Supervised(failing("unplugged"), slow)
-    assert eventually(lambda: rig.said.labels["device.sim"] == "opening")
-    assert rig.said.level == Message.LEVEL_OK
+    assert eventually(lambda: rig.said.message == "sim: unplugged; opened again, waits for its images")
     rig.late_ns = 31 * 10**9
-    said = rig.said
-    assert said.level == Message.LEVEL_ERROR
-    assert said.message == "sim: its driver has not returned for 31 s; end `capture`, which `run` starts again"
+    assert "sim: its driver has not returned for 31 s; end `capture`, which `run` starts again" in rig.said.message
     go_on.set()
+    assert eventually(lambda: rig.said.level == Message.LEVEL_OK)
+    rig.supervisor.close(5)
+
+
+def test_a_device_that_is_opened_again_is_an_error_until_all_its_streams_deliver():
+    sinks = []
+
+    def silent():
+        device = FakeDevice(start=lambda sink: (sink.on_state(DeviceState.STREAMING, ""), sinks.append(sink)))
+        device.capabilities = Capabilities(
+            tuple(StreamInfo("head", name, Kind.COLOR, "mono8", 4, 3, 30.0) for name in ("image", "infrared"))
+        )
+        return device
+
+    rig = Supervised(failing("unplugged"), silent)
+    assert eventually(lambda: rig.said.labels["device.sim"] == "streaming" and sinks)
+    words = "sim: unplugged; opened again, waits for its images"
+    assert (rig.said.level, rig.said.message) == (Message.LEVEL_ERROR, words)
+    sinks[0].on_frame(frame())
+    assert eventually(lambda: rig.frames == 2)
+    assert (rig.said.level, rig.said.message) == (Message.LEVEL_ERROR, words)
+    sinks[0].on_frame(replace(frame(), stream="infrared"))
     assert eventually(lambda: rig.said.level == Message.LEVEL_OK)
     rig.supervisor.close(5)

@@ -44,6 +44,8 @@ def test_a_recording_holds_what_was_published_byte_for_byte(tmp_path):
     schemas = {m.schema and m.schema.name for m in messages}
     assert schemas == {"foxglove.RawImage", "absmsg.v1.FrameInfo", "absmsg.v1.Health"}
     assert metadata(path) == {"ended": "stopped", "messages.tof/depth/image": "5", "messages.health/record": "1"}
+    assert rig.recorder.written == (path.stat().st_size, 0)
+    assert rig.said.gauges["file_bytes"] == path.stat().st_size
 
 
 @pytest.mark.parametrize("step_s", [-3600, 3600, 31_557_600, -1_700_000_000])
