@@ -105,6 +105,12 @@ class Health:
             if level != before:
                 self.publish()
 
+    def withdraw(self, beginning: str) -> None:
+        """Sets all conditions whose names begin so to OK: what they were about is gone."""
+        with self._lock:
+            for condition in [name for name in self._conditions if name.startswith(beginning)]:
+                self.report(condition, Level.OK)
+
     @property
     def level(self) -> Level:
         """Level of the worst condition."""

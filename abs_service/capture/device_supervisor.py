@@ -176,6 +176,7 @@ class DeviceSupervisor:
         finally:
             self._withdraw()
             device.close()
+            self._health.withdraw(f"device {self._name} ")  # its warnings; opened again, it tells them again
             self._previous.update(device.counters)
             self._previous.update(stall_detector.counters)
             self._health.count_up_to(self._previous, f"device.{self._name}.")

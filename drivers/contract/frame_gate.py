@@ -4,7 +4,7 @@ Every driver has one; it implements the contract's guarantees about counters, st
 """
 
 import threading
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
@@ -12,6 +12,9 @@ from drivers.contract.capabilities import StreamInfo
 from drivers.contract.clock import Stamp
 from drivers.contract.device import DeviceError, DeviceState, Sink, Truth
 from drivers.contract.frame import Frame
+
+#: Of so many latest frames of a stream, so many that do not fit are no accident.
+LATEST, MANY = 30, 15
 
 
 class FrameGate:
@@ -24,6 +27,8 @@ class FrameGate:
 
     def __init__(self, streams: Iterable[StreamInfo], causes: Iterable[str] = ()) -> None:
         self._streams = {stream.key: stream for stream in streams}
+        self._unfit = {key: deque[bool](maxlen=LATEST) for key in self._streams}
+        self._warned: set[str] = set()
         self._counters = Counter({"frames": 0, **dict.fromkeys(causes, 0)})
         # Reentrant, because the sink may stop the device in `on_frame`.
         self._lock = threading.RLock()
@@ -116,6 +121,8 @@ class FrameGate:
         """Delivers a frame, or counts the drop: `after_stop`, `unknown_stream`, `wrong_size`, `wrong_encoding`."""
         with self._lock:
             cause = self._drop_cause(frame)
+            if cause not in ("after_stop", "unknown_stream"):
+                self._note_form(frame, bool(cause))
             if cause:
                 self._counters[cause] += 1
             elif self._sink is not None:
@@ -134,6 +141,19 @@ class FrameGate:
         """Counts frames that the driver itself dropped."""
         with self._lock:
             self._counters[cause] += number
+
+    def _note_form(self, frame: Frame, unfit: bool) -> None:
+        """Warns when many frames of a stream do not have its size or encoding, as after somebody else has set one."""
+        latest, condition = self._unfit[frame.key], f"{frame.sensor}/{frame.stream} form"
+        latest.append(unfit)
+        if unfit and sum(latest) >= MANY:
+            stream, (height, width) = self._streams[frame.key], frame.data.shape[:2]
+            self._warned.add(condition)
+            is_, wanted = f"{width}×{height} {frame.encoding}", f"{stream.width}×{stream.height} {stream.encoding}"
+            self.warn(condition, f"{frame.sensor}/{frame.stream}: images of {is_} in place of {wanted}, not used")
+        elif condition in self._warned and not any(latest):
+            self._warned.remove(condition)
+            self.warn(condition, "")
 
     def _drop_cause(self, frame: Frame) -> str:
         stream = self._streams.get(frame.key)

@@ -129,3 +129,20 @@ def test_a_device_that_is_opened_again_is_an_error_until_all_its_streams_deliver
     sinks[0].on_frame(replace(frame(), stream="infrared"))
     assert eventually(lambda: rig.said.level == Message.LEVEL_OK)
     rig.supervisor.close(5)
+
+
+def test_a_warning_ends_with_the_device_that_gave_it():
+    sinks = []
+
+    def dark():
+        return FakeDevice(start=lambda sink: (sink.on_state(DeviceState.STREAMING, ""), sinks.append(sink)))
+
+    rig = Supervised(dark, working)
+    assert eventually(lambda: sinks)
+    sinks[0].on_frame(frame())
+    sinks[0].on_warning("head/image empty", "nothing in its images")
+    assert eventually(lambda: rig.said.message == "sim: nothing in its images")
+    sinks[0].on_state(DeviceState.FAILED, "unplugged")
+    assert eventually(lambda: rig.frames == 2)
+    assert eventually(lambda: rig.said.level == Message.LEVEL_OK)
+    rig.supervisor.close(5)
