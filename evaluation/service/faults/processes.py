@@ -12,6 +12,8 @@ from evaluation.service.live.proc import is_running
 
 #: For how long a process is stopped [s]: less than the bus's lease, more than a disk or a debugger takes.
 STOP_S = 1.5
+#: The same, as processes start: longer than they try to connect [s].
+UNANSWERED_S = 5.0
 #: Time in which all processes of a rig end [s].
 END_S = 5.0
 #: Time in which a rig that is started, or has its cameras again, tracks [s].
@@ -69,6 +71,18 @@ def stopped(component: str, rig: RunningRig) -> Made:
     return Made(begin_ns, rig.signal(component, signal.SIGCONT))
 
 
+def stopped_at_start(rig: RunningRig) -> Made:
+    """SIGSTOP to `run` as its processes start, which cannot connect meanwhile, and SIGCONT."""
+    rig.service.stop(END_S, signal.SIGTERM)
+    begin_ns = rig.start_again()
+    while "capture" not in rig.processes():
+        rig.service.check()
+        time.sleep(0.01)
+    rig.signal("run", signal.SIGSTOP)
+    time.sleep(UNANSWERED_S)
+    return Made(begin_ns, rig.signal("run", signal.SIGCONT))
+
+
 def hangs(component: str, rig: RunningRig) -> Made:
     """SIGSTOP for good: the process has to be killed and started again."""
     hanging = rig.processes()[component]
@@ -123,6 +137,16 @@ FAULTS = (
     Fault(f"SIGSTOP of `track` for {STOP_S:g} s", "goes on", partial(stopped, "track"), 2.5),
     Fault(f"SIGSTOP of `record` for {STOP_S:g} s", "nothing is lost", partial(stopped, "record"), noticed_s=math.inf),
     Fault(f"SIGSTOP of `run` for {STOP_S:g} s", "nobody is killed", partial(stopped, "run"), 2.5, 2.5, _UNSAID),
+    Fault(
+        f"SIGSTOP of `run` for {UNANSWERED_S:g} s as its processes start",
+        f"they are started again; then it tracks within {UNANSWERED_S:g} s",
+        stopped_at_start,
+        math.inf,
+        math.inf,
+        _UNSAID,
+        UNANSWERED_S,
+        _ALL,
+    ),
     Fault(f"`capture` {_HANGS}", _BACK, partial(hangs, "capture"), STALL_S + 4, STALL_S + 4, restarted=_CAPTURE),
     Fault(f"`track` {_HANGS}", _BACK, partial(hangs, "track"), STALL_S + 4, restarted=_TRACK),
     Fault(f"`record` {_HANGS}", _BACK, partial(hangs, "record"), 0.5, STALL_S + 2.5, restarted=_RECORD),
