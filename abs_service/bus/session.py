@@ -2,7 +2,9 @@
 
 import json
 import logging
+import os
 import re
+import sys
 from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
 from enum import StrEnum
@@ -84,6 +86,8 @@ def open_session(
     own = security.check(endpoint, role is Role.ROUTER)
     if own and own.ends - datetime.now(UTC) < CERTIFICATE_ENDS:
         _log.warning('the certificate "%s" ends on %s; after that, nobody can connect', own.name, own.ends.date())
+    if not sys.stdout.isatty():
+        os.environ.setdefault("NO_COLOR", "1")  # zenoh's lines would have escape sequences
     zenoh.init_log_from_env_or(LOG_LEVELS)
     try:
         settings = _settings(

@@ -1,5 +1,8 @@
 """Sessions of the bus: endpoints, and errors in opening one that are understood."""
 
+import os
+import subprocess
+import sys
 import threading
 
 import pytest
@@ -50,3 +53,12 @@ def test_a_sender_whose_wall_clock_is_ahead_fills_no_log(endpoint, capfd):
         assert arrived.wait(5)
         subscriber.undeclare()
     assert capfd.readouterr() == ("", "")
+
+
+def test_lines_of_zenoh_have_no_escape_sequences_where_no_terminal_is(endpoint):
+    code = f"from abs_service.bus.session import Role, open_session; open_session({endpoint!r}, Role.ROUTER).close()"
+    environment = {name: text for name, text in os.environ.items() if name != "NO_COLOR"} | {"RUST_LOG": "info"}
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+    said = done.stdout + done.stderr
+    assert "zenoh" in said
+    assert "\x1b" not in said
