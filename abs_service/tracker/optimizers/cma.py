@@ -6,6 +6,8 @@ Too slow for live tracking in more than a few dimensions.
 import warnings
 from dataclasses import dataclass
 from functools import partial
+from importlib import import_module
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +32,17 @@ class Settings(AskAndTellSettings):
         return AskAndTell(Schedule("cma", self.generations, self.tolerance), make, population, self.step, self.restarts)
 
 
+class _Pycma(Protocol):
+    """The used part of pycma's search, which has no types: to infer them takes the type checker ten seconds."""
+
+    sigma: float
+    mean: NDArray[np.float64]
+
+    def ask(self) -> list[NDArray[np.float64]]: ...
+
+    def tell(self, solutions: list[NDArray[np.float64]], function_values: list[float]) -> None: ...
+
+
 class PycmaSampler:
     """A `Sampler`: pycma. Step size and covariance of one frame start the next.
 
@@ -46,16 +59,16 @@ class PycmaSampler:
     ):
         with warnings.catch_warnings():  # pycma warns that it cannot plot
             warnings.simplefilter("ignore")
-            from cma import CMAEvolutionStrategy  # noqa: PLC0415  # importing it takes a second
+            pycma = import_module("cma")  # importing it takes a second
         self._steps = minimum_step, step
-        options = {
+        options: dict[str, Any] = {
             "randn": lambda *shape: generator.standard_normal(shape),
             "seed": np.nan,
             "verbose": -9,
             "verb_log": 0,
             "popsize": population,
         }
-        self._search = CMAEvolutionStrategy(np.zeros(dimension), step, options)
+        self._search: _Pycma = pycma.CMAEvolutionStrategy(np.zeros(dimension), step, options)
         self._origin, self._metric = np.zeros(dimension), np.eye(dimension)
         self._asked: list[NDArray[np.float64]] = []
 
