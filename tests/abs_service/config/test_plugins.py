@@ -72,6 +72,14 @@ def test_parts_that_are_not_configured_are_not_imported(package, tmp_path):
     assert f"{package}.heavy" not in sys.modules
 
 
+def test_installed_distributions_are_read_once(package, monkeypatch):
+    looks, entry_points = [], plugins.entry_points
+    monkeypatch.setattr(plugins, "entry_points", lambda **chosen: looks.append(chosen) or entry_points(**chosen))
+    for _ in range(3):
+        plugins.load(package, {"type": "bendy"}, Path())
+    assert len(looks) <= 1
+
+
 def test_relative_paths_start_from_the_given_folder(package):
     table = {"type": "bendy", "mask": "masks/a.png"}
     assert plugins.load(package, table, Path("/rig")).mask == Path("/rig/masks/a.png")
