@@ -18,21 +18,26 @@ def noise_deviation(image: NDArray[np.float32] | NDArray[np.uint8], places: NDAr
     The difference of two Laplacians leaves noise, and little of a picture (J. Immerkær: Fast noise variance estimation.
     Computer Vision and Image Understanding 64, 1996); here its median, which edges hardly change.
     """
-    medians = np.empty(image.shape[2])
-    _laplacian_medians(image, places, medians)
-    return medians / _MEDIAN_LEFT
+    left = np.empty((image.shape[2], len(places)))
+    count = _laplacians(image, places, left)
+    if not count:
+        return np.zeros(len(left))
+    # Not in the kernel: Numba's median takes two seconds to compile.
+    lower, upper = (count - 1) // 2, count // 2
+    ordered = np.partition(left[:, :count], (lower, upper), axis=1)
+    return (ordered[:, lower] + ordered[:, upper]) / (2 * _MEDIAN_LEFT)
 
 
 @kernel
-def _laplacian_medians(
-    image: NDArray[np.float32] | NDArray[np.uint8], places: NDArray[np.float64], medians: NDArray[np.float64]
-) -> None:
-    """Medians (channels,) of |Σ s_i s_j I_ij|, s = (1, −2, 1), around places (n, 2) [px]; 0 if none is known.
+def _laplacians(
+    image: NDArray[np.float32] | NDArray[np.uint8], places: NDArray[np.float64], left: NDArray[np.float64]
+) -> int:
+    """Fills `left` (channels, n) with |Σ s_i s_j I_ij|, s = (1, −2, 1), around places (n, 2) [px]; number of the known.
 
     A candidate may lie behind the camera, or far beside the image; one unknown pixel leaves out all channels.
     """
     height, width, channels = image.shape
-    left, count = np.empty((channels, places.shape[0])), 0
+    count = 0
     for v in range(places.shape[0]):
         x, y = places[v, 0] + 0.5, places[v, 1] + 0.5
         if not (abs(x) < 1e9 and abs(y) < 1e9):
@@ -48,5 +53,4 @@ def _laplacian_medians(
             left[c, count] = abs(total)
             is_known = is_known and abs(total) < 1e30
         count += 1 if is_known else 0
-    for c in range(channels):
-        medians[c] = np.median(left[c, :count]) if count else 0.0
+    return count
