@@ -5,6 +5,7 @@ along the first column, z into the board (away from a camera that sees its print
 front of an unrotated camera is close to a translation along +z.
 """
 
+import hashlib
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,6 +31,11 @@ class CornerView:
     points_b: NDArray[np.float64]
     pixels: NDArray[np.float64]
     sigma_px: float = 0.1
+
+    @property
+    def digest(self) -> str:
+        """Digest of the corners, rounded to 1e-3 px: images that are the same have the same, and no others."""
+        return hashlib.sha256(np.round(self.pixels, 3).tobytes()).hexdigest()[:16]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -53,10 +53,10 @@ def _sparse(view: PlaneView) -> PlaneView:
     return replace(view, **parts)
 
 
-def verdicts(stored: Stored, seen: BoardObservations, used: Views) -> list[Verdict]:
-    """Verdicts on sensors without any view, and on views that no camera of the calibration could have taken."""
-    found = []
-    for name in stored.sensors:
+def verdicts(known: RigCalibration, seen: BoardObservations, used: Views) -> list[Verdict]:
+    """Verdicts on views of the calibration itself, on sensors without any, and on views that no camera could have."""
+    found = _of_the_calibration(known, seen)
+    for name in known.sensors:
         corners = {view.shot for view in seen.corners if view.sensor == name}
         lost = sorted(corners - {view.shot for view in used.corners if view.sensor == name})
         if lost:
@@ -72,6 +72,17 @@ def verdicts(stored: Stored, seen: BoardObservations, used: Views) -> list[Verdi
             text = f"did not see the board{f' ({why})' if why else ''}, so nothing can be said of it."
             found.append(Verdict(Level.DOUBTFUL, text, "Show it the board too.", name))
     return found
+
+
+def _of_the_calibration(known: RigCalibration, seen: BoardObservations) -> list[Verdict]:
+    own = sum(view.digest in known.covariance.views for view in seen.corners)
+    if 2 * own <= len(seen.corners):
+        return []
+    text = (
+        f"{own} of {len(seen.corners)} images are those that it was made from: it fits these in any case, and they do "
+        "not show whether it still holds."
+    )
+    return [Verdict(Level.DOUBTFUL, text, "Take new images of the board.")]
 
 
 def _rejected_of(seen: BoardObservations, sensor: str) -> list[Exception]:

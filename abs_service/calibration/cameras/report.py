@@ -81,7 +81,8 @@ def calibration(
         )
     count = solution.adjustment.layout.board_start
     names = tuple(solution.adjustment.layout.names[:count])
-    covariance = Covariance(names, solution.covariance[:count, :count])
+    views = tuple(view.digest for view in solution.task.corners)
+    covariance = Covariance(names, solution.covariance[:count, :count], views)
     return RigCalibration(name, {**kept, **sensors}, origin, "good" if trusted else "doubtful", covariance)
 
 

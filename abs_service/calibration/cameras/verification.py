@@ -85,7 +85,7 @@ def verify(known: RigCalibration, seen: BoardObservations, provenance: Provenanc
     used = usable(stored, new_views.of_known_sensors(seen, stored))
     wrong = causes.of_material(gross_size(stored, used), mistakes.find(stored, used.corners))
     if wrong:
-        said = (*wrong, *new_views.verdicts(stored, seen, used))
+        said = (*wrong, *new_views.verdicts(known, seen, used))
         return Report(title, provenance, said, tuple(tables.refusals(seen)), {})
     found = _found(known, stored, seen, used)
     sections = [
@@ -97,7 +97,7 @@ def verify(known: RigCalibration, seen: BoardObservations, provenance: Provenanc
     said = verdicts(found)
     # A good board and good cameras need no solve of their own.
     if said[0].level > Level.GOOD and (wrong_print := misprint(stored, new_views.thinned(used), SPOILT_PX)):
-        said = [causes.of_misprint(wrong_print), *new_views.verdicts(stored, seen, used)]
+        said = [causes.of_misprint(wrong_print), *new_views.verdicts(known, seen, used)]
     return Report(title, provenance, tuple(said), tuple(sections), values)
 
 
@@ -142,7 +142,7 @@ def _found(known: RigCalibration, stored: Stored, seen: BoardObservations, used:
         _compared(stored, views, changes),
         reaches,
         {name: mistakes.likelier(stored, views, name) for name in observers},
-        tuple(new_views.verdicts(stored, seen, used)),
+        tuple(new_views.verdicts(known, seen, used)),
         len(sensors),
     )
 

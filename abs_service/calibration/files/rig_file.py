@@ -73,10 +73,12 @@ class Covariance:
     Attributes:
         names: of the parameters, `tof.fx`, `color.rotation_x`, …; see `calib.solve.bundle.parameters.layout`.
         matrix: (n, n), in the product of their units (m, rad, px, s, 1).
+        views: digests of the corners that they were estimated from; empty if unknown.
     """
 
     names: tuple[str, ...] = ()
     matrix: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
+    views: tuple[str, ...] = ()
 
     def of(self, sensor: str) -> dict[str, float]:
         """Standard deviations of a sensor's parameters, by name without the sensor."""
@@ -144,7 +146,8 @@ def read_covariance(path: Path, sha256: str) -> Covariance:
         raise RigFileError(f"{path}: not the covariances of this calibration, for which the hash must be {sha256}")
     try:
         arrays = limited.unpacked(content)
-        return Covariance(tuple(arrays["names"].tolist()), arrays["covariance"])
+        views = arrays["views"].tolist() if "views" in arrays else ()
+        return Covariance(tuple(arrays["names"].tolist()), arrays["covariance"], tuple(views))
     except (KeyError, ValueError) as error:
         raise RigFileError(f"{path}: the covariances cannot be read: {error}") from error
 
@@ -164,7 +167,8 @@ def camera_table(camera: Camera) -> dict[str, Any]:
 
 def _arrays(covariance: Covariance) -> bytes:
     buffer = io.BytesIO()
-    np.savez(buffer, names=np.array(covariance.names), covariance=covariance.matrix)
+    views = np.array(covariance.views, np.str_)
+    np.savez(buffer, names=np.array(covariance.names), covariance=covariance.matrix, views=views)
     return buffer.getvalue()
 
 
@@ -187,7 +191,7 @@ def _text(calibration: RigCalibration, name: str, beside: Mapping[str, str]) -> 
         ),
     ]
     if beside:
-        comment = "Of all parameters together, with their names; NumPy's format, arrays `names` and `covariance`."
+        comment = "Of all parameters together; NumPy's format, arrays `names`, `covariance`, `views` (digests)."
         parts.append(toml_text.table(("covariance",), beside, comment))
     for sensor, known in calibration.sensors.items():
         parts += _sensor(("sensors", sensor), known, calibration.covariance.of(sensor))

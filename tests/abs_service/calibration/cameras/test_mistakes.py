@@ -98,9 +98,20 @@ def test_the_images_of_another_sensor_are_named_without_common_shots() -> None:
 
 
 def test_views_that_the_stored_camera_could_not_have_seen_are_counted() -> None:
-    stored, seen = new_views.stored_in(calibration()), look(two_heads(), *_boards()).corners
+    seen = look(two_heads(), *_boards()).corners
     used = [view for view in seen if view.sensor == "right" or view.shot not in {2, 5}]
-    (verdict,) = new_views.verdicts(stored, BoardObservations(tuple(seen)), Views(used, ()))
+    (verdict,) = new_views.verdicts(calibration(), BoardObservations(tuple(seen)), Views(used, ()))
     assert (verdict.level, verdict.about) == (Level.DOUBTFUL, "left")
     assert "2 of 10 images" in verdict.text
     assert "(shots 2, 5)" in verdict.text
+
+
+@pytest.mark.parametrize(("kept", "level"), [(20, Level.DOUBTFUL), (8, Level.GOOD)])
+def test_images_that_the_calibration_was_made_from_do_not_verify_it(kept: int, level: Level) -> None:
+    seen = look(two_heads(), *_boards()).corners
+    covariance = rig_file.Covariance(("left.fx",), np.eye(1), tuple(view.digest for view in seen[:kept]))
+    known = replace(calibration(), covariance=covariance)
+    report = verification.verify(known, BoardObservations(tuple(seen)), ORIGIN)
+    assert report.level == level
+    said = [one for one in report.verdicts if f"{kept} of 20 images are those that it was made from" in one.text]
+    assert len(said) == (level == Level.DOUBTFUL)

@@ -34,7 +34,7 @@ FISHEYE = KannalaBrandt(np.array([0.01, -2e-3]))
 COLOR = Camera(
     640, 480, 500.0, 501.0, 320.0, 240.0, FISHEYE, pose.from_rotation_vector((0.01, -0.2, 3.0), (0.05, 0, 1e-3))
 )
-COVARIANCE = Covariance(("tof.fx", "color.x", "board 0.x"), np.diag([0.25, 1e-8, 1e-6]))
+COVARIANCE = Covariance(("tof.fx", "color.x", "board 0.x"), np.diag([0.25, 1e-8, 1e-6]), ("0f3a", "77c1"))
 NOISE = {"type": "tof_amplitude", "sigma": [0.0015, 0.0005], "sigma_amplitude": 9.0}
 
 CALIBRATION = RigCalibration(
@@ -122,6 +122,7 @@ def test_everything_else_comes_back_too(rig: Path) -> None:
         assert tof.noise.items() >= NOISE.items()
         assert found.covariance.names == COVARIANCE.names
         np.testing.assert_array_equal(found.covariance.matrix, COVARIANCE.matrix)
+        assert found.covariance.views == COVARIANCE.views
 
 
 def test_the_file_tells_people_the_deviation_of_every_parameter(rig: Path) -> None:
