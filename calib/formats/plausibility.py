@@ -1,6 +1,7 @@
 """Implausible cameras: signs of a unit, an image size or a kind of lens that was misread."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
@@ -13,6 +14,11 @@ LARGEST_BASELINE_M = 5.0
 
 #: Least and largest field of view along the width or height of an image [rad], by the focal length alone.
 FIELDS_OF_VIEW = np.deg2rad(1.0), np.deg2rad(170.0)
+
+#: Cameras that are turned by less look the same way [rad].
+SAME_WAY = np.deg2rad(45.0)
+
+_SIDES = (("to the left of", "to the right of"), ("above", "below"), ("behind", "in front of"))
 
 
 def doubts(cameras: Mapping[str, Camera]) -> tuple[str, ...]:
@@ -37,11 +43,48 @@ def doubts(cameras: Mapping[str, Camera]) -> tuple[str, ...]:
     return tuple(found)
 
 
-def baselines(cameras: Mapping[str, Camera]) -> dict[str, tuple[float, float]]:
-    """Distance [m] and angle [rad] of every pair of cameras, by "first, second"."""
-    found = {}
-    for (first, one), (second, other) in combinations(cameras.items(), 2):
-        T = one.T_sr @ other.T_rs
-        cosine = (np.trace(T[:3, :3]) - 1) / 2
-        found[f"{first}, {second}"] = float(np.linalg.norm(T[:3, 3])), float(np.arccos(np.clip(cosine, -1, 1)))
+@dataclass(frozen=True)
+class Baseline:
+    """Place and direction of the second camera of a pair relative to the first.
+
+    Attributes:
+        length: distance [m].
+        angle: by which it is turned [rad].
+        side: where it is for the first one, such as "to the right of".
+    """
+
+    length: float
+    angle: float
+    side: str
+
+
+def baselines(cameras: Mapping[str, Camera]) -> dict[str, Baseline]:
+    """Baseline of every pair of cameras, by "first, second"."""
+    return {
+        f"{first}, {second}": _baseline(one, other)
+        for (first, one), (second, other) in combinations(cameras.items(), 2)
+    }
+
+
+def exchanged(cameras: Mapping[str, Camera]) -> list[str]:
+    """Doubts about pairs that are called left and right, look the same way, and stand the other way round."""
+    found = []
+    for left, one in cameras.items():
+        right = left.replace("left", "right")
+        if left == right or right not in cameras:
+            continue
+        baseline = _baseline(one, cameras[right])
+        if baseline.side == "to the left of" and baseline.angle < SAME_WAY:
+            found.append(
+                f"{right} stands {baseline.length * 1e3:.1f} mm to the left of {left}, as they see it: are their names "
+                "exchanged, or all images mirrored?"
+            )
     return found
+
+
+def _baseline(one: Camera, other: Camera) -> Baseline:
+    T = one.T_sr @ other.T_rs
+    cosine = (np.trace(T[:3, :3]) - 1) / 2
+    axis = int(np.argmax(np.abs(T[:3, 3])))
+    side = _SIDES[axis][int(T[axis, 3] > 0)]
+    return Baseline(float(np.linalg.norm(T[:3, 3])), float(np.arccos(np.clip(cosine, -1, 1))), side)

@@ -93,11 +93,11 @@ def _check(path: Path, cameras: Mapping[str, Camera], unit: str | None) -> None:
     """Refuses what no camera of a rig is, unless the unit was given."""
     for doubt in plausibility.doubts(cameras):
         raise CamerasError(f"{path}: {doubt}")
-    for pair, (length, _) in plausibility.baselines(cameras).items():
-        if length > plausibility.LARGEST_BASELINE_M and unit is None:
+    for pair, how in plausibility.baselines(cameras).items():
+        if how.length > plausibility.LARGEST_BASELINE_M and unit is None:
             raise CamerasError(
-                f"{path}: {pair} are {length:.4g} m apart, if lengths are in metres; say what they are in with --unit, "
-                f"one of {', '.join(UNITS)}"
+                f"{path}: {pair} are {how.length:.4g} m apart, if lengths are in metres; say what they are in with "
+                f"--unit, one of {', '.join(UNITS)}"
             )
 
 

@@ -93,8 +93,8 @@ def run(arguments: argparse.Namespace) -> int:
     for one in lost:
         print(f"abs-service: lost: {one}", file=sys.stderr)
     print(f"wrote {out}: {', '.join(content.cameras)}")
-    for pair, (length, angle) in plausibility.baselines(content.cameras).items():
-        print(f"  {pair}: {length * 1e3:.1f} mm apart, turned by {np.rad2deg(angle):.2f}°")
+    for pair, how in plausibility.baselines(content.cameras).items():
+        print(f"  {pair}: {how.length * 1e3:.1f} mm apart, turned by {np.rad2deg(how.angle):.2f}°")
     return Exit.OK
 
 

@@ -161,8 +161,10 @@ def finish(title: str, task: Task, arguments: argparse.Namespace, found: Materia
     else:
         for line in itertools.chain([assessment.verdict], assessment.reasons[1:], report.cameras(solution)):
             print(line)
-        for pair, (length, angle) in baselines(solution.cameras).items():
-            print(f"{pair}: {length * 1e3:.1f} mm apart, turned by {math.degrees(angle):.2f}°")
+        for pair, how in baselines(solution.cameras).items():
+            first, second = pair.split(", ")
+            turned = f"turned by {math.degrees(how.angle):.2f}°"
+            print(f"{pair}: {how.length * 1e3:.1f} mm apart, {turned}, {second} {how.side} {first}")
         print(f"wrote {', '.join(map(str, written))}")
     return Exit.OK if assessment.trusted else Exit.FAILED
 

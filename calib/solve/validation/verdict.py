@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from calib.formats.plausibility import exchanged
 from calib.solve.calibrate import calibrate
 from calib.solve.solution import Solution
 from calib.solve.validation import projection_uncertainty
@@ -80,6 +81,7 @@ def assess(
     }
     shape = shape_errors(solution, distance, needed_px)
     reasons, contradicting, cause = _unlike(solution, shape, needed_px)
+    reasons += exchanged(solution.cameras)
     reasons += weak_directions(solution, distance)
     reasons += outliers(solution, {one.shot for one in contradicting})
     try:

@@ -42,3 +42,16 @@ def test_a_camera_that_saw_the_board_in_a_small_part_of_its_image_is_not_trusted
     found = judged(places=0.02, tilt=0.7, distance=1.9)
     (reason,) = (reason for reason in found.reasons if "the board was seen in " in reason)
     assert reason.startswith("color: the board was seen in ")
+
+
+def test_a_right_camera_that_stands_to_the_left_of_the_left_one_is_not_trusted() -> None:
+    generator = np.random.default_rng(2)
+    right = replace(CAMERA, T_rs=pose.from_rotation_vector((0, -0.05, 0), (0.1, 0, 0)))
+    heads = {"left": board_views.Head(CAMERA, 0.1), "right": board_views.Head(right, 0.1)}
+    seen = board_views.look(heads, board_views.random_boards(16, generator), generator).corners
+    other = {"left": "right", "right": "left"}
+    for corners, trusted in ((seen, True), ([replace(view, sensor=other[view.sensor]) for view in seen], False)):
+        solution = calibrate(Task({name: SensorTask(1280, 720) for name in heads}, corners, (), "left"))
+        found = assess(solution, 1.0, 10.0)
+        assert found.trusted == trusted, found.verdict
+    assert found.verdict.startswith("Do not trust it yet: right stands 100.")
