@@ -19,6 +19,7 @@ from calib.calibration_check.changes import PairChange, contradicting, pair_chan
 from calib.calibration_check.comparison import NOT_COMPARED, Comparison, compare
 from calib.calibration_check.hypotheses import TERMS, Kind
 from calib.calibration_check.misprint import misprint
+from calib.calibration_check.optics import OpticsChange, optics_change
 from calib.calibration_check.stored import Stored, Views, usable
 from calib.solve.validation.distance_errors import Displaced, Misread
 
@@ -44,6 +45,7 @@ class Verification:
 
     Attributes:
         fits: residuals of sensors with corners, by sensor.
+        optics: changes of their focal lengths and principal points, where those can be told.
         focal_px: their focal lengths.
         expected_px: their reprojection errors at calibration.
         biases: distance bias of sensors with corners and distances.
@@ -57,6 +59,7 @@ class Verification:
     """
 
     fits: Mapping[str, CornerFit]
+    optics: Mapping[str, OpticsChange]
     focal_px: Mapping[str, float]
     expected_px: Mapping[str, float]
     biases: Mapping[str, DistanceBias]
@@ -93,7 +96,7 @@ def verify(known: RigCalibration, seen: BoardObservations, provenance: Provenanc
         *tables.pairs(found.changes, found.comparison),
     ]
     sections += [tables.fields(known, found.fits), *tables.refusals(seen)]
-    values = tables.values(found.fits, found.biases, found.changes, found.comparison)
+    values = tables.values(found.fits, found.optics, found.biases, found.changes, found.comparison)
     said = verdicts(found)
     # A good board and good cameras need no solve of their own.
     if said[0].level > Level.GOOD and (wrong_print := misprint(stored, new_views.thinned(used), SPOILT_PX)):
@@ -104,7 +107,7 @@ def verify(known: RigCalibration, seen: BoardObservations, provenance: Provenanc
 def verdicts(found: Verification) -> list[Verdict]:
     """Verdicts, the worst first."""
     motion = max((_level(change) for change in found.changes if change.is_significant), default=Level.GOOD)
-    fits = [_of_fit(name, fit, found.expected_px[name], found.likelier[name]) for name, fit in found.fits.items()]
+    fits = [_of_fit(found, name) for name in found.fits]
     scatter = _of_scatter(found, max(one.level for one in fits))
     # Shots that do not agree with each other say nothing of a change that lasts.
     disagree = any(one.level == Level.BAD for one in scatter)
@@ -134,6 +137,7 @@ def _found(known: RigCalibration, stored: Stored, seen: BoardObservations, used:
     baseline = {name: known.sensors[name].residuals.corners_px for name in observers}
     return Verification(
         {name: corner_fit(stored, views, name) for name in observers},
+        {name: change for name in observers if (change := optics_change(stored, views, name)) is not None},
         {name: sensors[name].camera.fx for name in observers},
         {name: BASELINE_PX if px is None else px for name, px in baseline.items()},
         {name: bias for name, bias in biases.items() if bias is not None},
@@ -159,13 +163,22 @@ def _compared(stored: Stored, views: Views, changes: Sequence[PairChange]) -> Co
     return compare(stored, views.of(together, shots)) if together else NOT_COMPARED
 
 
-def _of_fit(name: str, fit: CornerFit, baseline: float, likelier: str) -> Verdict:
-    said = f"corners miss by {fit.rms:.2f} px; {baseline:.2f} px are usual for it."
-    if fit.rms <= DOUBTFUL_RATIO * baseline or fit.rms < UNNOTICED_PX:
-        return Verdict(Level.GOOD, f"still projects as it was calibrated: {said}", about=name)
-    level = Level.BAD if fit.rms > BAD_RATIO * baseline else Level.DOUBTFUL
-    advice = "Was it refocused, zoomed or set to another mode? If so, calibrate its intrinsics again."
-    if likelier:
+def _of_fit(found: Verification, name: str) -> Verdict:
+    rms, baseline, optics = found.fits[name].rms, found.expected_px[name], found.optics.get(name)
+    said = f"corners miss by {rms:.2f} px; {baseline:.2f} px are usual for it."
+    level = Level.GOOD
+    if rms > DOUBTFUL_RATIO * baseline and rms >= UNNOTICED_PX:
+        level = Level.BAD if rms > BAD_RATIO * baseline else Level.DOUBTFUL
+    if optics is not None and optics.is_significant and optics.shift_px > UNNOTICED_PX:
+        level = max(level, Level.BAD if optics.shift_px > SPOILT_PX else Level.DOUBTFUL)
+        said = f"{optics}; {said}"
+    if level == Level.GOOD:
+        return Verdict(level, f"still projects as it was calibrated: {said}", about=name)
+    advice = (
+        "Was it refocused, zoomed or set to another mode, is another board bent, or are these images of another "
+        "camera, cropped or resized? If it changed, calibrate its intrinsics again."
+    )
+    if likelier := found.likelier[name]:
         advice = f"The camera of {likelier} fits these corners by far better: are they its images?"
     return Verdict(level, f"no longer projects as it was calibrated: {said}", advice, name)
 

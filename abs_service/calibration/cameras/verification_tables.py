@@ -13,6 +13,7 @@ from abs_service.report.content import Column, Section, Table, drawing
 from calib.calibration_check.alone import CornerFit, DistanceBias
 from calib.calibration_check.changes import PairChange
 from calib.calibration_check.comparison import Comparison
+from calib.calibration_check.optics import OpticsChange
 
 
 def sensors(
@@ -100,6 +101,7 @@ def refusals(seen: BoardObservations) -> list[Section]:
 
 def values(
     fits: Mapping[str, CornerFit],
+    optics: Mapping[str, OpticsChange],
     biases: Mapping[str, DistanceBias],
     changes: Sequence[PairChange],
     comparison: Comparison,
@@ -107,6 +109,13 @@ def values(
     """Machine-readable values."""
     return {
         "sensors": {name: {"views": fit.views, "corners_px": fit.rms} for name, fit in fits.items()},
+        "optics": {
+            name: {
+                "focal": one.values[0], "center_px": one.values[1:], "sigmas": one.sigmas, "shift_px": one.shift_px,
+                "chi_squared": one.squared, "significant": one.is_significant,
+            }
+            for name, one in optics.items()
+        },
         "distance_bias_m": {name: bias.mean for name, bias in biases.items()},
         "pairs": [
             {
