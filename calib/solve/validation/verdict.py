@@ -95,7 +95,9 @@ def assess(
     reasons += _narrow(solution, images)
     reasons += [str(one) for one in shape if not one.is_misprint]  # why the halves may differ
     reasons = [*other_lenses(solution), *cause, *reasons] if reasons else []
-    verdict = f"Do not trust it yet: {reasons[0]}" if reasons else _praise(agreements, images, known, distance)
+    kept = [name for name, sensor in solution.task.sensors.items() if sensor.fixed_intrinsics]
+    praise = _praise(agreements, images, known, distance) + _given(kept)
+    verdict = f"Do not trust it yet: {reasons[0]}" if reasons else praise
     return Assessment(not reasons, verdict, reasons, contradicting, agreements, images, pairs, distance)
 
 
@@ -170,6 +172,12 @@ def _praise(
             f"{worst.predicted_px:.2g} px were predicted ({worst.of}, the worst)"
         )
     return text + "."
+
+
+def _given(kept: Sequence[str]) -> str:
+    """Sentence on sensors whose intrinsics were not estimated; "" without any."""
+    names = " and ".join(kept)
+    return f" That takes the intrinsics of {names} as given." if kept else ""
 
 
 def _disagreeing(agreements: Sequence[Agreement], needed_px: float) -> list[str]:

@@ -55,3 +55,14 @@ def test_a_right_camera_that_stands_to_the_left_of_the_left_one_is_not_trusted()
         found = assess(solution, 1.0, 10.0)
         assert found.trusted == trusted, found.verdict
     assert found.verdict.startswith("Do not trust it yet: right stands 100.")
+
+
+def test_trust_says_which_intrinsics_were_taken_as_given() -> None:
+    generator = np.random.default_rng(2)
+    right = replace(CAMERA, T_rs=pose.from_rotation_vector((0, -0.05, 0), (0.1, 0, 0)))
+    heads = {"left": board_views.Head(CAMERA, 0.1), "right": board_views.Head(right, 0.1)}
+    seen = board_views.look(heads, board_views.random_boards(12, generator), generator).corners
+    kept = {name: SensorTask(1280, 720, factory=(CAMERA,), fixed_intrinsics=True) for name in heads}
+    found = assess(calibrate(Task(kept, seen, (), "left")), 1.0, 10.0)
+    assert found.trusted, found.verdict
+    assert found.verdict.endswith(" That takes the intrinsics of left and right as given.")
