@@ -41,6 +41,8 @@ DRAIN_S = 2.5
 INTERRUPTED_S = 60.0
 #: Time between two looks whether something is to be recovered [s].
 RECOVERY_S = 10.0
+#: By so much a file system's clock may be behind: it has the time of the last tick of the system.
+TICK_S = 0.1
 #: Niceness: capture and tracking go first where cores are scarce; recording has a queue.
 NICE = 5
 
@@ -164,7 +166,7 @@ def recover_leftovers(settings: RecorderSettings, health: Health, begun_s: float
     remove_interrupted(settings.directory)
     for path, changed_s in leftovers(settings.directory).items():
         try:
-            if changed_s >= begun_s:
+            if changed_s >= begun_s - TICK_S:
                 continue
             if shutil.disk_usage(settings.directory).free < path.stat().st_size + settings.minimum_free_bytes:
                 # Recording goes first: the copy must not take the room that it needs.

@@ -42,7 +42,7 @@ class Settings:
         step: initial standard deviation of its candidates, in deviations of the priors.
         fallback_above: CMA-ES starts when the outlier share after the descent exceeds its running mean by this.
         fallback_until: CMA-ES continues in the next frames until that excess is below this.
-        restarts: maximum number of times that the population doubles in the first frame.
+        restarts: maximum number of times that the population doubles in the first two frames.
     """
 
     steps: Annotated[int, Ge(1)] = 12

@@ -89,7 +89,7 @@ class AskAndTellSettings:
         minimum_step: minimum step size at the start of a frame, so that the search can follow motion.
         tolerance: the search has converged when costs differ by less than this [nats], within a generation and between
             the minima of five.
-        restarts: maximum number of times that the population doubles in the first frame.
+        restarts: maximum number of times that the population doubles in the first two frames.
     """
 
     population: Annotated[int, Ge(0)] = 0

@@ -47,6 +47,8 @@ def test_a_file_that_a_recorder_has_made_this_moment_stays(tmp_path):
     health = Health(LoopbackBus(), "record", HeaderFactory("demo", WallClock()))
     settings = RecorderSettings(tmp_path, "demo", "", minimum_free_bytes=0)
     record.recover_leftovers(settings, health, time.time() - 3600)  # both are newer than the recorder
+    tick_s = (tmp_path / "b.mcap.active").stat().st_mtime + 0.01  # the file system's clock is behind by as much
+    record.recover_leftovers(settings, health, tick_s)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.mcap.active", "b.mcap.active"]
     record.recover_leftovers(settings, health, LATER_S)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.mcap.active", "b.mcap.broken"]
