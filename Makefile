@@ -14,7 +14,7 @@ test: .venv/.all ## the tests without the slow ones: make test ARGS="tests/calib
 	@OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n auto --dist loadgroup --max-worker-restart 0 -m "not slow and not hardware" $(ARGS)
 check: lint test ## everything a change has to pass
 lint: .venv/.all ## format, style, types, import contracts
-	@$(BIN)/ruff format --check . && $(BIN)/ruff check . && $(BIN)/basedpyright --pythonpath $(BIN)/python && $(BIN)/lint-imports
+	@$(BIN)/ruff format --check . && $(BIN)/ruff check . && $(BIN)/basedpyright --threads 2 --pythonpath $(BIN)/python && $(BIN)/lint-imports
 format: .venv/.all ## rewrite the code in the project's format
 	@$(BIN)/ruff format . && $(BIN)/ruff check --fix .
 evaluate: .venv/.all ## measure how well it tracks: make evaluate ARGS="all --quick --out results", ARGS=list
