@@ -11,13 +11,14 @@ from collections.abc import Iterator
 from dataclasses import fields, replace
 from functools import cache
 from importlib import import_module
-from importlib.metadata import EntryPoints, distributions, entry_points
+from importlib.metadata import distributions
 from pathlib import Path
 from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
 from abs_service.config.problems import Problem, ProblemsError, allowed_instead, from_pydantic, unknown_key
+from drivers.opening import entry_points
 
 
 def available(*packages: str) -> list[str]:
@@ -121,19 +122,12 @@ def _is_part(package: str, name: str) -> bool:
 
 def _installed(package: str) -> dict[str, str]:
     """Modules by name that installed distributions declare for a package."""
-    return {point.name: point.value for point in _declared().select(group=package)}
-
-
-@cache
-def _declared() -> EntryPoints:
-    """Entry points of all distributions, read once in a process: that takes 12 ms, and a rig file has a dozen parts."""
-    found: Any = entry_points()  # until Python 3.11 of another class, with the same `select`
-    return found
+    return {point.name: point.value for point in entry_points(group=package)}
 
 
 def _broken(packages: tuple[str, ...], module: str) -> str:
     """Message about an installed module that cannot be used; "" if it can, or if it is one of ours."""
-    for point in (point for package in packages for point in _declared().select(group=package, value=module)):
+    for point in (point for package in packages for point in entry_points(group=package, value=module)):
         declared = f"entry point {point.name} = {module} of {point.dist.name if point.dist else 'a distribution'}"
         try:
             if not hasattr(import_module(module), "Settings"):

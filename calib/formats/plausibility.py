@@ -57,6 +57,10 @@ class Baseline:
     angle: float
     side: str
 
+    def __str__(self) -> str:
+        """Distance and angle, to check with a ruler."""
+        return f"{self.length * 1e3:.1f} mm apart, turned by {np.rad2deg(self.angle):.2f}°"
+
 
 def baselines(cameras: Mapping[str, Camera]) -> dict[str, Baseline]:
     """Baseline of every pair of cameras, by "first, second"."""

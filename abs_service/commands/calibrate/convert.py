@@ -21,8 +21,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from abs_service.bus import keys
 from abs_service.calibration.files import exchange, rig_file
 from abs_service.commands.calibrate import camera_files
@@ -94,7 +92,7 @@ def run(arguments: argparse.Namespace) -> int:
         print(f"abs-service: lost: {one}", file=sys.stderr)
     print(f"wrote {out}: {', '.join(content.cameras)}")
     for pair, how in plausibility.baselines(content.cameras).items():
-        print(f"  {pair}: {how.length * 1e3:.1f} mm apart, turned by {np.rad2deg(how.angle):.2f}°")
+        print(f"  {pair}: {how}")
     return Exit.OK
 
 

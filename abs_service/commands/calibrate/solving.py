@@ -163,8 +163,7 @@ def finish(title: str, task: Task, arguments: argparse.Namespace, found: Materia
             print(line)
         for pair, how in baselines(solution.cameras).items():
             first, second = pair.split(", ")
-            turned = f"turned by {math.degrees(how.angle):.2f}°"
-            print(f"{pair}: {how.length * 1e3:.1f} mm apart, {turned}, {second} {how.side} {first}")
+            print(f"{pair}: {how}, {second} {how.side} {first}")
         print(f"wrote {', '.join(map(str, written))}")
     return Exit.OK if assessment.trusted else Exit.FAILED
 

@@ -1,3 +1,4 @@
+import importlib.metadata
 import sys
 from pathlib import Path
 
@@ -5,6 +6,7 @@ import pytest
 
 from abs_service.config import plugins
 from abs_service.config.problems import ProblemsError
+from drivers import opening
 
 BENDY = """
 from dataclasses import dataclass
@@ -73,8 +75,11 @@ def test_parts_that_are_not_configured_are_not_imported(package, tmp_path):
 
 
 def test_installed_distributions_are_read_once(package, monkeypatch):
-    looks, entry_points = [], plugins.entry_points
-    monkeypatch.setattr(plugins, "entry_points", lambda **chosen: looks.append(chosen) or entry_points(**chosen))
+    looks, entry_points = [], importlib.metadata.entry_points
+    monkeypatch.setattr(
+        importlib.metadata, "entry_points", lambda **chosen: looks.append(chosen) or entry_points(**chosen)
+    )
+    opening.declared.cache_clear()
     for _ in range(3):
         plugins.load(package, {"type": "bendy"}, Path())
     assert len(looks) <= 1

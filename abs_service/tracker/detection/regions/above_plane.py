@@ -12,7 +12,7 @@ from abs_service.tracker.detection.depth_view import DepthView, limited
 from abs_service.tracker.detection.initial_detection import DetectionError
 from abs_service.tracker.detection.plausibility import lining
 from abs_service.tracker.detection.segments.depth_segments import deepest_pixel, large_surfaces, surface_at
-from abs_service.tracker.detection.segments.dominant_plane import CLEARANCE_M, heights
+from abs_service.tracker.detection.segments.dominant_plane import CLEARANCE_M, above_plane
 from abs_service.tracker.detection.segments.within import Polygon, Restricted, restricted
 
 #: A surface with less than this share of a wall's pixels says nothing against it.
@@ -75,10 +75,7 @@ class Settings:
 
     def _above(self, view: DepthView) -> DepthView:
         """The view without the plane and everything beyond it; DetectionError if there is no plane."""
-        height = heights(view, self.clearance_m)
-        with np.errstate(invalid="ignore"):
-            above = height > self.clearance_m
-        return limited(view, above)
+        return limited(view, above_plane(view, self.clearance_m))
 
     def _selected(self, view: DepthView) -> NDArray[np.bool_]:
         """Pixels (height, width) of the object among those above the plane; DetectionError if there is none."""

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.detection.depth_view import DepthView
 from abs_service.tracker.detection.initial_detection import DetectionError
-from abs_service.tracker.detection.segments.dominant_plane import CLEARANCE_M, heights
+from abs_service.tracker.detection.segments.dominant_plane import CLEARANCE_M, above_plane
 from abs_service.tracker.detection.segments.seeds import Seeded, alike, joined
 
 #: Number of colours that the core of an object is described by: of its print, in light and shade.
@@ -56,21 +56,19 @@ def grown_by_color(seeded: Seeded, view: DepthView) -> NDArray[np.bool_]:
         raise DetectionError('no colour camera (noise type "color") sees the seed: grow = "depth" needs none')
     picture = _Picture(rgb, _filled(rgb, known))
     object_ = _grown(core, core, surface, surface, picture)
-    above = _above_plane(view)
+    above = _standing(view)
     if np.count_nonzero(object_ & above) > np.count_nonzero(object_) / 2 and (core & above).any():
         standing = _part_with(surface & above, core & above) & surface & above
         object_ = _grown(core & standing, (object_ | core) & standing, standing, surface, picture)
     return object_ & seeded.surface
 
 
-def _above_plane(view: DepthView) -> NDArray[np.bool_]:
+def _standing(view: DepthView) -> NDArray[np.bool_]:
     """Pixels (height, width) above the dominant plane; none if there is no plane."""
     try:
-        height = heights(view, CLEARANCE_M)
+        return above_plane(view, CLEARANCE_M)
     except DetectionError:
         return np.zeros(view.distance.shape, np.bool_)
-    with np.errstate(invalid="ignore"):
-        return np.asarray(height > CLEARANCE_M)
 
 
 def _grown(

@@ -1,4 +1,4 @@
-"""The plane with most returns of a depth image, such as a table or a wall, and heights above it."""
+"""The plane with most returns of a depth image, such as a table or a wall, and what is above it."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,8 +18,8 @@ CLEARANCE_M = 0.01
 MAX_PIXELS = 20_000
 
 
-def heights(view: DepthView, clearance_m: float) -> NDArray[np.float64]:
-    """Height (height, width) [m] of every pixel above the dominant plane, positive on the camera's side; else NaN.
+def above_plane(view: DepthView, clearance_m: float) -> NDArray[np.bool_]:
+    """Pixels (height, width) above the dominant plane, on the camera's side.
 
     The random generator is seeded, so that the same image has the same plane.
 
@@ -35,12 +35,13 @@ def heights(view: DepthView, clearance_m: float) -> NDArray[np.float64]:
     height = (1 - points_s @ q) / np.linalg.norm(q)
     with np.errstate(invalid="ignore"):
         share = np.count_nonzero(np.abs(height) <= clearance_m) / np.count_nonzero(view.measured)
+        above = height > clearance_m
     if share < MIN_SHARE:
         raise DetectionError(
             f"no plane: the largest has {share:.0%} of the returns within clearance_m = {clearance_m:g} m, "
             f"{MIN_SHARE:.0%} needed"
         )
-    return height
+    return above
 
 
 def _dominant_plane(view: DepthView, tolerance: float) -> NDArray[np.float64]:

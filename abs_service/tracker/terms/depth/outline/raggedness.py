@@ -10,13 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.terms.depth.outline.rim_motion import LEAST_OF_A_SIDE, without_motion
+from abs_service.tracker.terms.image_noise import NORMAL_MEDIAN
 from abs_service.tracker.terms.median import median
 
 #: Weight of a new frame in the running mean square.
 NEW = 0.1
-
-#: Median of absolute normal values, in deviations.
-MEDIAN_DEVIATION = 0.6745
 
 #: Edges are compared within so many pixels of the outline; farther ones are off it for other reasons.
 LIMIT_PX = 8.0
@@ -64,7 +62,7 @@ class Raggedness:
         if self._most <= self._least or near < max(LEAST_OF_A_SIDE, len(known) / 2):
             return
         left = without_motion(np.clip(away[known], -LIMIT_PX, LIMIT_PX), directions[known], places[known])
-        scatter = median(np.abs(left)) / MEDIAN_DEVIATION
+        scatter = median(np.abs(left)) / NORMAL_MEDIAN
         self._square += NEW * (scatter**2 - self._square)
         beyond = SHARE**2 * max(self._square - USUAL_PX**2, 0.0)
         self.deviation = float(min(np.sqrt(self._least**2 + beyond), self._most))
