@@ -92,9 +92,9 @@ def _result(scheme: str, search: Future[list[Found]], timeout_s: float) -> list[
     return [Found(DeviceInfo(f"{scheme}://", scheme, ""), Availability.FAULTY, reason, remedy)]
 
 
-def entry_points(**chosen: str) -> importlib.metadata.EntryPoints:
-    """Entry points of installed distributions, chosen by their group, name or value."""
-    return declared().select(**chosen)
+def entry_points(group: str) -> importlib.metadata.EntryPoints:
+    """Entry points of a group, of all installed distributions."""
+    return declared().select(group=group)
 
 
 @cache
@@ -107,7 +107,7 @@ def declared() -> importlib.metadata.EntryPoints:
 def _modules() -> dict[str, str]:
     """Modules by scheme: of this package, and of installed distributions (entry points of the group `drivers`)."""
     own = {module.name: f"{drivers.__name__}.{module.name}" for module in pkgutil.iter_modules(drivers.__path__)}
-    return own | {point.name: point.value for point in entry_points(group=drivers.__name__)}
+    return own | {point.name: point.value for point in entry_points(drivers.__name__)}
 
 
 def _driver_of(uri: str) -> ModuleType:

@@ -122,12 +122,12 @@ def _is_part(package: str, name: str) -> bool:
 
 def _installed(package: str) -> dict[str, str]:
     """Modules by name that installed distributions declare for a package."""
-    return {point.name: point.value for point in entry_points(group=package)}
+    return {point.name: point.value for point in entry_points(package)}
 
 
 def _broken(packages: tuple[str, ...], module: str) -> str:
     """Message about an installed module that cannot be used; "" if it can, or if it is one of ours."""
-    for point in (point for package in packages for point in entry_points(group=package, value=module)):
+    for point in (point for package in packages for point in entry_points(package) if point.value == module):
         declared = f"entry point {point.name} = {module} of {point.dist.name if point.dist else 'a distribution'}"
         try:
             if not hasattr(import_module(module), "Settings"):
