@@ -13,6 +13,7 @@ from abs_service.api import arguments, checks
 from abs_service.api import noise as noise_models
 from abs_service.api.arguments import ModelPart, NoisePart, Table
 from abs_service.api.arrays import FrameBuilder, object_mask
+from abs_service.api.blas import one_blas_thread
 from abs_service.api.checks import ArgumentError
 from abs_service.api.estimate import Estimate, with_mesh
 from abs_service.api.region_or_mask import RegionOrMask
@@ -21,7 +22,7 @@ from abs_service.pairing.observation import ObservationError
 from abs_service.tracker.detection.initial_detection import DetectionError
 from abs_service.tracking.observer import missing_streams
 from abs_service.tracking.session import TrackingSession
-from abs_service.tracking.tracked_sets import track_sets
+from abs_service.tracking.tracked_sets import TrackedSet, track_sets
 from abs_service.tracking.warmup.board import warm_up
 from calib.camera import Camera
 from calib.noise.base import NoiseError
@@ -206,8 +207,15 @@ class Tracker:
         warm_up(self._rig, self._plan)
 
     def _track(self, frame_sets: Iterable[FrameSet]) -> Iterator[Estimate]:
+        tracked = track_sets(self._session, frame_sets, time.monotonic_ns, self._budget_ns)
         try:
-            for _, found, _ in track_sets(self._session, frame_sets, time.monotonic_ns, self._budget_ns):
-                yield with_mesh(found, self._session.mesh, self._session.mesh_version)
+            while (found := self._next(tracked)) is not None:
+                yield found
         except ObservationError as error:
             raise ArgumentError(str(error)) from None
+
+    def _next(self, tracked: Iterator[TrackedSet]) -> Estimate | None:
+        with one_blas_thread:
+            for _, found, _ in tracked:
+                return with_mesh(found, self._session.mesh, self._session.mesh_version)
+        return None

@@ -1,0 +1,69 @@
+"""A program's BLAS has one thread while a frame is computed, and its own number before and after."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from itertools import islice
+from pathlib import Path
+
+import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
+
+import abs_service as a
+from abs_service.api.blas import one_blas_thread
+from drivers.contract.frame import Frame
+
+SAMPLE = Path(__file__).parents[3] / "recordings" / "sample.mcap"
+
+
+def threads() -> set[int]:
+    return {library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"}
+
+
+@pytest.fixture(autouse=True)
+def two_threads() -> Iterator[None]:
+    with threadpool_limits(2, user_api="blas"):
+        yield
+
+
+@dataclass
+class Looking:
+    """A recording whose reader looks at BLAS whenever the tracker asks for an image."""
+
+    recording: a.Recording
+    seen: list[set[int]] = field(default_factory=list)
+
+    @property
+    def path(self) -> Path:
+        return self.recording.path
+
+    @property
+    def streams(self):
+        return self.recording.streams
+
+    def frames(self) -> Iterator[Frame]:
+        for frame in self.recording.frames():
+            self.seen.append(threads())
+            yield frame
+
+
+def test_the_last_one_inside_gives_the_threads_back():
+    with one_blas_thread:
+        with one_blas_thread:
+            assert threads() == {1}
+        assert threads() == {1}
+    assert threads() == {2}
+
+
+def test_an_error_inside_gives_the_threads_back():
+    with pytest.raises(KeyError), one_blas_thread:
+        raise KeyError
+    assert threads() == {2}
+
+
+def test_a_frame_is_computed_with_one_thread():
+    recording = a.open_recording(SAMPLE)
+    looking = Looking(recording)
+    for _ in islice(recording.rig.tracker().replay(looking), 3):
+        assert threads() == {2}
+    assert looking.seen
+    assert set.union(*looking.seen) == {1}
