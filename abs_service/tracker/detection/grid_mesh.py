@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection
+from abs_service.tracker.detection.sparse_returns import sparse_gaps
 from abs_service.tracker.mesh import Mesh, pieces_of
 from calib import pose
 
@@ -50,11 +51,13 @@ def grid_mesh(detection: InitialDetection) -> Mesh:
     """
     distance, camera = detection.distance, detection.camera
     valid = np.isfinite(distance)
+    gaps = sparse_gaps(valid)
+    valid |= gaps
     spacing = float(np.sqrt(np.count_nonzero(valid) / detection.vertices))
     grid = _grid(np.argwhere(valid)[:, ::-1].astype(np.float32), spacing)
     rows, columns = grid.shape[:2]
     pixels = grid.reshape(-1, 2)
-    at_grid, deviation = _local_planes(pixels, distance, max(0.75 * spacing, MIN_RADIUS_PX))
+    at_grid, deviation = _local_planes(pixels, distance, gaps, max(0.75 * spacing, MIN_RADIUS_PX))
     place = np.where(np.isfinite(at_grid), np.arange(rows * columns), -1).reshape(rows, columns)
     positions = pose.transform(camera.T_rs, camera.directions(pixels) * at_grid[:, None])
     faces = _without_islands(_without_jumps(positions, triangles(place)))
@@ -92,12 +95,13 @@ def _cell_centers(length: float, spacing: float) -> NDArray[np.float64]:
 
 
 def _local_planes(
-    pixels: NDArray[np.float64], distance: NDArray[np.float32], radius: float
+    pixels: NDArray[np.float64], distance: NDArray[np.float32], gaps: NDArray[np.bool_], radius: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Distance [m] at pixel coordinates (g, 2) from a plane fitted around each, and its standard deviation [m].
 
-    Both are NaN off the object. The deviation of a single pixel is estimated from the residuals of all planes together,
-    because a single plane may have no more pixels than coefficients.
+    Both are NaN off the object; the pixels `gaps` (height, width) are on it, without a return. The deviation of a
+    single pixel is estimated from the residuals of all planes together, because a single plane may have no more pixels
+    than coefficients.
     """
     reach = int(np.ceil(radius))
     steps = np.stack(np.meshgrid(np.arange(-reach, reach + 1), np.arange(-reach, reach + 1)), axis=-1).reshape(-1, 2)
@@ -108,9 +112,11 @@ def _local_planes(
     column, row = np.moveaxis(np.where(inside[..., None], around, 0), -1, 0)
     values = np.where(within & inside, distance[row, column], np.nan).astype(np.float64)
     near = np.abs(values - _row_medians(values)) < LARGEST_RELIEF_M
-    least = np.maximum(MIN_COVER * np.count_nonzero(within, axis=1), 3)
     known = np.isfinite(values)
-    steep = np.flatnonzero((np.count_nonzero(near, axis=1) < least) & (np.count_nonzero(known, axis=1) >= least))
+    area, seen = np.count_nonzero(within, axis=1), np.count_nonzero(known, axis=1)
+    bridged = np.count_nonzero(within & inside & gaps[row, column], axis=1)
+    least = np.max([MIN_COVER * area - bridged, MIN_COVER * seen, np.full(len(area), 3)], axis=0)
+    steep = np.flatnonzero((np.count_nonzero(near, axis=1) < least) & (seen >= least))
     near[steep] = np.abs(values[steep] - _planes(values[steep], offset[steep], known[steep])[0]) < LARGEST_BEND_M
     count = np.count_nonzero(near, axis=1)
     usable = np.flatnonzero(count >= least)

@@ -10,6 +10,7 @@ from abs_service.tracker.detection.depth_view import DepthView
 from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection
 from abs_service.tracker.detection.plausibility import LARGEST_M, LARGEST_SCENE_M, MAX_POINTS, check_extent
 from abs_service.tracker.detection.regions.base import Region
+from abs_service.tracker.detection.sparse_returns import filled
 from calib.noise.base import DepthNoise, subtract_mean_offset
 from calib.noise.fit.scatter import scatter
 from calib.rig import Rig
@@ -34,15 +35,15 @@ def detect_object(
         raise DetectionError(f"no depth image from {reference} yet")
     distance = subtract_mean_offset(sensor.noise, image.distance, image.amplitude)
     pictures = [(rig.sensors[n].camera, i.rgb) for n, i in observation.images.items() if isinstance(i, ColorImage)]
-    view = DepthView.of(distance, sensor.camera, pictures, observation.t_host_ns)
+    view = DepthView.of(filled(distance), sensor.camera, pictures, observation.t_host_ns)
     check_extent(view.points_r[view.measured], "everything in sight", LARGEST_SCENE_M, sensor.head)
     inside = region.select(view)
     check_extent(view.points_r[inside], "the object", LARGEST_M, sensor.head)
-    distance = np.where(inside, view.distance, np.nan).astype(np.float32)
+    own = np.where(inside, distance, np.nan).astype(np.float32)
     deviation = _median_deviation(sensor.noise, image, inside)
-    count = resolution.vertices(int(np.isfinite(distance).sum())) if vertices == "auto" else vertices
-    scale = _noise_scale(sensor.noise, image, view.distance, inside)
-    return InitialDetection(distance, sensor.camera, count, view.distance, scale * deviation, scale)
+    count = resolution.vertices(int(np.isfinite(own).sum())) if vertices == "auto" else vertices
+    scale = _noise_scale(sensor.noise, image, distance, inside)
+    return InitialDetection(own, sensor.camera, count, distance, scale * deviation, scale)
 
 
 def _noise_scale(

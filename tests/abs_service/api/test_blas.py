@@ -1,6 +1,6 @@
 """A program's BLAS has one thread while a frame is computed, and its own number before and after."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
@@ -30,14 +30,11 @@ class Looking:
     """A recording whose reader looks at BLAS whenever the tracker asks for an image."""
 
     recording: a.Recording
+    path: Path = SAMPLE
     seen: list[set[int]] = field(default_factory=list)
 
     @property
-    def path(self) -> Path:
-        return self.recording.path
-
-    @property
-    def streams(self):
+    def streams(self) -> Mapping[str, int]:
         return self.recording.streams
 
     def frames(self) -> Iterator[Frame]:

@@ -23,7 +23,7 @@ def test_a_color_camera_that_starts_late_is_not_ignored_for_ever():
 
 
 def test_a_camera_that_starts_while_the_object_cannot_be_detected_waits_with_a_warning():
-    """The object stays tracked by what was known of it."""
+    """The object stays tracked by what was known of it; if it is lost, it is looked for again within a second."""
 
     def change(k: int, frames: list[Frame]) -> list[Frame]:
         if k < 30:
@@ -31,7 +31,7 @@ def test_a_camera_that_starts_while_the_object_cannot_be_detected_waits_with_a_w
         return frames if k >= 40 else [halved(frame) if frame.kind == Kind.DEPTH else frame for frame in frames]
 
     tracker = TrackingSession(RIG, default_plan())
-    steps = list(drive(tracker, SHEET, range(27, 50), change))
+    steps = list(drive(tracker, SHEET, range(27, 60), change))
     (warning,) = steps[5].estimate.warnings
     assert warning.startswith("not used yet: color (")
     assert (tracker.mesh_version, tracker.made_ns >= SHEET.time_ns(40)) == (2, True)

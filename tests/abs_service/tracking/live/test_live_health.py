@@ -67,7 +67,7 @@ def test_what_the_residuals_say_of_the_noise_models_is_in_health(bench):
 
 def test_doubts_about_the_object_are_in_every_state_and_in_health():
     bench = Bench(region=box.Settings((-9.0, -9.0, 0.0), (9.0, 9.0, 9.0)))
-    for k in range(2):
+    for k in (3, 4):  # from some exposures, no model of wall and sheet together can be made
         bench.expose(k)
         bench.live.process_next()
     first, second = bench.states
