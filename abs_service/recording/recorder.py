@@ -30,6 +30,9 @@ QUERY_S = 1.0
 LOOK_S = 1.0
 #: Time between two attempts to record after a failure [s].
 RETRY_S = 1.0
+#: Doublings of that time at most, one for each file that failed before its first flush: a disk may take the beginning
+#: of every file, and each one is left.
+DOUBLINGS = 5
 #: Time between two looks whether there is something to record [s].
 IDLE_S = 0.05
 #: Why a file ends when the trigger does.
@@ -84,6 +87,7 @@ class Recorder:
         )
         self._stopping = threading.Event()
         self._failed = ""
+        self._left = 0  # files in a row that failed before their first flush
         self._mount = Path("/")  # of the disk that has the recordings
         self._losses = Losses(health)
         self.stall = DiskStall(health, clock.monotonic, lambda: self._queue.size)
@@ -137,7 +141,7 @@ class Recorder:
                 continue
             if self._stopping.is_set():
                 break
-            self._stopping.wait(self._retry_s)
+            self._stopping.wait(self._retry_s * 2 ** min(self._left, DOUBLINGS))
         self._queue.drop_all()
 
     def _attempt(self) -> bool:
@@ -168,6 +172,7 @@ class Recorder:
             settings.chunk_bytes,
             self._open_file,
         )
+        self._left += 1
         self._mount, self._finished = folder.mount_point(settings.directory), self.written
         self._health.label("file", take.path.name)
         self._health.count("files")
@@ -222,6 +227,7 @@ class Recorder:
     def _flush(self, take: Take) -> None:
         take.flush()
         self._writer.saved()
+        self._left = 0
         self._measure(take)
         if self._failed:
             _log.warning("recording again, to %s", take.path.name)
