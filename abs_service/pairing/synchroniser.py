@@ -1,6 +1,6 @@
 """Groups frames of several streams by exposure time. Deterministic: no thread, no clock."""
 
-from collections import Counter
+from collections import Counter, defaultdict, deque
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from types import MappingProxyType
@@ -12,6 +12,8 @@ from drivers.contract.frame import Frame, FrameSet
 DEPTH = 32
 #: So many frames in a row with stamps in the future are no accident.
 FUTURE_IN_A_ROW = 15
+#: Of so many latest frames of a stream, so many that are stale are no accident.
+LATEST, MANY = 30, 15
 
 
 class Synchroniser:
@@ -51,6 +53,7 @@ class Synchroniser:
         self._seq = 0
         self._rejected: Counter[str] = Counter()
         self._in_future: Counter[Key] = Counter()  # in a row
+        self._stale: defaultdict[Key, deque[bool]] = defaultdict(lambda: deque(maxlen=LATEST))
 
     @property
     def tolerance_ns(self) -> int:
@@ -69,13 +72,20 @@ class Synchroniser:
 
     @property
     def doubt(self) -> str:
-        """Streams whose latest frames are all of the future, and what to do; "" if there are none."""
-        return "; ".join(
+        """Streams whose latest frames are all of the future, or often stale, and what to do; "" if there are none."""
+        future = [
             f"{sensor}/{stream}: its time stamps are ahead of the arrival of its frames, so that none is used; start "
             "again what captures it"
             for (sensor, stream), number in self._in_future.items()
             if number >= FUTURE_IN_A_ROW
-        )
+        ]
+        stale = [
+            f"{sensor}/{stream}: {sum(latest)} of its last {len(latest)} frames are not used, because their time "
+            "stamps jump back or they come after their sets; start again what captures it"
+            for (sensor, stream), latest in self._stale.items()
+            if sum(latest) >= MANY
+        ]
+        return "; ".join(future + stale)
 
     def add(self, frame: Frame, error_ns: int = 0) -> list[FrameSet]:
         """Takes one frame and returns the sets that are decided now, in order of time.
@@ -142,7 +152,9 @@ class Synchroniser:
 
     def _insert(self, frame: Frame, error_ns: int) -> None:
         stream = self._members.get(frame.key, self._reference)
-        if rejection_cause := stream.rejection_cause(frame):
+        rejection_cause = stream.rejection_cause(frame)
+        self._stale[frame.key].append(rejection_cause == "stale")
+        if rejection_cause:
             self._count(frame.key, rejection_cause)
             return
         stream.insert(frame, error_ns)

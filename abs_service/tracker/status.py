@@ -71,7 +71,7 @@ def judge(
     """
     lost = inlier_share(fits) < limits.lost_below
     reasons = [f"no frame from {name}" for name in missing]
-    reasons += _seen(fits, lost, limits)
+    reasons += _seen(fits, lost, limits) if fits else [_UNMEASURED]
     reasons += _placed(fits, shape, innovation, limits)
     reasons += _shaped(shape, limits)
     if lost:
@@ -119,6 +119,9 @@ _FOLLOW = (
     "take away what touches the object, move it more slowly, give the model more control points, or measure the noise"
 )
 _FIND = "bring the object back into sight; it is looked for again, at once by abs-service reinitialize"
+
+#: Without any measurement, nobody can say that the object is out of sight.
+_UNMEASURED = "no sensor delivered all its images, so that nothing was measured – see what unused.* of health counts"
 
 #: What may have happened where the free edges lie off the outline, and what to do.
 _SLID = (

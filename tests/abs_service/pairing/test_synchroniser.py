@@ -142,6 +142,31 @@ def test_stamps_of_the_future_are_said_until_they_are_right():
     assert sync.counters["color/color.future"] == 20
 
 
+@pytest.mark.parametrize("key", [TOF, COLOR])
+def test_a_stream_whose_stamps_alternate_is_said_until_they_are_right(key):
+    sync = synchroniser()
+    said = []
+    for k in range(120):
+        back_ms = 1000 if 30 <= k < 80 and k % 2 else 0
+        for one in (COLOR, TOF):
+            sync.add(frame(one, 3000 + 33 * k - (back_ms if one == key else 0), seq=k))
+        said.append(sync.doubt)
+    assert [bool(text) for text in said[:59]] == 59 * [False]
+    sensor, stream = key
+    assert said[70].startswith(f"{sensor}/{stream}: 15 of its last 30 frames are not used, because their time stamps")
+    assert said[-1] == ""
+    assert sync.counters[f"{sensor}/{stream}.stale"] == 25
+
+
+def test_frames_that_come_after_their_sets_are_said():
+    sync = synchroniser(deadline_ns=100 * MS)
+    for k in range(60):
+        sync.add(frame(TOF, 33 * k))
+        sync.poll((33 * k + 110) * MS)
+        sync.add(frame(COLOR, 33 * (k - 6), seq=k))
+    assert sync.doubt.startswith("color/color: 30 of its last 30 frames are not used")
+
+
 def elsewhere(key, t_s, host, *, epoch=0, received_s=0.0):
     """A frame of another host's clock that comes here at a time of our clock."""
     made = frame(key, t_s * 1000, epoch=epoch)

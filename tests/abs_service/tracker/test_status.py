@@ -54,6 +54,13 @@ def test_a_lost_object_names_every_reason():
     assert len(reasons) == 2
 
 
+def test_without_any_measurement_the_cause_is_said_and_not_that_the_object_is_out_of_sight():
+    status, reasons = judge([], ("tof", "color"), SHAPE, 0.0, SETTINGS)
+    assert status == Status.LOST
+    cause = "no sensor delivered all its images, so that nothing was measured"
+    assert facts(reasons) == ("no frame from tof", "no frame from color", cause)
+
+
 def test_a_mostly_hidden_object_is_degraded_even_if_the_rest_agrees():
     assert judge([fit(1.0, 0.5)], (), SHAPE, 0.0, SETTINGS) == (Status.TRACKING, ())
     reason = "62% of the vertices are occluded in the sensor that sees most of them"
