@@ -8,8 +8,8 @@ from PIL import Image, UnidentifiedImageError
 #: Most pixels of an image: 8192 × 8192. Decoded, they are up to 512 MiB.
 MAX_PIXELS = 1 << 26
 
-#: First bytes of a format, what its last part begins with, and what ends it: decoders make up what is missing.
-_ENDS = ((b"\x89PNG", b"IDAT", b"IEND"), (b"\xff\xd8", b"\xff\xda", b"\xff\xd9"))
+#: First bytes of a PNG, and of a JPEG.
+_PNG, _JPEG = b"\x89PNG\r\n\x1a\n", b"\xff\xd8"
 
 
 class ImageSizeError(ValueError):
@@ -17,8 +17,20 @@ class ImageSizeError(ValueError):
 
 
 def is_cut_off(content: bytes) -> bool:
-    """True for a PNG or JPEG whose end is missing."""
-    return any(content.startswith(first) and content.rfind(end) <= content.rfind(last) for first, last, end in _ENDS)
+    """True for a PNG or JPEG whose end is missing: decoders make up what is."""
+    if content.startswith(_PNG):
+        return not _has_all_chunks(content)
+    return content.startswith(_JPEG) and content.rfind(b"\xff\xd9") <= content.rfind(b"\xff\xda")
+
+
+def _has_all_chunks(png: bytes) -> bool:
+    """True if its chunks are as long as they say, up to the last: a decoder makes room for what a chunk announces."""
+    begin = len(_PNG)
+    while (end := begin + 8 + int.from_bytes(png[begin : begin + 4], "big")) <= len(png):
+        if png[begin + 4 : begin + 8] == b"IEND":
+            return True
+        begin = end + 4  # behind the checksum
+    return False
 
 
 def check(content: bytes) -> tuple[int, int]:

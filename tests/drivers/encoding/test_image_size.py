@@ -41,6 +41,18 @@ def test_images_of_every_format_pass(suffix: str) -> None:
     assert decoded.shape == (20, 30)
 
 
+def test_a_chunk_that_announces_more_bytes_than_there_are_is_refused_before_there_is_room_for_it(
+    tmp_path: Path,
+) -> None:
+    content = bytearray(cv2.imencode(".png", np.zeros((20, 30), np.uint8))[1].tobytes())
+    assert not image_size.is_cut_off(bytes(content))
+    begin = content.index(b"IDAT") - 4
+    content[begin : begin + 4] = struct.pack(">I", 2**31 - 1)
+    (tmp_path / "x.png").write_bytes(content)
+    with pytest.raises(ImageFolderError, match=r"x\.png: the image is truncated"):
+        image_file.read(tmp_path / "x.png")
+
+
 @pytest.mark.parametrize(
     "content", [png(30_000, 30_000), png(10_000, 10_000), jpeg(30_000, 30_000), png(2**31 - 1, 2**31 - 1)]
 )
