@@ -5,9 +5,8 @@ from numpy.typing import NDArray
 
 from calib.camera import Camera
 from calib.jit import composed, kernel
-from calib.lenses.fisheye import KannalaBrandt
 from calib.lenses.forward import brown_conrady_coefficients as coefficients
-from calib.lenses.forward import distort, distort_fisheye, fisheye_coefficients
+from calib.lenses.forward import distort, lens_parts
 
 
 def optics(camera: Camera) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
@@ -21,11 +20,12 @@ class Projection:
     """Eq. 10 for populations, in single precision.
 
     Attributes:
-        arguments: camera arguments of `project`, between the vertices and the results.
+        arguments: of the camera: pose T_sr (3, 4), matrix and lens, see `optics`, and limit of r².
     """
 
     def __init__(self, camera: Camera):
-        self.arguments = isinstance(camera.lens, KannalaBrandt), *optics(camera), camera.field_radius**2
+        self.arguments = *optics(camera), camera.field_radius**2
+        self._project = composed(_project, **lens_parts(camera.lens))
 
     def project(self, vertices: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Pixel coordinates (population, n, 2) and 1/z (population, n) of vertices (population, 3, n) [m].
@@ -34,7 +34,7 @@ class Projection:
         """
         population, _, n = vertices.shape
         place, inverse_z = np.empty((population, n, 2), np.float32), np.empty((population, n), np.float32)
-        project(vertices, *self.arguments, place, inverse_z)
+        self._project(vertices, *self.arguments, place, inverse_z)
         return place, inverse_z
 
 
@@ -60,24 +60,6 @@ def _count_inside(
 
 
 @kernel
-def project(
-    vertices: NDArray[np.float32],
-    is_fisheye: bool,
-    pose: NDArray[np.float32],
-    matrix: NDArray[np.float32],
-    lens: NDArray[np.float32],
-    limit: float,
-    place: NDArray[np.float32],
-    inverse_z: NDArray[np.float32],
-) -> None:
-    """Eq. 10 with the kernel of the given lens; pose (3, 4) = T_sr, limit of r², results as in `Projection.project`."""
-    if is_fisheye:
-        _project_fisheye(vertices, pose, matrix, lens, limit, place, inverse_z)
-    else:
-        _project(vertices, pose, matrix, lens, limit, place, inverse_z)
-
-
-@kernel
 def _project(
     vertices: NDArray[np.float32],
     pose: NDArray[np.float32],
@@ -87,7 +69,7 @@ def _project(
     place: NDArray[np.float32],
     inverse_z: NDArray[np.float32],
 ) -> None:
-    """Eq. 10; pose (3, 4) = T_sr, limit of r²."""
+    """Eq. 10; arguments as `Projection.arguments`, results as in `Projection.project`."""
     one, farthest = np.float32(1), np.float32(limit)
     (fx, fy, cx, cy), own_lens = matrix, coefficients(lens)
     for k in range(vertices.shape[0]):
@@ -103,7 +85,3 @@ def _project(
             place[k, v, 0] = fx * bent_u + cx if seen else np.float32(0)
             place[k, v, 1] = fy * bent_w + cy if seen else np.float32(0)
             inverse_z[k, v] = inverse if seen else np.float32(np.nan)
-
-
-#: `_project` with the four coefficients of a fisheye lens.
-_project_fisheye = composed(_project, distort=distort_fisheye, coefficients=fisheye_coefficients)

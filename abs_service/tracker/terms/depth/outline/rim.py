@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 from abs_service.pairing.images import Window
 from abs_service.tracker.mesh import Mesh, edges_of
 from abs_service.tracker.synthesis.perspective import project_with_jacobian
-from abs_service.tracker.synthesis.projection import project
 from abs_service.tracker.synthesis.window import corner
 from calib.camera import Camera
 from calib.jit import kernel
@@ -137,46 +136,19 @@ def chain(
 
 
 @kernel
-def locate(
+def extrapolate_rim(
     vertices: NDArray[np.float32],
     outer: NDArray[np.intp],
     inner: NDArray[np.intp],
     beyond: NDArray[np.float32],
-    is_fisheye: bool,
-    pose: NDArray[np.float32],
-    matrix: NDArray[np.float32],
-    lens: NDArray[np.float32],
-    limit: float,
-    corner: NDArray[np.float32],
-    inwards: NDArray[np.float32],
     points: NDArray[np.float32],
-    values: NDArray[np.float64],
-    gradients: NDArray[np.float64],
 ) -> None:
-    """Extrapolated rim of one candidate, and its distances inside the outline.
-
-    Args:
-        vertices: of the candidate (1, 3, n) [m].
-        outer, inner, beyond: vertices and share (k,).
-        is_fisheye, pose, matrix, lens, limit: as in `projection.project`.
-        corner: column and row of the image's first pixel (2,).
-        inwards: distances (rows, columns) [px].
-        points: extrapolated rim (1, 3, k) [m].
-        values, gradients: as in `look_up`.
-    """
-    k = outer.size
-    places, inverse_z = np.empty((1, k, 2), np.float32), np.empty((1, k), np.float32)
+    """Extrapolated rim (1, 3, k) [m] of one candidate (1, 3, n) [m]: outer + beyond (outer − inner), each (k,)."""
     for i in range(3):
         of_vertices = vertices[0, i]
-        for v in range(k):
+        for v in range(outer.size):
             end = of_vertices[outer[v]]
             points[0, i, v] = end + beyond[v] * (end - of_vertices[inner[v]])
-    project(points, is_fisheye, pose, matrix, lens, limit, places, inverse_z)
-    for v in range(k):
-        unknown = np.isnan(inverse_z[0, v])
-        for i in range(2):
-            places[0, v, i] = np.float32(np.nan) if unknown else places[0, v, i] - corner[i]
-    look_up(inwards, places[0], values, gradients)
 
 
 def shared_by_side(

@@ -39,12 +39,15 @@ def _rim_cost(
 ) -> None:
     """Half the sum of squared, bounded distances of the rim from the outline in units of σ.
 
-    The distance is that of `rim.locate`, without its gradients.
+    The distance is that of `rim.look_up`, without its gradients.
 
     Args:
         vertices: (population, 3, n) [m].
         deviation: σ [px].
-        outer, inner, beyond, pose, matrix, lens, limit, corner, inwards: as in `rim.locate`.
+        outer, inner, beyond: vertices and share (k,), as in `rim.extrapolate_rim`.
+        pose, matrix, lens, limit: as in `Projection.arguments`.
+        corner: column and row of the image's first pixel (2,).
+        inwards: distances (rows, columns) [px].
         out: costs (population,) [nats].
     """
     one, zero, farthest = np.float32(1), np.float32(0), np.float32(limit)

@@ -17,7 +17,15 @@ from abs_service.tracker.terms.base import RimFit
 from abs_service.tracker.terms.depth.classification.outline_distance import inwards
 from abs_service.tracker.terms.depth.classification.visibility import Visibility
 from abs_service.tracker.terms.depth.outline.raggedness import Raggedness
-from abs_service.tracker.terms.depth.outline.rim import Rim, chain, is_behind, locate, read, shared_by_side
+from abs_service.tracker.terms.depth.outline.rim import (
+    Rim,
+    chain,
+    extrapolate_rim,
+    is_behind,
+    look_up,
+    read,
+    shared_by_side,
+)
 from abs_service.tracker.terms.depth.outline.rim_classes import LARGEST_GAP_STEPS, RimClass, classify_rim
 from abs_service.tracker.terms.depth.outline.rim_cost import FARTHEST, rim_cost
 from abs_service.tracker.terms.depth.outline.rim_motion import displacement, motion
@@ -31,9 +39,8 @@ UNJUDGED_DEVIATIONS = 3.0
 #: A free edge is off the outline if it is farther from it than so many pixels, and than the bound of its cost.
 OFF_PX = 3.0
 
-#: Outer and inner vertices and share of a rim, and what `projection.project` takes of a camera.
+#: Outer and inner vertices and share of a rim.
 Ends = tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float32]]
-Optics = tuple[bool, NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], float]
 
 
 class RimOutline:
@@ -90,7 +97,7 @@ class RimOutline:
         visible = free[~is_behind(self._camera, ends, expected, window)]
         self._ends = self._rim.outer[visible], self._rim.inner[visible], self._beyond[visible]
         if not self._begun:
-            edges = self._locate(predicted)[0].astype(np.float64)
+            edges = self._points(predicted)[0].T.astype(np.float64)
             self._is_round = is_round(self._camera, edges, self._inwards, self._corner)
             self._begun = True
         self._hidden = len(free) - len(visible)
@@ -103,8 +110,8 @@ class RimOutline:
     def cost(self, surface: Surface) -> NDArray[np.float64]:
         """Cost (population,) of every deformed mesh."""
         out = np.empty(len(surface.vertices))
-        _, *optics = self._projection.arguments
-        self._rim_cost(surface.vertices, self._deviation, *self._ends, *optics, self._corner, self._inwards, out)
+        ends_and_optics = *self._ends, *self._projection.arguments
+        self._rim_cost(surface.vertices, self._deviation, *ends_and_optics, self._corner, self._inwards, out)
         return out
 
     def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> Linearization:
@@ -141,7 +148,7 @@ class RimOutline:
 
     def _edges(self, surface: Surface) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Free edges in sight (k, 3) [m], places in the image (k, 2) and distances inside the outline (k,) [px]."""
-        points = self._locate(surface)[0].astype(np.float64)
+        points = self._points(surface)[0].T.astype(np.float64)
         places = project_with_jacobian(self._camera, points)[0]
         return points, places, self._inside(places)
 
@@ -177,14 +184,17 @@ class RimOutline:
         read(self._inwards, self._corner, places, last, away)
         return away
 
-    @property
-    def _arguments(self) -> tuple[*Ends, *Optics, NDArray[np.float32], NDArray[np.float32]]:
-        """Arguments of `locate` between the vertices and the results."""
-        return *self._ends, *self._projection.arguments, self._corner, self._inwards
+    def _points(self, surface: Surface) -> NDArray[np.float32]:
+        """Extrapolated rim (1, 3, k) [m]."""
+        points = np.empty((1, 3, len(self._ends[0])), np.float32)
+        extrapolate_rim(surface.vertices, *self._ends, points)
+        return points
 
     def _locate(self, surface: Surface) -> tuple[NDArray[np.float32], NDArray[np.float64], NDArray[np.float64]]:
         """Extrapolated rim (k, 3) [m], its distances inside the outline (k,) [px], and their image gradients (k, 2)."""
-        k = len(self._ends[0])
-        points, values, gradients = np.empty((1, 3, k), np.float32), np.empty(k), np.empty((k, 2))
-        locate(surface.vertices, *self._arguments, points, values, gradients)
+        points, k = self._points(surface), len(self._ends[0])
+        (place,), (inverse_z,) = self._projection.project(points)
+        place[np.isnan(inverse_z)] = np.nan
+        values, gradients = np.empty(k), np.empty((k, 2))
+        look_up(self._inwards, place - self._corner, values, gradients)
         return points[0].T, values, gradients
