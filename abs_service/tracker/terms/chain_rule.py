@@ -110,8 +110,11 @@ def add_products(
     left: NDArray[np.float64], right: NDArray[np.float64], own: NDArray[np.int64], total: NDArray[np.float64]
 ) -> None:
     """Adds the square of (left, right) to the rows and columns `own` of a matrix; one block of four is mirrored."""
-    half = left.shape[1]
-    upper, across, lower = np.dot(left.T, left), np.dot(left.T, right), np.dot(right.T, right)
+    half, rest = left.shape[1], right.shape[1]
+    upper, across, lower = np.empty((half, half)), np.empty((half, rest)), np.empty((rest, rest))
+    np.dot(left.T, left, upper)
+    np.dot(left.T, right, across)
+    np.dot(right.T, right, lower)
     for i in range(half):
         line = total[own[i]]
         for j in range(half):

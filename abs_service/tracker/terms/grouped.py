@@ -66,8 +66,14 @@ def _add_curvature(
     rows: NDArray[np.float64], parameters: NDArray[np.int64], start: NDArray[np.int64], total: NDArray[np.float64]
 ) -> None:
     """Adds rowᵀ row, of rows (m, k), to a matrix (dim, dim)."""
+    k, half = rows.shape[1], rows.shape[1] // 2
     for g in range(parameters.shape[0]):
-        if start[g] < start[g + 1]:
-            half = rows.shape[1] // 2
-            own = rows[start[g] : start[g + 1]]
-            add_products(own[:, :half].copy(), own[:, half:].copy(), parameters[g], total)
+        first, count = start[g], start[g + 1] - start[g]
+        left, right = np.empty((count, half)), np.empty((count, k - half))
+        for m in range(count):
+            for d in range(half):
+                left[m, d] = rows[first + m, d]
+            for d in range(k - half):
+                right[m, d] = rows[first + m, half + d]
+        if count > 0:
+            add_products(left, right, parameters[g], total)

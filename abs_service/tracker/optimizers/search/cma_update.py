@@ -69,7 +69,8 @@ def sample_population(
         place, between = np.uintp(bits[i] >> np.uint16(4)), np.int32(bits[i] & np.uint16(15))
         low, high = quantiles[place], quantiles[place + np.uintp(1)]
         numbers[i] = low + (np.float32(between) + np.float32(0.5)) * np.float32(0.0625) * (high - low)
-    steps = np.dot(z, axes)
+    steps = np.empty((len(z), mean.size), np.float32)
+    np.dot(z, axes, steps)
     for k in range(len(z)):
         for j in range(mean.size):
             thetas[k, j] = mean[j] + sigma * steps[k, j]
@@ -144,7 +145,8 @@ def _learn(
     learnt: NDArray[np.float32],
 ) -> None:
     """Eq. 47 in the coordinates of z, from its rows, ranked by cost, and the path (population + 1, dim)."""
-    weighted, n = np.empty_like(steps), steps.shape[1]
+    n = steps.shape[1]
+    weighted, learning = np.empty((len(steps), n), np.float32), np.empty((n, n), np.float32)
     for rank in range(len(steps)):
         step, w = steps[rank], c_mu * weights[rank] if rank < weights.size else c_1
         if w < 0:  # eq. 46: negative weights are scaled by the squared length of the step
@@ -154,7 +156,7 @@ def _learn(
             w *= n / square
         for i in range(n):
             weighted[rank, i] = np.float32(w) * step[i]
-    learning = np.dot(weighted.T, steps)
+    np.dot(weighted.T, steps, learning)
     for i in range(n):
         for j in range(n):
             learnt[i, j] = np.float32(decay) * learnt[i, j] + learning[i, j]
@@ -185,7 +187,9 @@ def update_factor(
         root[:] = 0
         for i in range(n):
             root[i, i] = np.sqrt(abs(learnt[i, i]))
-    new_factor, new_axes = np.dot(factor, root), np.dot(root.astype(np.float32).T, axes)
+    new_factor, new_axes = np.empty((n, n)), np.empty((n, n), np.float32)
+    np.dot(factor, root, new_factor)
+    np.dot(root.astype(np.float32).T, axes, new_axes)
     for i in range(n):
         for j in range(n):
             factor[i, j], axes[i, j] = new_factor[i, j], new_axes[i, j]

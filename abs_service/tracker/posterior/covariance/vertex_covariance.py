@@ -90,7 +90,8 @@ def _propagate(
             for j in range(k):
                 part[i, j] = line[own[j]]
         rows = local[first:last].reshape((3 * (last - first), k))
-        products = np.dot(rows, part)
+        products = np.empty((3 * (last - first), k))
+        np.dot(rows, part, products)
         for v in range(last - first):
             square = result[first + v]
             for i in range(3):
