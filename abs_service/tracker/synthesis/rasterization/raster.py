@@ -147,7 +147,7 @@ def _nearest_at(
         for row in range(first, last + 1):
             for at in range(start[row], start[row + 1]):
                 pixel = order[at]
-                column = int(columns[pixel])
+                column = int(np.int64(columns[pixel]))  # one form of what is called
                 if left <= column <= right:
                     near = np.float32(_nearness_in(corners, row, column))
                     nearness[pixel] = max(nearness[pixel], near)

@@ -63,11 +63,11 @@ def _fill(
         between: False before (rows, columns).
     """
     for row in range(labels.shape[0]):
-        last, of = -1, labels[row]
+        last, of = labels.shape[1], labels[row]  # there is none to the left yet
         for column in range(labels.shape[1]):
             if of[column] == 0:
                 continue
-            wide = 1 < column - last <= reach and last >= 0 and (ours[of[last]] or ours[of[column]])
+            wide = 1 < column - last <= reach and (ours[of[last]] or ours[of[column]])
             if wide and _continues(distance[row], of, last, column):
                 between[row, last + 1 : column] = True
             last = column
