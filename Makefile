@@ -11,7 +11,7 @@ help: ## list the targets; ARGS="…" is passed on to the command behind a targe
 run: .venv/.run ## start the service on the simulated camera: make run ARGS="--duration 20", ARGS=my-rig.toml
 	@$(BIN)/abs-service run $(ARGS)
 test: .venv/.all ## the tests without the slow ones: make test ARGS="tests/calib -x"
-	@OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n auto --dist loadgroup --max-worker-restart 0 -m "not slow and not hardware" $(ARGS)
+	@OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n $$(($$(nproc) + 1)) --dist loadfile --max-worker-restart 0 -m "not slow and not hardware" $(ARGS)
 check: lint test ## everything a change has to pass
 lint: .venv/.all ## format, style, types, import contracts
 	@$(BIN)/ruff format --check . && $(BIN)/ruff check . && $(BIN)/basedpyright --threads 2 --pythonpath $(BIN)/python && $(BIN)/lint-imports

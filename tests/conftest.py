@@ -54,6 +54,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    # Those that take longest first, lest one worker is busy with them when the others have nothing left.
+    items.sort(key=lambda item: item.get_closest_marker("slow") is None)
     if config.getoption("--device") is not None:
         return
     without_device = pytest.mark.skip(reason="needs a real device: --device URI")

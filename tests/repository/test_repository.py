@@ -1,6 +1,7 @@
 """Promises of the repository itself: it works elsewhere, installs what it pins, and its changelog knows the version."""
 
 import ast
+import functools
 import os
 import re
 import subprocess
@@ -97,7 +98,7 @@ def test_files_and_functions_are_short_enough_to_read_at_once() -> None:
             continue
         if (lines := len(text.splitlines())) > 250:
             long.append(f"{path} has {lines} lines, the limit is 250")
-        for function in (node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.FunctionDef)):
+        for function in _functions(text):
             limit = 60 if "kernel" in map(ast.unparse, function.decorator_list) else 40
             if (lines := _lines_of_code(function)) > limit:
                 long.append(f"{path}: {function.name} has {lines} lines, the limit is {limit}")
@@ -110,8 +111,8 @@ def test_kernels_copy_no_array_into_another_by_an_assignment() -> None:
         f"{path}: {function.name} has {ast.unparse(assignment)}"
         for path, text in _tracked_texts()
         if path.endswith(".py") and path.startswith(PACKAGES)
-        for function in ast.walk(ast.parse(text))
-        if isinstance(function, ast.FunctionDef) and "kernel" in map(ast.unparse, function.decorator_list)
+        for function in _functions(text)
+        if "kernel" in map(ast.unparse, function.decorator_list)
         for assignment in ast.walk(function)
         if isinstance(assignment, ast.Assign | ast.AugAssign) and _copies(assignment)
     ]
@@ -133,6 +134,7 @@ def test_what_the_packages_import_is_required_by_name() -> None:
     assert undeclared == set()
 
 
+@functools.cache
 def _tracked_texts() -> list[tuple[str, str]]:
     listing = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=False)
     if listing.returncode != 0:
@@ -140,6 +142,12 @@ def _tracked_texts() -> list[tuple[str, str]]:
     paths = [name for name in listing.stdout.split("\0") if name and (ROOT / name).is_file()]
     contents = [(name, (ROOT / name).read_bytes()) for name in paths]
     return [(name, data.decode("utf-8", errors="replace")) for name, data in contents if b"\0" not in data[:4096]]
+
+
+@functools.cache
+def _functions(text: str) -> list[ast.FunctionDef]:
+    """All functions of a module, since to parse all modules takes seconds."""
+    return [node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.FunctionDef)]
 
 
 def _not_portable(line: str) -> list[str]:

@@ -15,7 +15,7 @@ from drivers.simulated.address import parse
 from tests.abs_service.commands.recordings.simulated_recording import write_take
 from tests.system.running import START_S, abs_service, wait_until
 
-pytestmark = [pytest.mark.slow, pytest.mark.realtime]
+pytestmark = pytest.mark.slow
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "rigs"
 #: Those that need recordings or images which are not in the repository.
@@ -74,6 +74,7 @@ def recorded(path, exposures=range(60)):
     return simulation, write_take(path, simulation, exposures, {"structured_light": "depth", "color": "color"})
 
 
+@pytest.mark.realtime
 @pytest.mark.parametrize("name", LIVE)
 def test_it_tracks(name, example, tracks):
     errors: dict[str, list[float]] = {}
@@ -85,6 +86,7 @@ def test_it_tracks(name, example, tracks):
         assert min(some) < 4  # how far it lags behind while it moves is a matter of how busy the machine is
 
 
+@pytest.mark.realtime
 def test_it_plays_a_recording_as_if_it_were_live(example, tracks, tmp_path):
     recorded(tmp_path / "recordings" / "scene.mcap")
     assert len(tracks(example("replay"))) >= 30
@@ -102,6 +104,7 @@ def test_it_tracks_images_that_were_imported(example, tmp_path):
     assert max(one["error_mm"] for one in estimates) < 4
 
 
+@pytest.mark.realtime
 def test_it_records_without_tracking(example, launch, tmp_path):
     folder = tmp_path / "takes"
     process = launch("run", example("record_only"), "--out", folder)

@@ -14,7 +14,7 @@ from abs_service import config
 from evaluation.service.live.proc import children, is_running
 from tests.system.running import TRACKING, abs_service, wait_until
 
-pytestmark = [pytest.mark.slow, pytest.mark.realtime]
+pytestmark = pytest.mark.slow
 
 TOPICS = {
     *(f"/tof/{stream}/{part}" for stream in ("depth", "amplitude") for part in ("image", "info")),
@@ -65,6 +65,7 @@ def read_whole(path):
         return schemas, messages, {attachment.name: attachment.data for attachment in reader.iter_attachments()}
 
 
+@pytest.mark.realtime
 def test_a_subscriber_receives_nearly_all_estimates_and_ctrl_c_leaves_a_complete_recording(run, tmp_path):
     process, listener = run
     begin_ns = time.monotonic_ns()
@@ -98,6 +99,7 @@ def test_a_subscriber_receives_nearly_all_estimates_and_ctrl_c_leaves_a_complete
     assert config.loads(rig_toml, "attachment", tmp_path) == config.load(tmp_path / "rig.toml")
 
 
+@pytest.mark.realtime
 def test_sigterm_to_run_ends_everything_in_time_and_the_last_line_of_output_is_whole(run, tmp_path):
     process, listener = run
     wait_until(lambda: any(h.gauges["file_bytes"] > 1e6 for h in listener.health("record")), 20, "a growing file")
@@ -110,6 +112,7 @@ def test_sigterm_to_run_ends_everything_in_time_and_the_last_line_of_output_is_w
     assert np.mean(errors_mm) < 5
 
 
+@pytest.mark.realtime
 def test_all_processes_log_where_run_was_told_to(rig_file, tmp_path):
     log = tmp_path / "rig.log"
     options = ("--no-record", "--duration", "3", "--log-level", "info", "--log-format", "json", "--log-file", log)

@@ -41,6 +41,12 @@ HOSTILE = st.lists(samples(), min_size=1, max_size=5)
 S = 1_000_000_000
 
 
+@pytest.fixture(autouse=True)
+def _at_once(monkeypatch):
+    """Messages are there as soon as they are delivered, so that nobody has to wait for one."""
+    monkeypatch.setattr("abs_service.pairing.frame_set_queue.POLL_S", 0.0)
+
+
 class Recording:
     """A recorder of a rig, and its health."""
 

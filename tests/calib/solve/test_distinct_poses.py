@@ -13,7 +13,7 @@ from calib.solve.calibrate import calibrate
 from calib.solve.diagnoses import ViewsError
 from calib.solve.solution import Solution
 from calib.solve.validation.cross_validation import TooFewToSplitError, cross_validate
-from calib.solve.validation.verdict import assess
+from calib.solve.validation.verdict import Assessment, assess
 from tests.calib.solve import board_views
 from tests.calib.solve.bent import bent
 
@@ -58,9 +58,14 @@ def solved_once() -> Solution:
     return solved(repeated(views(), 1))
 
 
+@cache
+def assessed_once() -> Assessment:
+    return assess(solved_once(), 1.0, 1.0)
+
+
 @pytest.mark.parametrize(("times", "noise"), [(2, "the same"), (2, "fresh"), (5, "fresh")])
 def test_the_same_views_again_do_not_make_a_calibration_trusted(times: int, noise: str) -> None:
-    once = assess(solved_once(), 1.0, 1.0)
+    once = assessed_once()
     again = assess(solved(repeated(views(), times, noise)), 1.0, 1.0)
     assert not once.trusted
     assert not again.trusted, again.verdict
