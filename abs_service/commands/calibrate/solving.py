@@ -19,6 +19,7 @@ from abs_service.config.problems import allowed_instead
 from abs_service.report import page, provenance
 from abs_service.report.content import Level, Report, Verdict
 from abs_service.supervision.exit_codes import Exit
+from calib.calibration_check.kept import with_kept
 from calib.formats.plausibility import baselines
 from calib.solve.bundle.parameters.lens_parameters import KINDS, LensKind, kind_of
 from calib.solve.bundle.tasks import SensorTask, Task
@@ -146,7 +147,7 @@ def finish(title: str, task: Task, arguments: argparse.Namespace, found: Materia
     """Solves, cross-validates, writes calibration and report, and prints the verdict."""
     solution = calibrate(task, say)
     distance = arguments.distance or _middle_distance(solution.task.reference, solution)
-    assessment = assess(solution, distance, arguments.needed, say)
+    assessment = with_kept(assess(solution, distance, arguments.needed, say), solution, arguments.needed)
     data = [path for path in (*found.data, arguments.target) if path.exists()]
     origin = provenance.trace(sys.argv[1:], data)
     name = re.sub(r"[^A-Za-z0-9_-]+", "_", arguments.out.name.partition(".")[0]) or "rig"
