@@ -13,7 +13,7 @@ _PNG, _JPEG = b"\x89PNG\r\n\x1a\n", b"\xff\xd8"
 
 
 class ImageSizeError(ValueError):
-    """An image that is too large, or whose size is unknown."""
+    """An image that is too large, or whose size is unknown, or that is not all there."""
 
 
 def is_cut_off(content: bytes) -> bool:
@@ -43,7 +43,7 @@ def check(content: bytes) -> tuple[int, int]:
         Width and height [px].
 
     Raises:
-        ImageSizeError: more than `MAX_PIXELS`, or no image.
+        ImageSizeError: more than `MAX_PIXELS`, a PNG that announces more bytes than it has, or no image.
     """
     try:
         with warnings.catch_warnings():
@@ -58,4 +58,6 @@ def check(content: bytes) -> tuple[int, int]:
         raise ImageSizeError(f"no image with a known size: {type(error).__name__}") from error
     if width * height > MAX_PIXELS:
         raise ImageSizeError(f"{width} × {height} pixels, {MAX_PIXELS} are allowed")
+    if content.startswith(_PNG) and not _has_all_chunks(content):
+        raise ImageSizeError("a part of it is missing")
     return width, height

@@ -51,6 +51,8 @@ def test_a_chunk_that_announces_more_bytes_than_there_are_is_refused_before_ther
     (tmp_path / "x.png").write_bytes(content)
     with pytest.raises(ImageFolderError, match=r"x\.png: the image is truncated"):
         image_file.read(tmp_path / "x.png")
+    with pytest.raises(image_size.ImageSizeError, match="a part of it is missing"):  # of the bus and of recordings, too
+        image_size.check(bytes(content))
 
 
 @pytest.mark.parametrize(
