@@ -65,5 +65,6 @@ def test_offline_every_frame_is_tracked_and_live_gives_the_pace_and_an_end(recor
     assert 24 < rate_hz < 31
     assert 0.8 < pace < 1.25
     assert len(states) > 30
-    assert mean_error_mm(estimates) < 1.5 * mean_error_mm(live)
+    # Each mesh has the noise of its own first image: 0.36 to 0.55 mm on average, by the image that is the first.
+    assert mean_error_mm(estimates) < 2 * mean_error_mm(live)
     assert "Traceback" not in complaints

@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from abs_service.tracker.detection.dropouts import sparse_gaps
 from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection
-from abs_service.tracker.detection.sparse_returns import sparse_gaps
 from abs_service.tracker.mesh import Mesh, pieces_of
 from calib import pose
 

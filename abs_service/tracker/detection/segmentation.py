@@ -7,10 +7,10 @@ from abs_service.pairing.images import ColorImage, DepthImage
 from abs_service.pairing.observation import Observation
 from abs_service.tracker import resolution
 from abs_service.tracker.detection.depth_view import DepthView
+from abs_service.tracker.detection.dropouts import filled
 from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection
 from abs_service.tracker.detection.plausibility import LARGEST_M, LARGEST_SCENE_M, MAX_POINTS, check_extent
 from abs_service.tracker.detection.regions.base import Region
-from abs_service.tracker.detection.sparse_returns import filled
 from calib.noise.base import DepthNoise, subtract_mean_offset
 from calib.noise.fit.scatter import scatter
 from calib.rig import Rig

@@ -69,17 +69,17 @@ class Row:
     pixels: int
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class _Surface:
     """The region of one surface of the frame, and its settings."""
 
-    label: int
+    pixels: NDArray[np.bool_]
 
     def build(self) -> "_Surface":
         return self
 
     def select(self, view: DepthView) -> NDArray[np.bool_]:
-        return connected_surfaces(view.distance, LARGEST_STEP_M).labels == self.label
+        return self.pixels
 
 
 def read(folder: Path) -> O3rExposure:
@@ -139,18 +139,18 @@ def _hidden(seen: O3rExposure, noise: DepthNoise, whole: O3rExposure) -> Iterato
     distance, own = whole.image(Kind.DEPTH), whole.image(Kind.DEVIATION)
     unseen = ~np.isfinite(seen.image(Kind.DEPTH)) & np.isfinite(distance) & np.isfinite(own)
     for label in np.flatnonzero(sizes >= MIN_PIXELS)[1:]:
-        found = _rendered(seen, noise, int(label))
+        found = _rendered(seen, noise, labels == label)
         there = unseen & np.isfinite(found)
         yield from_images(np.where(there, distance, np.nan), found, own).take(there.ravel())
 
 
-def _rendered(exposure: O3rExposure, noise: DepthNoise, label: int) -> NDArray[np.float64]:
-    """Radial distances (height, width) [m] of the mesh that the tracker makes of a surface; NaN beside it."""
+def _rendered(exposure: O3rExposure, noise: DepthNoise, surface: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Radial distances (height, width) [m] of the mesh that the tracker makes of some pixels; NaN beside it."""
     rig = Rig("o3r", {SENSOR: Sensor(SENSOR, exposure.camera, noise)})
-    plan = demo_plan(MODEL, reference=SENSOR, region=_Surface(label), vertices=300, optimizer=SEARCH)
+    plan = demo_plan(MODEL, reference=SENSOR, region=_Surface(surface), vertices=300, optimizer=SEARCH)
     tracking, frames = TrackingSession(rig, plan), {frame.key: frame for frame in exposure.frames.values()}
     estimate = tracking.track(FrameSet(0, exposure.frames[Kind.DEPTH].t_host_ns, frames), lambda: True)
     if tracking.mesh is None:
-        raise RuntimeError(f"surface {label}: {', '.join(estimate.reasons)}")
+        raise RuntimeError(f"{np.count_nonzero(surface)} pixels: {', '.join(estimate.reasons)}")
     image = Raster(exposure.camera, tracking.mesh.faces).render(np.ascontiguousarray(estimate.vertices.T))
     return np.where(np.isfinite(image), image, np.nan).astype(np.float64)

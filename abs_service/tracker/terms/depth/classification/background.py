@@ -21,21 +21,6 @@ DEEPEST_M = 0.03
 #: Returns are missing beside the object's edge in any case; so many pixels around it are no background.
 MARGIN_PX = 3
 
-#: Missing returns belong to an area if a square of so many pixels a side fits around them.
-AREA_PX = 3
-
-
-def dropouts(missing: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Missing returns (rows, columns) of single pixels and thin rows of them, which are no area (an opening).
-
-    A sensor loses them one by one, as likely as its probability of no return says; an area is lost for a reason that
-    all its pixels share.
-    """
-    if not missing.any():
-        return missing
-    areas = cv2.morphologyEx(missing.view(np.uint8), cv2.MORPH_OPEN, np.ones((AREA_PX, AREA_PX)))
-    return missing & (areas == 0)
-
 
 class Background:
     """Pixels at which the background gives no return, learnt from the first depth image."""

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.pairing.images import Window
-from abs_service.tracker.terms.depth.classification.background import Background, dropouts
+from abs_service.tracker.detection.dropouts import dropouts
+from abs_service.tracker.terms.depth.classification.background import Background
 from abs_service.tracker.terms.depth.classification.beyond_view import BeyondView
 from abs_service.tracker.terms.depth.classification.interruption import interruptions
 from abs_service.tracker.terms.depth.classification.separation import separates, separating_step

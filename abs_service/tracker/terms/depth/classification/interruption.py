@@ -7,8 +7,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from abs_service.tracker.detection.dropouts import dropouts
 from abs_service.tracker.detection.segments.depth_segments import Surfaces
-from abs_service.tracker.terms.depth.classification.background import dropouts
 from abs_service.tracker.terms.depth.classification.outline_distance import around
 from abs_service.tracker.terms.depth.classification.visibility import AGREEMENT_M, MIN_PIXELS
 from calib.jit import kernel

@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from abs_service.tracker.detection.dropouts import AREA_PX, dropouts
 from abs_service.tracker.synthesis import dense
 from abs_service.tracker.terms.base import Bounds
-from abs_service.tracker.terms.depth.classification.background import AREA_PX, dropouts
 from abs_service.tracker.terms.depth.classification.outline_distance import inwards
 from abs_service.tracker.terms.depth.classification.visibility import classify, surfaces_of
 from abs_service.tracker.terms.depth.depth import DepthTerm

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from abs_service.tracker.detection.dropouts import filled, sparse_gaps
 from abs_service.tracker.detection.grid_mesh import grid_mesh
 from abs_service.tracker.detection.initial_detection import InitialDetection
 from abs_service.tracker.detection.regions import nearest
 from abs_service.tracker.detection.segmentation import detect_object
-from abs_service.tracker.detection.sparse_returns import filled, sparse_gaps
 from calib import pose
 from tests.abs_service.tracker.detection.test_grid_mesh import RIG, area, placed, rectangle
 from tests.abs_service.tracker.scenes import depth_image, observation
