@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from abs_service.tracker.detection.dropouts import filled, sparse_gaps
 from abs_service.tracker.detection.grid_mesh import grid_mesh
 from abs_service.tracker.detection.initial_detection import InitialDetection
+from abs_service.tracker.detection.rectangle_fit import find_sheet
 from abs_service.tracker.detection.regions import nearest
 from abs_service.tracker.detection.segmentation import detect_object
 from calib import pose
@@ -33,8 +34,10 @@ def checks(shape: tuple[int, int]) -> Pixels:
 MISSING = {"30 %": by_chance(0.3), "45 %": by_chance(0.45), "rows": rows, "checks": checks}
 
 
-def detect(distance: NDArray[np.float32]) -> InitialDetection:
-    return detect_object(observation(tof=depth_image(distance)), RIG, "tof", nearest.Settings().build(), 200)
+def detect(distance: NDArray[np.floating]) -> InitialDetection:
+    return detect_object(
+        observation(tof=depth_image(distance.astype(np.float32))), RIG, "tof", nearest.Settings().build(), 200
+    )
 
 
 @pytest.mark.parametrize("missing", MISSING.values(), ids=MISSING)
@@ -42,12 +45,20 @@ def detect(distance: NDArray[np.float32]) -> InitialDetection:
 def test_the_mesh_is_that_of_all_returns(missing: Callable[[tuple[int, int]], Pixels], background: float) -> None:
     T_ro = placed(turn=0.3, tilt=0.3)
     whole = rectangle(T_ro, background)
-    seen = detect(np.where(missing(whole.shape), np.nan, whole).astype(np.float32))
+    seen = detect(np.where(missing(whole.shape), np.nan, whole))
     mesh, expected = grid_mesh(seen), grid_mesh(detect(whole))
     assert area(mesh) == pytest.approx(area(expected), rel=0.12)
     assert len(mesh.vertices) == pytest.approx(len(expected.vertices), rel=0.25)
     np.testing.assert_allclose(pose.transform(pose.inverse(T_ro), mesh.vertices)[:, 2], 0, atol=5e-4)
     assert not np.isfinite(seen.distance[missing(whole.shape)]).any()  # nothing is made up
+
+
+@pytest.mark.parametrize("missing", MISSING.values(), ids=MISSING)
+def test_a_sheet_is_the_rectangle_of_all_returns(missing: Callable[[tuple[int, int]], Pixels]) -> None:
+    whole = rectangle(placed(turn=0.3, tilt=0.3))
+    sheet, expected = (find_sheet(detect(one)) for one in (np.where(missing(whole.shape), np.nan, whole), whole))
+    np.testing.assert_allclose((sheet.width, sheet.height), (expected.width, expected.height), atol=0.014)  # 3 px
+    np.testing.assert_allclose(sheet.T_rp, expected.T_rp, atol=0.03)
 
 
 @pytest.mark.parametrize("missing", MISSING.values(), ids=MISSING)
