@@ -216,6 +216,5 @@ class Tracker:
 
     def _next(self, tracked: Iterator[TrackedSet]) -> Estimate | None:
         with one_blas_thread:
-            for _, found, _ in tracked:
-                return with_mesh(found, self._session.mesh, self._session.mesh_version)
-        return None
+            one = next(tracked, None)
+            return one and with_mesh(one.estimate, self._session.mesh, self._session.mesh_version)

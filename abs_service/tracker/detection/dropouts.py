@@ -37,7 +37,7 @@ def sparse_gaps(known: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return gaps & (missing > LEAST_SHARE * there)
 
 
-def filled(distance: NDArray[np.float32]) -> NDArray[np.float32]:
+def fill_gaps(distance: NDArray[np.float32]) -> NDArray[np.float32]:
     """Distances (height, width) [m] with the least one beside it in each sparse gap; NaN without return."""
     known = np.isfinite(distance)
     nearest = cv2.erode(np.where(known, distance, np.float32(np.inf)), _AREA)

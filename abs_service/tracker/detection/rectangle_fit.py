@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.detection.dropouts import filled
+from abs_service.tracker.detection.dropouts import fill_gaps
 from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection
 from abs_service.tracker.detection.shapes.sheet_mesh import Sheet
 from calib import pose
@@ -55,7 +55,7 @@ def find_sheet(detection: InitialDetection, limits: Limits = LIMITS) -> Sheet:
     window = _window(seen)
     rows, columns = np.indices(seen.shape)[:, *window]
     rays = camera.directions(np.stack([columns, rows], axis=-1)) @ camera.T_rs[:3, :3].T
-    points = camera.center + rays * filled(detection.distance)[window][..., None]
+    points = camera.center + rays * fill_gaps(detection.distance)[window][..., None]
     T_rp = _plane(points[seen[window]], camera)
     pixels = _pixels_on_plane(pose.transform(pose.inverse(T_rp), points), limits)
     corner = np.array([columns[0, 0], rows[0, 0]])

@@ -7,7 +7,7 @@ from abs_service.pairing.images import ColorImage, DepthImage
 from abs_service.pairing.observation import Observation
 from abs_service.tracker import resolution
 from abs_service.tracker.detection.depth_view import DepthView
-from abs_service.tracker.detection.dropouts import filled
+from abs_service.tracker.detection.dropouts import fill_gaps
 from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection
 from abs_service.tracker.detection.plausibility import LARGEST_M, LARGEST_SCENE_M, MAX_POINTS, check_extent
 from abs_service.tracker.detection.regions.base import Region
@@ -35,7 +35,7 @@ def detect_object(
         raise DetectionError(f"no depth image from {reference} yet")
     distance = subtract_mean_offset(sensor.noise, image.distance, image.amplitude)
     pictures = [(rig.sensors[n].camera, i.rgb) for n, i in observation.images.items() if isinstance(i, ColorImage)]
-    view = DepthView.of(filled(distance), sensor.camera, pictures, observation.t_host_ns)
+    view = DepthView.of(fill_gaps(distance), sensor.camera, pictures, observation.t_host_ns)
     check_extent(view.points_r[view.measured], "everything in sight", LARGEST_SCENE_M, sensor.head)
     inside = region.select(view)
     check_extent(view.points_r[inside], "the object", LARGEST_M, sensor.head)

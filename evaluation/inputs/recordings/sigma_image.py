@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.detection.depth_view import DepthView
+from abs_service.tracker.detection.regions.mask import Mask
 from abs_service.tracker.detection.segments.depth_segments import connected_surfaces
 from abs_service.tracker.models import nurbs
 from abs_service.tracker.optimizers import hybrid
@@ -71,15 +71,12 @@ class Row:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Surface:
-    """The region of one surface of the frame, and its settings."""
+    """The settings of a region: one surface of the frame."""
 
     pixels: NDArray[np.bool_]
 
-    def build(self) -> "_Surface":
-        return self
-
-    def select(self, view: DepthView) -> NDArray[np.bool_]:
-        return self.pixels
+    def build(self) -> Mask:
+        return Mask(self.pixels)
 
 
 def read(folder: Path) -> O3rExposure:

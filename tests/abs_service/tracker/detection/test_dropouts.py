@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from abs_service.tracker.detection.dropouts import filled, sparse_gaps
+from abs_service.tracker.detection.dropouts import fill_gaps, sparse_gaps
 from abs_service.tracker.detection.grid_mesh import grid_mesh
 from abs_service.tracker.detection.initial_detection import InitialDetection
 from abs_service.tracker.detection.rectangle_fit import find_sheet
@@ -76,17 +76,17 @@ def test_what_a_row_without_return_separates_stays_separate(width: int) -> None:
     """As the rim of a thin thing before a background, which sensors often leave out."""
     distance = rectangle(placed(), background=1.02)
     distance[60 : 60 + width] = np.nan
-    np.testing.assert_array_equal(filled(distance), distance)
+    np.testing.assert_array_equal(fill_gaps(distance), distance)
     distance[60 : 60 + width, 80:] = 1.0
     distance[:, 88 : 88 + width] = np.nan  # and where two of them cross
-    np.testing.assert_array_equal(filled(distance), distance)
+    np.testing.assert_array_equal(fill_gaps(distance), distance)
 
 
 def test_gaps_have_a_distance_of_their_neighbours() -> None:
     distance = np.full((20, 20), 1.5, np.float32)
     distance[:, 10:] = 2.0
     distance[1::2] = np.nan
-    there = filled(distance)
+    there = fill_gaps(distance)
     assert np.isfinite(there[:19]).all()
     assert set(there[:19, :9].ravel()) == {1.5}
     assert set(there[:19, 11:].ravel()) == {2.0}
