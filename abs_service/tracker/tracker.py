@@ -22,8 +22,10 @@ from abs_service.tracker.posterior.covariance.vertex_covariance import VertexCov
 from abs_service.tracker.posterior.frame_posterior import FramePosterior
 from abs_service.tracker.posterior.posterior import Posterior
 from abs_service.tracker.posterior.relocation import fit_to_points
+from abs_service.tracker.posterior.search_start import search_start
 from abs_service.tracker.shape_quality import ShapeComparison
 from abs_service.tracker.terms.base import inlier_share
+from abs_service.tracker.terms.patches import patches_of
 
 #: Frames after a start that are searched from scratch: in the first, nothing is known, and in the second, not how fast
 #: the object moves.
@@ -61,6 +63,7 @@ class Tracker:
         self._limits = limits
         self._theta_covariance = ThetaCovariance(model, registration_m)
         self._vertex_covariance = VertexCovariance(model, registration_m, centers)
+        self._patches = patches_of(model.mesh)
         self._shape = ShapeComparison(model.mesh)
         self._followed = 0
         self._last_tracked = model.rest
@@ -76,7 +79,8 @@ class Tracker:
         is_warm = self._followed >= COLD_FRAMES
         budget = Budget(self._evaluations, in_time if self._followed else _without_end)
         start = self._optimizer.follow if is_warm else self._optimizer.explore  # warm or cold start
-        outcome = self._minimize(frame, start(frame, frame.motion.theta, budget), budget)
+        frame, theta = search_start(frame, self._patches)  # the prediction, or where images show the surface's print
+        outcome = self._minimize(frame, start(frame, theta, budget), budget)
         if frame.motion.is_too_narrow(outcome.theta):  # a sudden motion
             frame = frame.with_motion(frame.motion.widened(outcome.theta))
             outcome = self._minimize(frame, self._optimizer.follow(frame, outcome.theta, budget), budget)

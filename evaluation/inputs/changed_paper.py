@@ -7,7 +7,9 @@ of dropouts, with which no object was found before (looked at with 15 to 60 % of
 colour and by depth alone, before nothing, by `nurbs` with all defaults, and compared with the measured points.
 
 Statistic and goals, those of the unchanged sheet (`recordings`): over all of them, median frame at most 3 mm, worst
-15 mm, 85 to 99 % of the points in their 95 % region, no frame TRACKING and wrong.
+15 mm, 85 to 99 % of the points in their 95 % region, no frame TRACKING and wrong. At most two meshes: one that began
+cut by the image's border may be made anew when more of the sheet is seen. Points are bound to that one, too, since the
+evening of 2026-11-28; before, all frames after it counted as outside their regions.
 Seeds: the context's, of noise and dropouts.
 """
 
@@ -46,6 +48,8 @@ class Settings:
     frames: int = 16
     changes: int = 13
 
+
+MESHES = 2
 
 QUICK = Settings(frames=2, changes=2)
 
@@ -162,7 +166,7 @@ def run(settings: Settings, context: Context) -> Findings:
             runs.append(kinect_paper.follow(name, tracker, images, known))
     section = Section("Errors with changed images", (_WHAT, errors_table(runs)))
     return Findings(
-        goals(runs, "Changed images", f"of {len(runs)}"), (section,), {"changes": [one.name for one in runs]}
+        goals(runs, "Changed images", f"of {len(runs)}", MESHES), (section,), {"changes": [one.name for one in runs]}
     )
 
 

@@ -11,7 +11,8 @@ from abs_service.pairing.observation import Observation
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.terms.base import SensorFit, Term
-from abs_service.tracker.terms.linearization import Linear
+from abs_service.tracker.terms.linearization import Linear, PointLinearization
+from abs_service.tracker.terms.patches import Patches
 
 
 class Objective(Protocol):
@@ -46,6 +47,10 @@ class ObservedObjective(Protocol):
 
     def fits(self, surface: Surface) -> list[SensorFit]:
         """Agreement of every contributing sensor with a population of one."""
+        ...
+
+    def match(self, surface: Surface, sparse_jacobian: SparseJacobian, patches: Patches) -> list[PointLinearization]:
+        """Residuals of the places in the images where the appearance of a population of one is, see `Term.match`."""
         ...
 
     def misfit(self, surface: Surface) -> NDArray[np.float64]:
@@ -103,6 +108,10 @@ class ObservedTerms:
     def fits(self, surface: Surface) -> list[SensorFit]:
         """Agreement of every contributing sensor with a population of one."""
         return [term.fit(surface) for term in self._terms]
+
+    def match(self, surface: Surface, sparse_jacobian: SparseJacobian, patches: Patches) -> list[PointLinearization]:
+        """Residuals of the places in the images where the appearance is, of all sensors."""
+        return [term.match(surface, sparse_jacobian, patches) for term in self._terms]
 
     def misfit(self, surface: Surface) -> NDArray[np.float64]:
         """Signed distance of each vertex from its measurements, the largest, and its deviation by noise (2, n) [m]."""

@@ -15,7 +15,8 @@ from abs_service.tracker.models.base import ModelError, SparseJacobian, Surface
 from abs_service.tracker.objectives.base import ObservedTerms, TermSum
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.terms.base import Bounds, SensorFit, Term
-from abs_service.tracker.terms.linearization import Linear
+from abs_service.tracker.terms.linearization import Linear, PointLinearization
+from abs_service.tracker.terms.patches import Patches
 from calib.no_return import NEVER
 from calib.noise.base import LOG_SQRT_2PI, DepthNoise
 from calib.noise.constant import Constant
@@ -123,6 +124,10 @@ class ObservedSquares:
     def fits(self, surface: Surface) -> list[SensorFit]:
         """Agreement of every sensor; without normalised residuals, because weights are no noise model."""
         return [replace(fit, normalized_residual=float("nan")) for fit in self.terms.fits(surface)]
+
+    def match(self, surface: Surface, sparse_jacobian: SparseJacobian, patches: Patches) -> list[PointLinearization]:
+        """See `ObservedObjective`."""
+        return self.terms.match(surface, sparse_jacobian, patches)
 
     def misfit(self, surface: Surface) -> NDArray[np.float64]:
         """See `ObservedObjective`."""

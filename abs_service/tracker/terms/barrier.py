@@ -7,6 +7,7 @@ from abs_service.pairing.images import BeamReading, Image
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.terms.base import Bounds, SensorFit
 from abs_service.tracker.terms.linearization import NO_ROWS, PointLinearization
+from abs_service.tracker.terms.patches import Patches
 from calib.camera import Camera
 from calib.jit import kernel
 from calib.noise.images.binary import LightBarrier
@@ -55,6 +56,10 @@ class BarrierTerm:
         """Agreement of the single sample with a population of one."""
         agrees = int(self._crossing(surface)[0] == self._interrupted)
         return SensorFit(self.sensor, 1, 0, 1, agrees, -float(self.cost(surface)[0]), float("nan"))
+
+    def match(self, surface: Surface, sparse_jacobian: SparseJacobian, patches: Patches) -> PointLinearization:
+        """No residuals: there is no appearance."""
+        return PointLinearization(*NO_ROWS, sparse_jacobian, np.zeros((0, 3)))
 
     def misfit(self, surface: Surface) -> NDArray[np.float64]:
         """Zero: a beam has no vertex."""

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from abs_service.pairing.images import Image
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import View
-from abs_service.tracker.terms.linearization import Linear
+from abs_service.tracker.terms.linearization import Linear, PointLinearization
+from abs_service.tracker.terms.patches import Patches
 from abs_service.tracker.terms.vertex_counts import Sight, VertexCounts
 from calib.no_return import CAUTIOUS, NoReturn
 from calib.noise.fit.truncation import deviation_within
@@ -216,6 +217,16 @@ class Term(Protocol):
 
     def fit(self, surface: Surface) -> SensorFit:
         """Agreement of the sensor with a population of one."""
+        ...
+
+    def match(self, surface: Surface, sparse_jacobian: SparseJacobian, patches: Patches) -> PointLinearization:
+        """Residuals of the places in the image where the appearance of a population of one is, and their derivatives.
+
+        Args:
+            surface: the deformed mesh.
+            sparse_jacobian: derivative of its vertices with respect to theta.
+            patches: of its vertices, which are looked for one by one.
+        """
         ...
 
     def misfit(self, surface: Surface) -> NDArray[np.float64]:

@@ -75,7 +75,7 @@ class Truth:
 
 @dataclass(frozen=True)
 class MaterialErrors:
-    """Errors of the bound points in one frame with a truth; NaN if the tracker has made another mesh.
+    """Errors of the bound points in one frame with a truth; NaN without an estimate.
 
     Attributes:
         number: of the frame.
@@ -110,8 +110,10 @@ class PaperRun:
 
     Attributes:
         name: of the way.
-        errors: in every frame with a truth after the first, in which the points are bound.
-        bound, beyond: how many of the measured points are bound, and how many are beyond the mesh.
+        errors: in every frame with a truth after those in which the points are bound: the first, and that in which a
+            mesh that the tracker has made anew is seen first.
+        bound, beyond: how many of the measured points are bound to the first mesh, and how many are beyond it.
+        meshes: how many meshes the tracker made.
         tracking: share of all frames that are TRACKING.
         solve_ms: CPU time of every frame but the first [ms].
         shown: estimates of the first and the last frame with a truth.
@@ -121,6 +123,7 @@ class PaperRun:
     errors: tuple[MaterialErrors, ...]
     bound: int
     beyond: int
+    meshes: int
     tracking: float
     solve_ms: NDArray[np.float64]
     shown: tuple[a.Estimate, a.Estimate]
@@ -192,20 +195,21 @@ def follow(name: str, tracker: a.Tracker, frames: Iterable[Frame], known: Truth)
     first, last = (estimates[truths[k][0]] for k in (0, -1))
     if not len(first.faces):
         raise UnboundError(f"{name}: {', '.join(first.reasons)}")
-    binding = bind(truths[0][1], first.vertices, first.faces)
-    errors = tuple(
-        _errors(number, binding, estimates[number], points, known.sigma, first.mesh_version)
-        for number, points in truths[1:]
-    )
-    bound, tracking = int(binding.bound.sum()), [one.status == a.Status.TRACKING for one in estimates.values()]
-    beyond, times = len(binding.bound) - bound, np.array(solve_ms[1:])
-    return PaperRun(name, errors, bound, beyond, float(np.mean(tracking)), times, (first, last))
+    bindings, errors, version = [bind(truths[0][1], first.vertices, first.faces)], [], first.mesh_version
+    for number, points in truths[1:]:
+        estimate = estimates[number]
+        if estimate.mesh_version != version and np.isfinite(estimate.vertices).all():
+            bindings.append(bind(points, estimate.vertices, estimate.faces))
+            version = estimate.mesh_version
+        else:
+            errors.append(_errors(number, bindings[-1], estimate, points, known.sigma))
+    bound, tracking = bindings[0].bound, [one.status == a.Status.TRACKING for one in estimates.values()]
+    counts = int(bound.sum()), int((~bound).sum()), len(bindings)
+    return PaperRun(name, tuple(errors), *counts, float(np.mean(tracking)), np.array(solve_ms[1:]), (first, last))
 
 
-def _errors(
-    number: int, binding: Binding, estimate: a.Estimate, points: Points, sigma: float, version: int
-) -> MaterialErrors:
-    if estimate.mesh_version != version or not np.isfinite(estimate.vertices).all():
+def _errors(number: int, binding: Binding, estimate: a.Estimate, points: Points, sigma: float) -> MaterialErrors:
+    if not np.isfinite(estimate.vertices).all():
         nan = float("nan")
         return MaterialErrors(number, estimate.status, nan, nan, nan, nan, nan, 0.0, 0.0)
     found = binding.points(estimate.vertices)

@@ -25,6 +25,7 @@ from abs_service.tracker.terms.depth.outline.continuation import Continuation, N
 from abs_service.tracker.terms.depth.texels import Unusable, texels
 from abs_service.tracker.terms.gradients import color_rows, depth_rows
 from abs_service.tracker.terms.linearization import NO_ROWS, PointLinearization, Together
+from abs_service.tracker.terms.patches import Patches
 from abs_service.tracker.terms.vertex_counts import Sight
 from calib import pose
 from calib.camera import Camera
@@ -188,6 +189,10 @@ class DepthTerm:
             remainder=self._continuation.remainder(surface),
             is_surprised=self._is_surprised,
         )
+
+    def match(self, surface: Surface, sparse_jacobian: SparseJacobian, patches: Patches) -> PointLinearization:
+        """No residuals: there is no appearance."""
+        return PointLinearization(*NO_ROWS, sparse_jacobian, np.zeros((0, 3)))
 
     def misfit(self, surface: Surface) -> NDArray[np.float64]:
         """Signed distance of each vertex from its measurement, and the deviation of that by noise (2, n) [m].

@@ -14,6 +14,7 @@ from abs_service.tracker.terms.base import Bounds, SensorFit, facing, summarize
 from abs_service.tracker.terms.gradients import channel_gradients, shortened
 from abs_service.tracker.terms.image_noise import NORMAL_MEDIAN, noise_deviation
 from abs_service.tracker.terms.linearization import PointLinearization
+from abs_service.tracker.terms.patches import Patches
 from abs_service.tracker.terms.photometric.channel_cost import (
     CHANNEL,
     INVERSE,
@@ -24,6 +25,7 @@ from abs_service.tracker.terms.photometric.channel_cost import (
     fill,
 )
 from abs_service.tracker.terms.photometric.illumination import Illumination
+from abs_service.tracker.terms.photometric.matching import matched
 from abs_service.tracker.terms.photometric.registration_bias import RegistrationBias
 from abs_service.tracker.terms.photometric.shadow import Shadow
 from abs_service.tracker.terms.photometric.texture_registration_noise import (
@@ -150,6 +152,19 @@ class ChannelTerm:
         sight = Sight.of(pixel, facing(self._view, surface), np.zeros_like(hidden), hidden, ~known)
         mean = -float(self.cost(surface)[0]) / len(residual)
         return summarize(self.sensor, sight, np.isfinite(residual), np.abs(residual), mean)
+
+    def match(self, surface: Surface, sparse_jacobian: SparseJacobian, patches: Patches) -> PointLinearization:
+        """See `Term`."""
+        seen = self._illumination.shine(self._view.synthesize(surface), surface, self._view)
+
+        def costs(pixel: NDArray[np.int32], samples: NDArray[np.intp]) -> NDArray[np.float64]:
+            out, own = np.empty(len(pixel)), samples if len(self._widening.factor) > 1 else np.zeros(1, np.intp)
+            texture, factor, log_factor, outlier, uniform = self._measured
+            attributes = np.ascontiguousarray(seen.attributes[:, :, samples])
+            channel_cost(pixel, attributes, texture, factor[own], log_factor[own], outlier, uniform, out)
+            return out
+
+        return matched(self._view, surface, sparse_jacobian, seen.pixel[0], patches, self._image.shape, costs)
 
     def misfit(self, surface: Surface) -> NDArray[np.float64]:
         """Zero: brightness carries no distance."""

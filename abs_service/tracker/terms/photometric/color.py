@@ -10,7 +10,9 @@ from abs_service.tracker.synthesis.window import NOTHING_HAS, Bordered
 from abs_service.tracker.terms.base import Bounds, SensorFit, facing, summarize
 from abs_service.tracker.terms.gradients import noiseless_color_rows
 from abs_service.tracker.terms.linearization import PointLinearization
+from abs_service.tracker.terms.patches import Patches
 from abs_service.tracker.terms.photometric.illumination import Exposed
+from abs_service.tracker.terms.photometric.matching import matched
 from abs_service.tracker.terms.photometric.registration_bias import RegistrationBias
 from abs_service.tracker.terms.photometric.shadow import Shadow
 from abs_service.tracker.terms.photometric.texture_registration_noise import (
@@ -140,6 +142,19 @@ class ColorTerm:
         mean = -float(self._cost_of(seen, surface)[0]) / len(residual)
         size = np.sqrt(np.mean(residual**2, axis=1))
         return summarize(self.sensor, sight, measured, size, mean, channels=3)
+
+    def match(self, surface: Surface, sparse_jacobian: SparseJacobian, patches: Patches) -> PointLinearization:
+        """See `Term`."""
+        seen = self._synthesize(surface)
+
+        def costs(pixel: NDArray[np.int32], samples: NDArray[np.intp]) -> NDArray[np.float64]:
+            out, own = np.empty(len(pixel)), samples if len(self._inverse) > 1 else np.zeros(1, np.intp)
+            texture, inverse, normalizer, outlier, uniform = self._measured
+            attributes = np.ascontiguousarray(seen.attributes[:, :, samples])
+            _color_cost(pixel, attributes, texture, inverse[own], normalizer[own], outlier, uniform, out)
+            return out
+
+        return matched(self._view, surface, sparse_jacobian, seen.pixel[0], patches, self._image.shape, costs)
 
     def misfit(self, surface: Surface) -> NDArray[np.float64]:
         """Zero: colours carry no distance."""

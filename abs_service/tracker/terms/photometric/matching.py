@@ -1,0 +1,106 @@
+"""Search for the appearance of a mesh in an image: patches are shifted until they agree with it.
+
+Gradients of an image hold within a pixel or two of a fine print. A mesh that lies further beside it, after a sudden
+motion or behind an occluder, ends in a minimum of the cost that is not the least. So all shifts of a patch of samples
+within some pixels are compared, as in block matching (J. Jain, A. Jain: Displacement measurement and its application in
+interframe image coding. IEEE Transactions on Communications 29, 1981), by the cost that the samples have there.
+"""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.tracker.models.base import SparseJacobian, Surface
+from abs_service.tracker.synthesis.base import View
+from abs_service.tracker.synthesis.perspective import project_with_jacobian
+from abs_service.tracker.terms.linearization import PointLinearization
+from abs_service.tracker.terms.patches import Patches
+
+#: Largest shift of a patch to the right or down [px], and largest number of its samples that are compared.
+REACH_PX, MOST = 8, 40
+
+#: A shift that is less likely by this is another one [nats]; of two places that differ by less, either may be right.
+SIGNIFICANT, AMBIGUOUS = 20.0, 10.0
+
+#: Shifts of up to this are the same place [px]; gradients hold as far.
+NEAR_PX = 2
+
+#: Standard deviation of the place of a patch in the image [px].
+SIGMA_PX = 0.5
+
+#: Cost (s,) [nats] of some samples (k,), given by their indices, at pixels (s, k) of the texture with a border.
+Costs = Callable[[NDArray[np.int32], NDArray[np.intp]], NDArray[np.float64]]
+
+_STEPS = np.arange(-REACH_PX, REACH_PX + 1, dtype=np.int32)
+#: All shifts (s, 2), right and down [px], and the index of the one by nothing.
+_SHIFTS = np.stack([part.ravel() for part in np.meshgrid(_STEPS, _STEPS)], axis=1)
+_STILL = len(_SHIFTS) // 2
+
+
+def matched(
+    view: View,
+    surface: Surface,
+    sparse_jacobian: SparseJacobian,
+    pixel: NDArray[np.int32],
+    patches: Patches,
+    shape: tuple[int, ...],
+    costs: Costs,
+) -> PointLinearization:
+    """Residuals of the places in the image, two for each sample, whose patch is found there; see `Term.match`."""
+    of_samples = np.argmax(view.spread(surface, np.eye(int(patches.max()) + 1)[patches]), axis=1)
+    shift = _shifts(pixel, (shape[0], shape[1]), of_samples, costs)
+    found = np.flatnonzero(np.isfinite(shift[:, 0]))
+    vertices = view.spread(surface, surface.vertices[0].T)
+    rows = project_with_jacobian(view.camera, vertices[found])[1].reshape(-1, 3) / SIGMA_PX
+    samples = view.follow(surface, sparse_jacobian)
+    return PointLinearization(-shift[found].ravel() / SIGMA_PX, rows, np.repeat(found, 2), samples, vertices)
+
+
+def is_beside(rows: Sequence[PointLinearization]) -> bool:
+    """True if any patch is found beside the mesh, further than gradients hold."""
+    return any(len(part.residual) and np.abs(part.residual).max() * SIGMA_PX >= NEAR_PX for part in rows)
+
+
+def _shifts(
+    pixel: NDArray[np.int32], shape: tuple[int, int], of_samples: NDArray[np.intp], costs: Costs
+) -> NDArray[np.float64]:
+    """Shift (m, 2) [px] of samples to where the image shows their appearance, right and down; NaN where unknown.
+
+    Args:
+        pixel: of the samples (m,), see `Synthesis`.
+        shape: of the image without its border (height, width).
+        of_samples: patch (m,) of every sample.
+        costs: of samples at other pixels.
+    """
+    result = np.full((len(pixel), 2), np.nan)
+    for patch in range(int(of_samples.max()) + 1):
+        samples = np.flatnonzero((of_samples == patch) & (pixel > 0))
+        if len(samples):
+            some = samples[:: -(-len(samples) // MOST)]
+            result[samples] = _best(costs(_shifted(pixel[some], shape), some))
+    return result
+
+
+def _best(costs: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The shift (2,) [px] of least cost, of costs (s,); 0 if that is hardly worse; NaN if other places are as good."""
+    best = int(np.argmin(costs))
+    if costs[_STILL] - costs[best] < SIGNIFICANT:
+        best = _STILL
+    elsewhere = np.abs(_SHIFTS - _SHIFTS[best]).max(axis=1) > NEAR_PX
+    if costs[elsewhere].min() - costs[best] < AMBIGUOUS:
+        return np.full(2, np.nan)
+    return _SHIFTS[best].astype(np.float64)
+
+
+def _shifted(pixel: NDArray[np.int32], shape: tuple[int, int]) -> NDArray[np.int32]:
+    """Pixels (s, k) of all shifts; 0, in the border, outside the image."""
+    height, width = shape
+    stride = width + 2
+    row, column = np.divmod(pixel, stride)
+    right, down = _SHIFTS[:, :1], _SHIFTS[:, 1:]
+    places = pixel + (down * stride + right)
+    if min(row.min(), height + 1 - row.max(), column.min(), width + 1 - column.max()) > REACH_PX:
+        return places
+    rows, columns = row + down, column + right
+    return np.where((rows > 0) & (rows <= height) & (columns > 0) & (columns <= width), places, np.int32(0))
