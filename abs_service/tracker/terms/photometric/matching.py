@@ -87,8 +87,10 @@ def _best(costs: NDArray[np.float64]) -> NDArray[np.float64]:
     best = int(np.argmin(costs))
     if costs[_STILL] - costs[best] < SIGNIFICANT:
         best = _STILL
-    elsewhere = np.abs(_SHIFTS - _SHIFTS[best]).max(axis=1) > NEAR_PX
-    if costs[elsewhere].min() - costs[best] < AMBIGUOUS:
+    row, column = divmod(best, len(_STEPS))
+    elsewhere = costs.reshape(len(_STEPS), -1).copy()
+    elsewhere[max(row - NEAR_PX, 0) : row + NEAR_PX + 1, max(column - NEAR_PX, 0) : column + NEAR_PX + 1] = np.inf
+    if elsewhere.min() - costs[best] < AMBIGUOUS:
         return np.full(2, np.nan)
     return _SHIFTS[best].astype(np.float64)
 
@@ -96,10 +98,9 @@ def _best(costs: NDArray[np.float64]) -> NDArray[np.float64]:
 def _shifted(pixel: NDArray[np.int32], shape: tuple[int, int]) -> NDArray[np.int32]:
     """Pixels (s, k) of all shifts; 0, in the border, outside the image."""
     height, width = shape
-    stride = width + 2
-    row, column = np.divmod(pixel, stride)
+    row, column = np.divmod(pixel, width + 2)
     right, down = _SHIFTS[:, :1], _SHIFTS[:, 1:]
-    places = pixel + (down * stride + right)
+    places = pixel + (down * np.int32(width + 2) + right)
     if min(row.min(), height + 1 - row.max(), column.min(), width + 1 - column.max()) > REACH_PX:
         return places
     rows, columns = row + down, column + right
