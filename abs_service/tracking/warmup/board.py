@@ -19,6 +19,8 @@ from drivers.contract.frame import Frame, FrameSet, Geometry, Kind
 
 #: Placeholder camera: kernels accept images of any size, and in a small one there is little to compute.
 _CAMERA = Camera(160, 120, 200.0, 200.0, 79.5, 59.5)
+#: Fewer vertices than a rig has: kernels take any number, and Python computes what is not compiled yet.
+_VERTICES = 60
 #: Placeholder for every depth noise, of which a per-pixel map would not fit the camera; a polynomial that is evaluated.
 _NOISE = GaussianPolynomial(((0.01,), (1e-4,)))
 
@@ -65,7 +67,8 @@ def warm_up(rig: Rig, plan: Plan, report: Callable[[Progress], None] = ignore) -
 def _track_board(sensors: Mapping[str, Sensor], plan: Plan) -> None:
     rig = Rig("warm-up", {name: _sensor(sensor) for name, sensor in sensors.items()})
     frames = [_board(head, Kind(stream), plan.model.board) for head, stream in streams(rig.sensors.values())]
-    tracking = TrackingSession(rig, replace(plan, region=nearest.Settings(), template=first_image.Settings()))
+    small = replace(plan, region=nearest.Settings(), template=first_image.Settings(), vertices=_VERTICES)
+    tracking = TrackingSession(rig, small)
     changed = [[change(frame) for frame in frames] for change in (_with_dropout, _moved, _without_object)]
     for seq, seen in enumerate((frames, *changed)):
         tracking.track(FrameSet(seq, round(seq * 33e6), {frame.key: frame for frame in seen}), lambda: False)
@@ -80,7 +83,9 @@ def _moved(frame: Frame) -> Frame:
     """The object has left a part of its place, before a background; in integers, as most devices deliver distances."""
     if frame.kind != Kind.DEPTH:
         return frame
-    z = np.roll(np.nan_to_num(frame.data, nan=2 * float(np.nanmax(frame.data))), _CAMERA.width // 20, axis=1)
+    rows, columns = np.nonzero(np.isfinite(frame.data))
+    away = np.ptp(rows) // 5, np.ptp(columns) // 5
+    z = np.roll(np.nan_to_num(frame.data, nan=2 * float(np.nanmax(frame.data))), away, axis=(0, 1))
     return replace(frame, data=np.round(z / 1e-3).astype("<u2"), encoding="16UC1", scale=1e-3)
 
 
