@@ -19,8 +19,9 @@ from types import ModuleType
 from typing import Any
 
 import abs_service
-from abs_service.supervision import kernel_cache, parent_watchdog, standard_files
+from abs_service.supervision.children import parent_watchdog
 from abs_service.supervision.exit_codes import Exit, lack_of_host
+from abs_service.supervision.process_setup import kernel_cache, standard_files
 
 #: One line of help for each command; kept here so that `--help` imports none of them.
 COMMANDS = {
@@ -173,7 +174,7 @@ def _preload(given: Sequence[str]) -> None:
     """Starts to import what the processes of a command have in common, while this process imports the command."""
     if set(given[:1]) & PRELOADED.keys() and not {"-h", "--help"} & set(given):
         _compute_with_one_thread()
-        from abs_service.supervision import forked  # noqa: PLC0415 - `multiprocessing` is for those that have processes
+        from abs_service.supervision.children import forked  # noqa: PLC0415 - `multiprocessing` is for those that need it
 
         forked.preload(PRELOADED[given[0]])
 

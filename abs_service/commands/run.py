@@ -28,12 +28,14 @@ from abs_service.commands.parts.rig_in_memory import RigInMemory, in_memory
 from abs_service.commands.running import outcome, settled_file, view
 from abs_service.display.terminal import choice
 from abs_service.recording.disk import folder
-from abs_service.supervision import forked, log_lines, metrics, systemd
-from abs_service.supervision.child import Child
-from abs_service.supervision.child_process import ChildProcess, Process, Spawn
+from abs_service.supervision.children import forked
+from abs_service.supervision.children.child import Child
+from abs_service.supervision.children.child_process import ChildProcess, Process, Spawn
 from abs_service.supervision.exit_codes import Exit
+from abs_service.supervision.health import metrics, systemd
+from abs_service.supervision.health.rig_view import Display
+from abs_service.supervision.process_setup import log_lines
 from abs_service.supervision.repeats import Tracebacks
-from abs_service.supervision.rig_view import Display
 from abs_service.supervision.run_session import Renewal, RunSession
 from abs_service.supervision.supervisor import Limits, Supervisor
 from abs_service.wire.commands import RefusedError

@@ -14,9 +14,9 @@ from abs_service.bus.health import Health, Level
 from abs_service.bus.pools import EndedPools
 from abs_service.bus.queues import LatestQueue
 from abs_service.bus.stamps import HeaderFactory, WallClock
-from abs_service.supervision import rig_state
-from abs_service.supervision.child import PROCESS, Child, State
-from abs_service.supervision.rig_view import Display, RigView
+from abs_service.supervision.children.child import PROCESS, Child, State
+from abs_service.supervision.health import rig_state
+from abs_service.supervision.health.rig_view import Display, RigView
 from abs_service.supervision.supervisor import Supervisor
 from abs_service.tracking.monitors.silence_monitor import SilenceMonitor
 from abs_service.wire import commands

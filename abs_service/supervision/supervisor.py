@@ -7,8 +7,8 @@ import logging
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from abs_service.supervision.child import FIRST_BACKOFF_NS, FIRST_LOOK_NS, Child, State, exit_reason
-from abs_service.supervision.child_process import NO_PROCESS, Spawn
+from abs_service.supervision.children.child import FIRST_BACKOFF_NS, FIRST_LOOK_NS, Child, State, exit_reason
+from abs_service.supervision.children.child_process import NO_PROCESS, Spawn
 from abs_service.supervision.exit_codes import Exit
 from abs_service.supervision.repeats import Repeats, counted
 

@@ -16,7 +16,7 @@ from abs_service.commands import run
 from abs_service.display.terminal import choice
 from abs_service.display.terminal.output import Output
 from abs_service.display.terminal.table import TableDisplay, draw
-from abs_service.supervision.rig_view import RigView
+from abs_service.supervision.health.rig_view import RigView
 
 #: Length of the run [s].
 DURATION_S = 15

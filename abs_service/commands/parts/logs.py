@@ -11,7 +11,7 @@ from typing import IO, cast
 import abs_service
 from abs_service.display.terminal import output
 from abs_service.supervision.exit_codes import code_for, is_for_user
-from abs_service.supervision.log_lines import ERROR, JsonFormatter
+from abs_service.supervision.process_setup.log_lines import ERROR, JsonFormatter
 from drivers.contract.text import printable
 
 LEVELS = ("debug", "info", "warning", "error")

@@ -17,7 +17,7 @@ from abs_service.bus.security.mutual_tls import TlsError
 from abs_service.bus.session import Role
 from abs_service.bus.zenoh_bus import ZenohBus
 from abs_service.commands.parts import library_output, logs
-from abs_service.supervision import process_tuning
+from abs_service.supervision.process_setup import process_tuning
 from abs_service.wire.checked_bus import CheckedBus
 
 #: Least time between two calls by SIGHUP [s].

@@ -24,8 +24,8 @@ from abs_service.capture.device_supervisor import DeviceSupervisor
 from abs_service.capture.metadata_publisher import MetadataPublisher
 from abs_service.capture.point_clouds import PointCloudPublisher
 from abs_service.commands.parts import rig_devices, rig_process
-from abs_service.supervision import process_tuning
 from abs_service.supervision.exit_codes import Exit
+from abs_service.supervision.process_setup import process_tuning
 from abs_service.wire import control_commands
 from drivers.contract.device import AddressError, Device, Sink
 from drivers.opening import open_device

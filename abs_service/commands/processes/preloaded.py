@@ -3,7 +3,7 @@
 from contextlib import suppress
 from importlib import import_module
 
-from abs_service.supervision import forked
+from abs_service.supervision.children import forked
 
 #: Beside what the demo rig names: its model, search and objective are the default ones.
 MODULES = (

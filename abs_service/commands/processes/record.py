@@ -26,8 +26,8 @@ from abs_service.recording.recorder_settings import RecorderSettings
 from abs_service.recording.recovery import InUseError, RecoveryError, leftovers, recover, remove_interrupted, set_aside
 from abs_service.recording.triggers.first_tracking import FirstTracking
 from abs_service.recording.triggers.trigger import ALWAYS, Asked, Trigger
-from abs_service.supervision import process_tuning
 from abs_service.supervision.exit_codes import Exit
+from abs_service.supervision.process_setup import process_tuning
 from abs_service.wire import commands
 from drivers.encoding import encoded_image
 from drivers.encoding.encoded_image import ImageCodec

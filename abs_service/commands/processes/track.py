@@ -27,8 +27,8 @@ from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.commands.parts import chosen_region, rig_process
 from abs_service.pairing.common_clock import CommonClock
 from abs_service.pairing.frame_set_queue import FrameSetQueue
-from abs_service.supervision import process_tuning
 from abs_service.supervision.exit_codes import Exit
+from abs_service.supervision.process_setup import process_tuning
 from abs_service.tracking.live.estimate_publisher import EstimatePublisher
 from abs_service.tracking.live.live_tracker import LiveTracker
 from abs_service.tracking.live.tracker_health import TrackerHealth

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from abs_service.supervision.exit_codes import Exit
-from abs_service.supervision.rig_view import RigView
+from abs_service.supervision.health.rig_view import RigView
 from abs_service.tracking.log.tracker_log import TrackerLog
 
 

@@ -2,7 +2,7 @@
 
 from absmsg.v1.health_pb2 import Health
 
-from abs_service.supervision.rig_view import dropped, size
+from abs_service.supervision.health.rig_view import dropped, size
 
 
 def words(component: str, health: Health) -> str:

@@ -13,9 +13,9 @@ from typing import Self
 
 from absmsg.v1.health_pb2 import Health
 
-from abs_service.supervision import log_lines
+from abs_service.supervision.health.rig_view import RigView
+from abs_service.supervision.process_setup import log_lines
 from abs_service.supervision.repeats import Repeats
-from abs_service.supervision.rig_view import RigView
 from abs_service.tracking.log.tracker_log import EstimateReport
 
 SOCKET = "/run/systemd/journal/socket"

@@ -5,7 +5,7 @@ from contextlib import suppress
 from typing import Self
 
 from abs_service.display.terminal.output import Output
-from abs_service.supervision.rig_view import RigView, size
+from abs_service.supervision.health.rig_view import RigView, size
 from abs_service.tracking.log.tracker_log import EstimateReport
 
 PERIOD_NS = 1_000_000_000

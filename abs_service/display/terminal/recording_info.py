@@ -11,7 +11,7 @@ from rich.table import Table
 
 from abs_service.display.terminal import recorded_configuration
 from abs_service.recording.summary import Summary, Topic, Track
-from abs_service.supervision.rig_view import size
+from abs_service.supervision.health.rig_view import size
 from drivers.contract.text import printable
 
 

@@ -13,8 +13,8 @@ from rich.table import Table
 from rich.text import Text
 
 from abs_service.display.terminal.output import Output
-from abs_service.supervision.child import State
-from abs_service.supervision.rig_view import RigView, size
+from abs_service.supervision.children.child import State
+from abs_service.supervision.health.rig_view import RigView, size
 from abs_service.tracking.log.tracker_log import EstimateReport, TrackerLog
 
 #: Time between two tables [ns].

@@ -10,10 +10,10 @@ from absmsg.v1.health_pb2 import Health
 from abs_service.bus import keys
 from abs_service.bus.contract import Sample
 from abs_service.commands.running import outcome
-from abs_service.supervision.child import Child, State
+from abs_service.supervision.children.child import Child, State
 from abs_service.supervision.exit_codes import Exit
-from abs_service.supervision.rig_state import RigState
-from abs_service.supervision.rig_view import RigView
+from abs_service.supervision.health.rig_state import RigState
+from abs_service.supervision.health.rig_view import RigView
 from abs_service.tracking.log.tracker_log import TrackerLog
 
 

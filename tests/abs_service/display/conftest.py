@@ -3,7 +3,7 @@
 import pytest
 from absmsg.v1.health_pb2 import Health
 
-from abs_service.supervision.rig_state import RigState
+from abs_service.supervision.health.rig_state import RigState
 from tests.abs_service.display.full_swing import Clock, S, capture, recorder, report, take_health
 
 

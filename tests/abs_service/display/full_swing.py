@@ -5,10 +5,10 @@ from pathlib import Path
 from absmsg.v1.health_pb2 import Health
 
 from abs_service.bus.contract import Sample
-from abs_service.supervision.child import Child, State
-from abs_service.supervision.rig_view import RigView
+from abs_service.supervision.children.child import Child, State
+from abs_service.supervision.health.rig_view import RigView
 from abs_service.tracking.log.tracker_log import EstimateReport
-from tests.abs_service.supervision.idle_process import Idle
+from tests.abs_service.supervision.children.idle_process import Idle
 
 S = 1_000_000_000
 

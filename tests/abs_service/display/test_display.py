@@ -12,8 +12,8 @@ from abs_service.display.terminal import output
 from abs_service.display.terminal.lines import JsonDisplay, PlainDisplay, line
 from abs_service.display.terminal.output import Output
 from abs_service.display.terminal.table import TableDisplay
-from abs_service.supervision.rig_state import RigState
-from abs_service.supervision.rig_view import size
+from abs_service.supervision.health.rig_state import RigState
+from abs_service.supervision.health.rig_view import size
 from tests.abs_service.display.full_swing import Clock, S, recorder, report, take_health, view
 
 

@@ -12,8 +12,8 @@ from rich.spinner import Spinner
 from abs_service.display.terminal.lines import line
 from abs_service.display.terminal.output import Output
 from abs_service.display.terminal.table import STATUS_COLORS, TableDisplay, draw
-from abs_service.supervision.child import Child, State
-from abs_service.supervision.rig_state import RigState
+from abs_service.supervision.children.child import Child, State
+from abs_service.supervision.health.rig_state import RigState
 from abs_service.tracking.log.sensor_shares import SensorShares
 from tests.abs_service.display.full_swing import Clock, recorder, report, take_health, view
 

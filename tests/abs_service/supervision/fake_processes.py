@@ -2,7 +2,7 @@
 
 import signal
 
-from abs_service.supervision.child import Child
+from abs_service.supervision.children.child import Child
 from abs_service.supervision.supervisor import Limits, Supervisor
 
 S = 1_000_000_000

@@ -12,7 +12,7 @@ from abs_service.bus.contract import EVENTS
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.display.terminal.lines import PlainDisplay
 from abs_service.display.terminal.output import Output
-from abs_service.supervision.child import Child, State
+from abs_service.supervision.children.child import Child, State
 from abs_service.supervision.run_session import Renewal
 from abs_service.tracking.monitors import silence_monitor
 from abs_service.wire import commands, estimate_messages

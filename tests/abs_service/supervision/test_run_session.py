@@ -18,7 +18,7 @@ from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.commands import run
 from abs_service.display.terminal.lines import PlainDisplay
 from abs_service.display.terminal.output import Output
-from abs_service.supervision.child import Child
+from abs_service.supervision.children.child import Child
 from abs_service.supervision.exit_codes import Exit
 from abs_service.supervision.run_session import Renewal, RunSession
 from abs_service.supervision.supervisor import Limits, Supervisor
@@ -26,7 +26,7 @@ from abs_service.tracking.monitors import silence_monitor
 from abs_service.wire import commands, estimate_messages
 from abs_service.wire.checked_bus import CheckedBus
 from tests.abs_service.bus.loopback import LoopbackBus
-from tests.abs_service.supervision.idle_process import Idle
+from tests.abs_service.supervision.children.idle_process import Idle
 
 RIG = """
 version = 1

@@ -2,7 +2,7 @@
 
 import pytest
 
-from abs_service.supervision.child_process import ThreadTimes
+from abs_service.supervision.children.child_process import ThreadTimes
 from tests.abs_service.supervision.fake_processes import S, World, passes
 
 

@@ -2,8 +2,8 @@ import os
 
 import pytest
 
-from abs_service.supervision.child import State
-from abs_service.supervision.child_process import ThreadTimes
+from abs_service.supervision.children.child import State
+from abs_service.supervision.children.child_process import ThreadTimes
 from abs_service.supervision.exit_codes import Exit
 from tests.abs_service.supervision.fake_processes import S, World, ends, passes
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from abs_service.supervision.child import State
+from abs_service.supervision.children.child import State
 from abs_service.supervision.exit_codes import Exit
 from tests.abs_service.supervision.fake_processes import S, World, ends, passes
 

@@ -18,7 +18,7 @@ from abs_service.bus.stamps import WallClock
 from abs_service.display.terminal.lines import JsonDisplay, PlainDisplay
 from abs_service.display.terminal.output import Output
 from abs_service.display.terminal.table import draw
-from abs_service.supervision.rig_view import Display
+from abs_service.supervision.health.rig_view import Display
 from abs_service.supervision.run_session import RunSession
 from abs_service.supervision.supervisor import Supervisor
 from abs_service.wire.checked_bus import CheckedBus

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
-from abs_service.supervision import log_lines
-from abs_service.supervision.child_process import NO_PROCESS, Process, ThreadTimes, longest_wait_ns
+from abs_service.supervision.children.child_process import NO_PROCESS, Process, ThreadTimes, longest_wait_ns
+from abs_service.supervision.process_setup import log_lines
 
 #: A label of the health of `run` for each process, after which the component's name follows: its state, and why.
 PROCESS = "process."

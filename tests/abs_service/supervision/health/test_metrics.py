@@ -11,10 +11,10 @@ import pytest
 from absmsg.v1.health_pb2 import Health
 
 from abs_service.bus.contract import Sample
-from abs_service.supervision import metrics
-from abs_service.supervision.child import Child
-from abs_service.supervision.rig_state import RigState
-from abs_service.supervision.rig_view import RigView
+from abs_service.supervision.children.child import Child
+from abs_service.supervision.health import metrics
+from abs_service.supervision.health.rig_state import RigState
+from abs_service.supervision.health.rig_view import RigView
 from abs_service.tracking.log.tracker_log import EstimateReport
 
 S = 1_000_000_000

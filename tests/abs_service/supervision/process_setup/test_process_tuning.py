@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from abs_service.supervision import process_tuning
+from abs_service.supervision.process_setup import process_tuning
 
 
 @pytest.fixture
@@ -35,7 +35,7 @@ def test_what_is_loaded_is_searched_for_garbage_no_more():
 #: Faults of a process that has ten images of 3 MB and their copies, one after the other, after the first ones.
 _FAULTS = """
 import resource
-from abs_service.supervision import process_tuning
+from abs_service.supervision.process_setup import process_tuning
 {tune}
 def faults():
     for _ in range(10):

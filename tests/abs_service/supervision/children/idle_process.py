@@ -1,6 +1,6 @@
 """A process that does nothing until it is asked to end."""
 
-from abs_service.supervision.child_process import ThreadTimes
+from abs_service.supervision.children.child_process import ThreadTimes
 
 
 class Idle:

@@ -31,7 +31,7 @@ def test_a_command_whose_standard_files_are_closed_works(closed):
 @pytest.mark.parametrize("closed", ["<&-", "<&- >&- 2>&-"])
 def test_what_is_opened_later_is_no_standard_file(closed):
     program = (
-        "import os\nfrom abs_service.supervision import standard_files\nstandard_files.secure()\n"
+        "import os\nfrom abs_service.supervision.process_setup import standard_files\nstandard_files.secure()\n"
         "os._exit(os.open('/', os.O_RDONLY))"
     )
     code, _, _ = shell(f'{sys.executable} -c "{program}" {closed}')
@@ -63,13 +63,14 @@ def test_a_working_directory_that_was_deleted_is_told(tmp_path):
 
 
 def test_a_low_limit_of_open_files_is_raised_if_it_can_be():
-    program = "from abs_service.supervision import standard_files as s; s.allow_files(); import resource as r"
+    program = "import abs_service.supervision.process_setup.standard_files as s, resource as r; s.allow_files()"
     code, output, _ = shell(f'ulimit -S -n 32; {sys.executable} -c "{program}; print(r.getrlimit(r.RLIMIT_NOFILE)[0])"')
     assert (code, output) == (0, b"1024\n")
 
 
 def test_a_rig_may_open_more_files_since_each_restart_of_a_process_costs_some():
-    program = "from abs_service.supervision import forked as f, standard_files as s; s.allow_files(f.FILES)"
+    modules = "children.forked as f, abs_service.supervision.process_setup.standard_files as s"
+    program = f"import abs_service.supervision.{modules}; s.allow_files(f.FILES)"
     shown = f"{program}; import resource as r; print(r.getrlimit(r.RLIMIT_NOFILE)[0])"
     code, output, _ = shell(f'ulimit -S -n 1024; ulimit -H -n 5000; {sys.executable} -c "{shown}"')
     assert (code, output) == (0, b"5000\n")

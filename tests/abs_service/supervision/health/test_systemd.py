@@ -12,13 +12,13 @@ import pytest
 from absmsg.v1.health_pb2 import Health
 
 from abs_service.bus.contract import Sample
-from abs_service.supervision import systemd
-from abs_service.supervision.rig_state import RigState
-from abs_service.supervision.rig_view import RigView
+from abs_service.supervision.health import systemd
+from abs_service.supervision.health.rig_state import RigState
+from abs_service.supervision.health.rig_view import RigView
 from abs_service.tracking.log.tracker_log import EstimateReport
 
 S = 1_000_000_000
-UNIT = Path(__file__).parents[3] / "docker" / "abs-service@.service"
+UNIT = Path(__file__).parents[4] / "docker" / "abs-service@.service"
 
 
 class Manager:

@@ -10,7 +10,7 @@ import socket
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 
-from abs_service.supervision.rig_view import RigView
+from abs_service.supervision.health.rig_view import RigView
 
 #: Extension of the start that is asked for, four times as often as needed [ns].
 EXTENSION_NS = 60_000_000_000

@@ -5,7 +5,7 @@ import os
 import shutil
 
 import abs_service
-from abs_service.supervision import standard_files
+from abs_service.supervision.process_setup import standard_files
 
 #: Numba's environment variable for it.
 VARIABLE = "NUMBA_CACHE_DIR"

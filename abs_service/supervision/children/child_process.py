@@ -12,7 +12,7 @@ from multiprocessing.context import ForkServerProcess
 from pathlib import Path
 from typing import Protocol
 
-from abs_service.supervision import forked
+from abs_service.supervision.children import forked
 
 #: Lines of a child's output that are kept.
 TAIL_LINES = 40

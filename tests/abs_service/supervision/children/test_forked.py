@@ -1,6 +1,6 @@
 import signal
 
-from abs_service.supervision import forked
+from abs_service.supervision.children import forked
 
 
 def test_ctrl_c_does_not_reach_a_fork_server_that_begins(monkeypatch):

@@ -7,7 +7,7 @@ import tempfile
 import pytest
 
 import abs_service
-from abs_service.supervision import kernel_cache, standard_files
+from abs_service.supervision.process_setup import kernel_cache, standard_files
 
 
 @pytest.fixture

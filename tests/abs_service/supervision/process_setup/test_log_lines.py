@@ -4,7 +4,7 @@ import sys
 
 import pytest
 
-from abs_service.supervision import log_lines
+from abs_service.supervision.process_setup import log_lines
 
 
 def record(message, *args, level=logging.WARNING, error=None, **fields):

@@ -8,7 +8,7 @@ from absmsg.v1.health_pb2 import Health
 from absmsg.v1.surface_truth_pb2 import SurfaceTruth
 
 from abs_service.bus.contract import Sample
-from abs_service.supervision.rig_state import RigState
+from abs_service.supervision.health.rig_state import RigState
 from abs_service.tracking.log.tracker_log import RunningStats
 
 

@@ -8,8 +8,8 @@ from typing import Protocol, Self
 from absmsg.v1.health_pb2 import Health
 
 from abs_service.bus import keys
-from abs_service.supervision.child import Child, State
-from abs_service.supervision.rig_state import Received, RigState
+from abs_service.supervision.children.child import Child, State
+from abs_service.supervision.health.rig_state import Received, RigState
 from abs_service.tracking.log.tracker_log import EstimateReport
 
 #: A component that says nothing for this long, of its healths each second, has no present numbers [ns].

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from abs_service.supervision import forked
-from abs_service.supervision.child_process import ChildProcess, ThreadTimes
-from tests.abs_service.supervision import child_code
+from abs_service.supervision.children import forked
+from abs_service.supervision.children.child_process import ChildProcess, ThreadTimes
+from tests.abs_service.supervision.children import child_code
 from tests.waiting import eventually
 
 PATH = os.pathsep.join(sys.path)
@@ -78,11 +78,11 @@ def test_killing_a_child_kills_what_it_started(child):
 
 SUPERVISOR = """
 import sys, time
-from abs_service.supervision.child_process import ChildProcess
-from tests.abs_service.supervision import child_code
+from abs_service.supervision.children.child_process import ChildProcess
+from tests.abs_service.supervision.children import child_code
 text = '''
 import signal, time
-from abs_service.supervision import parent_watchdog
+from abs_service.supervision.children import parent_watchdog
 parent_watchdog.GRACE_S = 0.2
 signal.signal(signal.SIGTERM, {handler})
 parent_watchdog.start()
@@ -113,9 +113,9 @@ def test_no_child_outlives_a_supervisor_that_was_killed(handler):
 FORKED = """
 import os, shutil, signal
 from multiprocessing import util
-from abs_service.supervision import forked
-from abs_service.supervision.child_process import ChildProcess
-from tests.abs_service.supervision import child_code
+from abs_service.supervision.children import forked
+from abs_service.supervision.children.child_process import ChildProcess
+from tests.abs_service.supervision.children import child_code
 from tests.waiting import eventually
 
 def servers():
@@ -160,7 +160,7 @@ def test_children_outlive_the_fork_server():
 
 
 WOKEN = """
-from abs_service.supervision import parent_watchdog
+from abs_service.supervision.children import parent_watchdog
 woken = parent_watchdog.start()
 for number in range(2):
     print(woken.is_set(), flush=True)
@@ -181,9 +181,9 @@ def test_a_child_that_is_woken_sees_it_each_time(child):
 
 PRELOADING = """
 import time
-from abs_service.supervision import forked
-from abs_service.supervision.child_process import ChildProcess
-from tests.abs_service.supervision import child_code
+from abs_service.supervision.children import forked
+from abs_service.supervision.children.child_process import ChildProcess
+from tests.abs_service.supervision.children import child_code
 
 forked.preload("abs_service.commands.processes.preloaded")
 child = ChildProcess("act", ["print('works')"], lambda _, line: print(line, flush=True), child_code.run)

@@ -20,7 +20,8 @@ from typing import Any
 
 from setproctitle import setproctitle
 
-from abs_service.supervision import parent_watchdog, standard_files
+from abs_service.supervision.children import parent_watchdog
+from abs_service.supervision.process_setup import standard_files
 
 #: Makes processes that the fork server forks.
 CONTEXT = multiprocessing.get_context("forkserver")
