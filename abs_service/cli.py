@@ -132,7 +132,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         with _ended_by_interrupt():
             module = import_module(f"{module.__name__}.{MODULES.get(name, chosen)}")
         commands = getattr(module, "COMMANDS", {})
-    from abs_service.commands.parts import logs  # noqa: PLC0415 - `logging` takes a third of the time of --help
+    from abs_service.commands.parts.log import logs  # noqa: PLC0415 - `logging` takes a third of the time of --help
 
     parser = command_parser(name, module)
     logs.add_arguments(parser)

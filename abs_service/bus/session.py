@@ -13,8 +13,8 @@ import zenoh
 
 from abs_service.bus.pools import own_size
 from abs_service.bus.security.mutual_tls import NO_SECURITY, MutualTls, NoSecurity
-from drivers.encoding import connection, shared_memory
 from drivers.encoding.message_check import LARGEST_IMAGE
+from drivers.zenoh_session import connection, shared_memory
 
 _log = logging.getLogger(__name__)
 

@@ -14,7 +14,7 @@ from abs_service.bus.contract import EVENTS, Priority, Publisher, Qos, Sample, S
 from abs_service.bus.security import link_log
 from abs_service.bus.security.mutual_tls import NO_SECURITY, MutualTls, NoSecurity
 from abs_service.bus.session import Role, open_session
-from drivers.contract.callbacks import from_non_daemon_thread
+from drivers.zenoh_session.callbacks import from_non_daemon_thread
 
 _log = logging.getLogger(__name__)
 

@@ -23,17 +23,10 @@ from abs_service import config, wiring
 from abs_service.bus import keys
 from abs_service.bus.security import roles
 from abs_service.bus.security.mutual_tls import TlsError
-from abs_service.commands.parts import (
-    data_rates,
-    device_checks,
-    disk,
-    harmless_devices,
-    preview_option,
-    recorded_rig,
-    rig_process,
-)
-from abs_service.commands.parts.device_checks import CheckError
-from abs_service.commands.parts.harmless_devices import HarmlessError
+from abs_service.commands.parts import disk, preview_option, recorded_rig, rig_process
+from abs_service.commands.parts.checks import data_rates, device_checks, harmless_devices
+from abs_service.commands.parts.checks.device_checks import CheckError
+from abs_service.commands.parts.checks.harmless_devices import HarmlessError
 from abs_service.commands.parts.preview_option import PictureOptionError
 from abs_service.config import addresses, plugins
 from abs_service.config.positions import located

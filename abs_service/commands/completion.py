@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 
-from abs_service.commands.parts import logs
+from abs_service.commands.parts.log import logs
 from abs_service.supervision.exit_codes import Exit
 
 

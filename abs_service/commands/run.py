@@ -23,7 +23,8 @@ from abs_service import config
 from abs_service.bus import keys
 from abs_service.bus.session import Role
 from abs_service.bus.stamps import WallClock
-from abs_service.commands.parts import logs, rig_process
+from abs_service.commands.parts import rig_process
+from abs_service.commands.parts.log import logs
 from abs_service.commands.parts.rig_in_memory import RigInMemory, in_memory
 from abs_service.commands.running import outcome, settled_file, view
 from abs_service.display.terminal import choice

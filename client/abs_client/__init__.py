@@ -6,13 +6,13 @@ for state in abs_client.subscribe("tcp/127.0.0.1:7447", rig="demo", tracker="she
 """
 
 from abs_client.camera import Camera
+from abs_client.connection.tls import Tls
 from abs_client.errors import ClientError, MalformedError, RangeError, UnknownNameError, UnreachableError
+from abs_client.estimates.state import State, Status
 from abs_client.images import Image, ImageError
 from abs_client.rig import RefusedError, Rig, subscribe
 from abs_client.simulated_rig import RigFailedError, RunningRig, SimulatedRig, run_rig
-from abs_client.state import State, Status
 from abs_client.stream import NothingReceivedError, Stream
-from abs_client.tls import Tls
 
 __all__ = [
     "Camera",

@@ -11,11 +11,11 @@ from absmsg.v1.frame_info_pb2 import FrameInfo
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 from numpy.typing import NDArray
 
+from abs_client.connection.link import Link
+from abs_client.connection.received import Received, decoded, decoded_bytes
+from abs_client.connection.wake import Wake
 from abs_client.errors import MalformedError
-from abs_client.link import Link
-from abs_client.received import Received, decoded, decoded_bytes
 from abs_client.stream import Stream
-from abs_client.wake import Wake
 
 #: Longest time that a reader waits for a signal before it looks again [s].
 LOOK_S = 1.0

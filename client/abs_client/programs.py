@@ -6,10 +6,10 @@ import sys
 import threading
 from pathlib import Path
 
-from abs_client import states
-from abs_client.link import DEFAULT_ENDPOINT, Link
+from abs_client.connection.link import DEFAULT_ENDPOINT, Link
+from abs_client.connection.tls import Tls
+from abs_client.estimates import states
 from abs_client.rig import LARGEST_AGE_S
-from abs_client.tls import Tls
 
 #: Exit status for what the user can mend.
 USER_ERROR = 2

@@ -8,15 +8,16 @@ from absmsg.v1.command_pb2 import CommandAnswer, Record, Reinitialize, SetContro
 from absmsg.v1.common_pb2 import Header
 from absmsg.v1.sensor_model_pb2 import SensorModel
 
-from abs_client import images, states
+from abs_client import images
 from abs_client.camera import Camera, camera
+from abs_client.connection.link import DEFAULT_ENDPOINT, Link, checked
+from abs_client.connection.received import decoded
+from abs_client.connection.tls import Tls
 from abs_client.errors import ClientError
+from abs_client.estimates import states
+from abs_client.estimates.state import State
 from abs_client.images import Image
-from abs_client.link import DEFAULT_ENDPOINT, Link, checked
-from abs_client.received import decoded
-from abs_client.state import State
 from abs_client.stream import NothingReceivedError, Stream
-from abs_client.tls import Tls
 
 #: Estimates that are older are left out [s].
 LARGEST_AGE_S = 0.5

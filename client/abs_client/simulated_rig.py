@@ -16,8 +16,8 @@ from time import monotonic
 from urllib.parse import urlencode
 
 from abs_client.errors import ClientError, UnreachableError
+from abs_client.estimates.state import State, Status
 from abs_client.rig import subscribe
-from abs_client.state import State, Status
 from abs_client.stream import Stream
 
 #: By when it must track: the first start on a machine compiles the numerical code [s].

@@ -8,9 +8,9 @@ from time import monotonic
 from types import TracebackType
 from typing import Generic, Protocol, Self, TypeVar
 
+from abs_client.connection.link import Link
+from abs_client.connection.wake import Wake
 from abs_client.errors import ClientError
-from abs_client.link import Link
-from abs_client.wake import Wake
 
 T = TypeVar("T")
 T_co = TypeVar("T_co", covariant=True)

@@ -10,10 +10,10 @@ from typing import Any
 
 import zenoh
 
-from drivers.contract.callbacks import from_non_daemon_thread
 from drivers.contract.device import DeviceError
-from drivers.encoding import connection, shared_memory
 from drivers.remote.address import Address
+from drivers.zenoh_session import connection, shared_memory
+from drivers.zenoh_session.callbacks import from_non_daemon_thread
 
 #: Timeout of queries [s].
 ANSWER_S = 3.0

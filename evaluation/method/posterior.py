@@ -27,9 +27,9 @@ from abs_service.tracker.posterior.priors.change_metric import ChangeMetric
 from abs_service.tracker.posterior.priors.stretch_prior import StretchPrior
 from abs_service.tracker.terms.linearization import stack
 from calib.noise.images.color import GaussianColor
-from evaluation.coverage import inside_region
 from evaluation.experiment import Context, Findings, at_least, at_most
 from evaluation.sequences import demo_plan, demo_rig, expose, simulate, track, with_noise
+from evaluation.statistics.coverage import inside_region
 
 #: Standard deviation of a colour in the default rig [levels of 256].
 DEMO_SIGMA = 4.0

@@ -26,7 +26,6 @@ from calib.noise.gaussian_polynomial import GaussianPolynomial
 from calib.noise.images.color import GaussianColor
 from calib.rig import Rig
 from evaluation.experiment import Context, Findings, Goal, at_most
-from evaluation.paired import upper_end
 from evaluation.sequences import (
     PIXELS_ALONE,
     UntrackedError,
@@ -39,6 +38,7 @@ from evaluation.sequences import (
     track,
     with_noise,
 )
+from evaluation.statistics.paired import upper_end
 
 TITLE = "Likelihood against squares with default weights on the demo's sheet, and what explains the difference"
 

@@ -41,13 +41,13 @@ from abs_service.tracker.models import gravity, nurbs, rigid
 from abs_service.tracker.objectives import likelihood
 from abs_service.tracking.plan import ModelSettings
 from calib.camera import Camera
-from evaluation.coverage import inside_region
 from evaluation.experiment import Context, Findings, at_least, at_most
 from evaluation.method.slid_sheets import FRAMES_AFTER, SLIDE_FRAME, sequences
 from evaluation.scenes.bent_sheet import CAMERA, SheetFrame, render_frames
 from evaluation.scenes.rubber import SIGMA as RUBBER_SIGMA
 from evaluation.scenes.rubber import STRAINS, printed_frames
 from evaluation.sequences import TrackedSequence, demo_plan, demo_rig, expose, simulate, track
+from evaluation.statistics.coverage import inside_region
 
 TITLE = "Trust: sheets that slide along themselves, and coverage over time"
 

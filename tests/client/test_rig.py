@@ -6,8 +6,8 @@ from functools import partial
 import numpy as np
 import pytest
 from abs_client import NothingReceivedError, RefusedError, Rig, Tls, UnknownNameError, UnreachableError
+from abs_client.connection.received import Received
 from abs_client.images import ImageError, read
-from abs_client.received import Received
 from absmsg.v1.common_pb2 import Header
 from absmsg.v1.sensor_model_pb2 import SensorModel
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage

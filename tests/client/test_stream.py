@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 from abs_client import NothingReceivedError
+from abs_client.connection.wake import Wake
 from abs_client.stream import Stream
-from abs_client.wake import Wake
 
 LIMIT_S = 5.0
 

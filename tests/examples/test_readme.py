@@ -8,7 +8,7 @@ from typing import Any
 
 import abs_client
 import numpy as np
-from abs_client.state import State, Status
+from abs_client.estimates.state import State, Status
 from absmsg.v1.deformation_state_pb2 import DeformationState
 from absmsg.v1.deformed_mesh_pb2 import DeformedMesh, MeshTopology
 

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.calibration.files import corner_file
-from abs_service.commands.calibrate import camera_files
+from abs_service.commands.calibrate.inputs import camera_files
 from abs_service.config.problems import allowed_instead
 from abs_service.supervision.exit_codes import Exit
 from calib.camera import Camera

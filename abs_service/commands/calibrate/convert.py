@@ -23,7 +23,7 @@ from pathlib import Path
 
 from abs_service.bus import keys
 from abs_service.calibration.files import exchange, rig_file
-from abs_service.commands.calibrate import camera_files
+from abs_service.commands.calibrate.inputs import camera_files
 from abs_service.config.problems import allowed_instead
 from abs_service.report import provenance
 from abs_service.supervision.exit_codes import Exit

@@ -37,7 +37,7 @@ from rich.console import Console
 from abs_service.calibration.files import target_file, toml_text
 from abs_service.calibration.noise import board_poses, measurement, repeated, report, sigma_consistency
 from abs_service.calibration.shots import sequences
-from abs_service.commands.calibrate import calibrations
+from abs_service.commands.calibrate.inputs import calibrations
 from abs_service.commands.images import camera_file
 from abs_service.config import plugins
 from abs_service.report import page, provenance

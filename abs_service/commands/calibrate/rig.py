@@ -22,8 +22,9 @@ options have to be changed first. What the verdicts mean: docs/how-to/calibratio
 import argparse
 from collections.abc import Iterable
 
-from abs_service.commands.calibrate import material, solving
-from abs_service.commands.calibrate.material import Material, SolveOptionError
+from abs_service.commands.calibrate import solving
+from abs_service.commands.calibrate.inputs import material
+from abs_service.commands.calibrate.inputs.material import Material, SolveOptionError
 from abs_service.config.problems import allowed_instead
 from calib.solve.bundle.tasks import Task
 

@@ -13,8 +13,8 @@ from pathlib import Path
 
 from abs_service.calibration.cameras import report
 from abs_service.calibration.files import rig_file
-from abs_service.commands.calibrate import skipping
-from abs_service.commands.calibrate.material import Material, SolveOptionError, UnusableImagesError, named, say
+from abs_service.commands.calibrate.inputs import skipping
+from abs_service.commands.calibrate.inputs.material import Material, SolveOptionError, UnusableImagesError, named, say
 from abs_service.config.problems import allowed_instead
 from abs_service.report import page, provenance
 from abs_service.report.content import Level, Report, Verdict

@@ -25,8 +25,8 @@ from abs_service.calibration.shots import image_sizes, unseen
 from abs_service.calibration.shots.corner_extraction import BoardObservations, see
 from abs_service.calibration.shots.shot_sources import FolderShots, RecordingShots
 from abs_service.calibration.shots.shots import Shot
-from abs_service.commands.calibrate import calibrations, live, skipping
-from abs_service.commands.calibrate.material import UnusableImagesError
+from abs_service.commands.calibrate.inputs import calibrations, live, skipping
+from abs_service.commands.calibrate.inputs.material import UnusableImagesError
 from abs_service.commands.parts import rig_process
 from abs_service.config.problems import allowed_instead
 from abs_service.report import page, provenance

@@ -16,7 +16,7 @@ from abs_service.bus.security import roles
 from abs_service.bus.security.mutual_tls import TlsError
 from abs_service.bus.session import Role
 from abs_service.bus.zenoh_bus import ZenohBus
-from abs_service.commands.parts import library_output, logs
+from abs_service.commands.parts.log import library_output, logs
 from abs_service.supervision.process_setup import process_tuning
 from abs_service.wire.checked_bus import CheckedBus
 

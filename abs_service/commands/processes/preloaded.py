@@ -7,7 +7,7 @@ from abs_service.supervision.children import forked
 
 #: Beside what the demo rig names: its model, search and objective are the default ones.
 MODULES = (
-    "abs_service.commands.parts.logs",
+    "abs_service.commands.parts.log.logs",
     "abs_service.commands.processes.capture",
     "abs_service.commands.processes.record",
     "abs_service.commands.processes.track",

@@ -26,7 +26,8 @@ from rich.progress import Progress
 from abs_service import config, wiring
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.commands import run as run_command
-from abs_service.commands.parts import logs, preview_option, progress
+from abs_service.commands.parts import preview_option, progress
+from abs_service.commands.parts.log import logs
 from abs_service.commands.parts.recorded_rig import ReplayOptionError, draw_previews, recorded_rig
 from abs_service.commands.parts.rig_in_memory import in_memory
 from abs_service.commands.recordings.image_copies import image_copies

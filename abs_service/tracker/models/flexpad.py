@@ -8,7 +8,7 @@ from annotated_types import Gt, Interval
 from numpy.typing import NDArray
 
 from abs_service.tracker.detection.initial_detection import InitialDetection
-from abs_service.tracker.detection.rectangle_fit import Limits, find_sheet
+from abs_service.tracker.detection.shapes.rectangle_fit import Limits, find_sheet
 from abs_service.tracker.detection.shapes.sheet_mesh import Sheet, rectangle_of
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import BOARD, ModelError, SparseJacobian, Surface

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from absmsg.v1.common_pb2 import Header
 
+from abs_client.estimates.state import State, Status
 from abs_client.ros2 import cdr, diagnostics
-from abs_client.state import State, Status
 
 #: Red, green, blue of a mesh by status, 0 to 1. While TRACKING, the object's own colours count where they are known.
 COLORS = {

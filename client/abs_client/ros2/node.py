@@ -10,8 +10,8 @@ from typing import Any, Self
 import zenoh
 from zenoh import ext
 
+from abs_client.connection.link import CONNECT_S, client_settings
 from abs_client.errors import UnreachableError
-from abs_client.link import CONNECT_S, client_settings
 from abs_client.ros2 import cdr, layout
 from abs_client.ros2.layout import Qos
 

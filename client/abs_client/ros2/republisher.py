@@ -13,15 +13,15 @@ from foxglove_schemas_protobuf.PointCloud_pb2 import PointCloud
 from numpy.typing import NDArray
 
 from abs_client import images as received_images
-from abs_client import states
 from abs_client.camera import Camera, camera
+from abs_client.connection.link import Link
+from abs_client.connection.received import Received, decoded
+from abs_client.estimates import states
+from abs_client.estimates.state import State, Status
 from abs_client.images import Image, ImageError
-from abs_client.link import Link
-from abs_client.received import Received, decoded
 from abs_client.ros2 import cameras, cdr, diagnostics, estimates, images, rays
 from abs_client.ros2.layout import Qos, ros_name
 from abs_client.ros2.node import RosNode
-from abs_client.state import State, Status
 from abs_client.stream import Stream
 
 #: Of /tf_static: the newest, for every node that comes later.

@@ -5,7 +5,7 @@ import json
 import math
 from collections.abc import Iterable, Iterator
 
-from abs_client.state import State
+from abs_client.estimates.state import State
 
 
 def events(states: Iterable[State]) -> Iterator[bytes]:

@@ -6,9 +6,9 @@ from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from importlib import resources
 
-from abs_client import states
+from abs_client.connection.link import Link, checked
 from abs_client.errors import ClientError, UnknownNameError
-from abs_client.link import Link, checked
+from abs_client.estimates import states
 from abs_client.web.events import events
 
 _PREFIX = "/states/"

@@ -6,7 +6,7 @@ from contextlib import closing
 
 import pytest
 import zenoh
-from abs_client.link import client_settings
+from abs_client.connection.link import client_settings
 
 from abs_service.bus.session import Role, open_session
 from drivers.remote.address import Address

@@ -10,10 +10,10 @@ import pytest
 import zenoh
 
 from abs_service.bus import session
-from drivers.encoding import shared_memory
-from drivers.encoding.shared_memory import may_be_locked
 from drivers.remote.address import Address
 from drivers.remote.link import open_link
+from drivers.zenoh_session import shared_memory
+from drivers.zenoh_session.shared_memory import may_be_locked
 
 MB = 1 << 20
 

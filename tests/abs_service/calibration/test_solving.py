@@ -10,7 +10,7 @@ import pytest
 from abs_service import cli
 from abs_service.calibration.files import corner_file, target_file
 from abs_service.calibration.shots.corner_extraction import BoardObservations
-from abs_service.commands.calibrate import calibrations
+from abs_service.commands.calibrate.inputs import calibrations
 from calib import pose
 from calib.board.target import Chessboard
 from tests.abs_service.calibration.simulated import Filmed, record, scene

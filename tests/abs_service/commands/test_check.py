@@ -4,7 +4,7 @@ import pytest
 
 from abs_service import cli, config
 from abs_service.commands import check
-from abs_service.commands.parts import device_checks
+from abs_service.commands.parts.checks import device_checks
 from abs_service.supervision.exit_codes import Exit
 from drivers.simulated.address import parse
 from tests.abs_service.commands.recordings.simulated_recording import write_take

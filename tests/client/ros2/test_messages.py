@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from abs_client import state as client_state
 from abs_client.camera import camera
+from abs_client.estimates import state as client_state
+from abs_client.estimates.state import Status
 from abs_client.images import read
 from abs_client.ros2 import cameras, cdr, diagnostics, estimates, images
-from abs_client.state import Status
 from absmsg.v1.common_pb2 import Header
 from absmsg.v1.deformed_mesh_pb2 import DeformedMesh, MeshTopology
 from absmsg.v1.health_pb2 import Health

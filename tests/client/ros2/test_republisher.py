@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from abs_client.connection.link import Link
 from abs_client.errors import UnreachableError
-from abs_client.link import Link
 from abs_client.ros2 import layout
 from abs_client.ros2.node import RosNode
 from abs_client.ros2.republisher import Republisher

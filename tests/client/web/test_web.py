@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from abs_client.link import Link
+from abs_client.connection.link import Link
 from abs_client.web import program
 from abs_client.web.server import EstimateServer
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.detection.depth_view import at_points
 from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection
-from abs_service.tracker.detection.principal_axes import extents, principal_axes
+from abs_service.tracker.detection.shapes.principal_axes import extents, principal_axes
 from abs_service.tracker.detection.shapes.samples import Samples
 from calib import pose
 from calib.camera import Camera

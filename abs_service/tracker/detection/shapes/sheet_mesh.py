@@ -6,7 +6,7 @@ import numpy as np
 
 from abs_service.tracker.detection.grid_mesh import triangles
 from abs_service.tracker.detection.initial_detection import DetectionError
-from abs_service.tracker.detection.principal_axes import principal_axes
+from abs_service.tracker.detection.shapes.principal_axes import principal_axes
 from abs_service.tracker.mesh import Mesh
 from calib import pose
 from calib.pose import Pose

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.detection.initial_detection import DetectionError
-from abs_service.tracker.detection.principal_axes import extents, principal_axes
 from abs_service.tracker.detection.shapes.paint import NO_PAINT, PointPaint
+from abs_service.tracker.detection.shapes.principal_axes import extents, principal_axes
 from abs_service.tracker.detection.shapes.resampling import evenly_spread, triangulated
 from abs_service.tracker.detection.shapes.samples import Samples
 from abs_service.tracker.detection.templates.known_object import KnownObject

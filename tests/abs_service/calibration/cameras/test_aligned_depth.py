@@ -10,7 +10,7 @@ import pytest
 
 from abs_service import cli
 from abs_service.calibration.files import rig_file, target_file
-from abs_service.commands.calibrate import calibrations
+from abs_service.commands.calibrate.inputs import calibrations
 from abs_service.report.provenance import Provenance
 from calib.board.target import Chessboard
 from calib.camera import Camera

@@ -11,7 +11,7 @@ import pytest
 
 from abs_service import cli
 from abs_service.calibration.files import rig_file
-from abs_service.commands.calibrate import calibrations
+from abs_service.commands.calibrate.inputs import calibrations
 from abs_service.report.provenance import Provenance
 from abs_service.supervision.exit_codes import Exit
 from calib import pose

@@ -12,7 +12,7 @@ from abs_service import cli
 from abs_service.calibration.files import corner_file, mrcal_corners, target_file
 from abs_service.calibration.files.corner_file import CornerFileError
 from abs_service.calibration.shots.corner_extraction import BoardObservations
-from abs_service.commands.calibrate import calibrations
+from abs_service.commands.calibrate.inputs import calibrations
 from calib.board.target import Chessboard
 from calib.formats import vnl
 from tests.calib.solve import board_views

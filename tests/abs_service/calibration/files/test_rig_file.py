@@ -21,7 +21,7 @@ from abs_service.calibration.files.rig_file import (
     read_covariance,
     write,
 )
-from abs_service.commands.calibrate import calibrations
+from abs_service.commands.calibrate.inputs import calibrations
 from abs_service.report.provenance import DataFile, Provenance
 from calib import pose
 from calib.camera import Camera

@@ -12,7 +12,7 @@ import pytest
 from abs_service import cli
 from abs_service.calibration.files import target_file
 from abs_service.calibration.shots.shots import Shot
-from abs_service.commands.calibrate import skipping
+from abs_service.commands.calibrate.inputs import skipping
 from calib.board.target import Chessboard
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from abs_service import cli, config
-from abs_service.commands.parts import harmless_devices
+from abs_service.commands.parts.checks import harmless_devices
 from abs_service.display.pictures import preview_picture
 from abs_service.display.pictures.preview_picture import CLASS_COLORS, LEGEND, LINE, NO_RETURN, REGION, WARNING
 from abs_service.supervision.exit_codes import Exit

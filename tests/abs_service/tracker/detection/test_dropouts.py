@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from abs_service.tracker.detection.dropouts import fill_gaps, sparse_gaps
 from abs_service.tracker.detection.grid_mesh import grid_mesh
 from abs_service.tracker.detection.initial_detection import InitialDetection
-from abs_service.tracker.detection.rectangle_fit import find_sheet
 from abs_service.tracker.detection.regions import nearest
 from abs_service.tracker.detection.segmentation import detect_object
+from abs_service.tracker.detection.shapes.rectangle_fit import find_sheet
 from calib import pose
 from tests.abs_service.tracker.detection.test_grid_mesh import RIG, area, placed, rectangle
 from tests.abs_service.tracker.scenes import depth_image, observation

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection
-from abs_service.tracker.detection.rectangle_fit import LIMITS, find_sheet
+from abs_service.tracker.detection.shapes.rectangle_fit import LIMITS, find_sheet
 from abs_service.tracker.detection.shapes.sheet_mesh import Sheet
 from abs_service.tracker.models.flexpad import Settings
 from calib import pose

@@ -6,8 +6,8 @@ import pytest
 from abs_service.tracker.terms.depth.outline.raggedness import SHARE, USUAL_PX, Raggedness
 from abs_service.tracker.terms.depth.outline.rim import Rim
 from abs_service.tracker.terms.depth.outline.rim_outline import RimOutline
-from tests.abs_service.tracker.terms.depth.outline_scene import CAMERA, MESH, look, moved, picture
-from tests.abs_service.tracker.terms.depth.test_rim_motion import OUT, PLACES, off
+from tests.abs_service.tracker.terms.depth.outline.outline_scene import CAMERA, MESH, look, moved, picture
+from tests.abs_service.tracker.terms.depth.outline.test_rim_motion import OUT, PLACES, off
 
 
 def after(away: list[np.ndarray], least: float = 0.5, most: float = 3.0) -> Raggedness:

@@ -3,9 +3,9 @@
 import resource
 
 import pytest
-from abs_client import shared_memory as of_client
+from abs_client.connection import shared_memory as of_client
 
-from drivers.encoding import shared_memory as of_service
+from drivers.zenoh_session import shared_memory as of_service
 
 MB = 1 << 20
 

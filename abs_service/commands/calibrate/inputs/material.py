@@ -13,7 +13,7 @@ from abs_service.calibration.shots import corner_extraction, image_sizes, unseen
 from abs_service.calibration.shots.corner_extraction import BoardObservations
 from abs_service.calibration.shots.shot_sources import FolderShots, RecordingShots
 from abs_service.calibration.shots.shots import Shot
-from abs_service.commands.calibrate import calibrations, live, skipping
+from abs_service.commands.calibrate.inputs import calibrations, live, skipping
 from calib.board import coverage
 from calib.board.distinct import counts_of, distinct_poses
 from calib.board.target import Target

@@ -8,15 +8,15 @@ from absmsg.v1.common_pb2 import Header
 from absmsg.v1.deformation_state_pb2 import DeformationState
 from absmsg.v1.deformed_mesh_pb2 import DeformedMesh, MeshTopology
 
-from abs_client import reading
-from abs_client.ages import Ages
-from abs_client.assembly import Assembly
+from abs_client.connection.link import Link
+from abs_client.connection.received import Received, decoded
+from abs_client.connection.wake import Wake
 from abs_client.errors import RangeError
-from abs_client.link import Link
-from abs_client.received import Received, decoded
-from abs_client.state import State, Status, received
+from abs_client.estimates import reading
+from abs_client.estimates.ages import Ages
+from abs_client.estimates.assembly import Assembly
+from abs_client.estimates.state import State, Status, received
 from abs_client.stream import Stream
-from abs_client.wake import Wake
 
 #: Pause between two questions for a topology [ns].
 PAUSE_NS = 200_000_000

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator, Set
 from pathlib import Path
 
 from abs_service.calibration.shots.shots import Shot
-from abs_service.commands.calibrate import live
+from abs_service.commands.calibrate.inputs import live
 
 
 class SkipError(ValueError):

@@ -4,8 +4,8 @@ import numpy as np
 from absmsg.v1.deformation_state_pb2 import DeformationState
 from absmsg.v1.deformed_mesh_pb2 import DeformedMesh, MeshTopology
 
+from abs_client.connection.received import Received, decoded
 from abs_client.errors import MalformedError
-from abs_client.received import Received, decoded
 
 #: Bytes of a vertex, a face, a vertex' covariance and its colour.
 VERTEX, FACE, COVARIANCE, COLOR = 12, 12, 24, 3

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from abs_service.commands.parts import logs
-from abs_service.commands.parts.log_file import LogFile
+from abs_service.commands.parts.log import logs
+from abs_service.commands.parts.log.log_file import LogFile
 from abs_service.display.terminal import output
 from abs_service.supervision.exit_codes import Exit
 

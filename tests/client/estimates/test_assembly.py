@@ -4,7 +4,7 @@ from itertools import permutations
 
 import numpy as np
 import pytest
-from abs_client.assembly import KEPT, Assembly
+from abs_client.estimates.assembly import KEPT, Assembly
 
 from tests.client.messages import TRIANGLE, mesh, state, topology
 

@@ -4,7 +4,7 @@ import os
 import subprocess
 import sys
 
-from abs_service.commands.parts import library_output
+from abs_service.commands.parts.log import library_output
 
 REFUSED = (
     "\x1b[2m2026-11-24T03:06:25.156251Z\x1b[0m \x1b[33m WARN\x1b[0m acc-0 ThreadId(05) \x1b[2mzenoh_link_tls::unicast"
@@ -32,7 +32,7 @@ def test_a_line_that_repeats_is_passed_on_once_in_ten_seconds_with_a_count():
 def test_lines_past_python_are_logged_and_those_of_python_stay_where_they_were():
     program = """
 import logging, os
-from abs_service.commands.parts import library_output
+from abs_service.commands.parts.log import library_output
 logging.basicConfig(format="%(levelname)s %(message)s")
 print("before")
 with library_output.logged():

@@ -1,7 +1,7 @@
 """Ages of estimates whose exposure another host's clock tells."""
 
 import pytest
-from abs_client.ages import PERIOD_NS, Ages
+from abs_client.estimates.ages import PERIOD_NS, Ages
 from absmsg.v1.common_pb2 import Header
 
 from tests.client.messages import state

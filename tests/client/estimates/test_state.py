@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from abs_client.state import Status, received
+from abs_client.estimates.state import Status, received
 from absmsg.v1.deformation_state_pb2 import DeformationState
 
 from tests.client.messages import TRIANGLE, mesh, state, topology

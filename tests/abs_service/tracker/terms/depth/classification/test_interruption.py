@@ -10,7 +10,7 @@ from abs_service.tracker.terms.depth.classification.interruption import interrup
 from abs_service.tracker.terms.depth.classification.visibility import surfaces_of
 from abs_service.tracker.terms.depth.outline.first_rim import classified_rim
 from abs_service.tracker.terms.depth.outline.rim_classes import RimClass
-from tests.abs_service.tracker.terms.depth.outline_scene import BESIDE_M, CAMERA, MESH, moved, picture
+from tests.abs_service.tracker.terms.depth.outline.outline_scene import BESIDE_M, CAMERA, MESH, moved, picture
 
 RAYS = CAMERA.unproject(np.ones((CAMERA.height, CAMERA.width)))
 #: Where a ray meets the plane of the sheet, to the right [m]; the mesh ends at 0.15.

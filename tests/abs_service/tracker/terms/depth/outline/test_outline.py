@@ -25,7 +25,7 @@ from calib.noise.constant import Constant
 from calib.rig import Sensor
 from tests import reference
 from tests.abs_service.tracker.scenes import depth_image, sparse
-from tests.abs_service.tracker.terms.depth.outline_scene import CAMERA, MESH, look, moved, outline, picture
+from tests.abs_service.tracker.terms.depth.outline.outline_scene import CAMERA, MESH, look, moved, outline, picture
 
 
 @settings(max_examples=50, deadline=None)

@@ -10,9 +10,9 @@ from types import SimpleNamespace
 from typing import ClassVar
 
 import pytest
-from abs_client import shared_memory
+from abs_client.connection import shared_memory
+from abs_client.connection.link import Link, client_settings
 from abs_client.errors import UnreachableError
-from abs_client.link import Link, client_settings
 
 Thread = threading.Thread
 
@@ -43,7 +43,7 @@ def test_two_threads_that_subscribe_at_once_are_both_waited_for(bus, endpoint, m
     link = Link(endpoint, "demo")
     monkeypatch.setattr(Late, "joined", [])
     with monkeypatch.context() as patch:
-        patch.setattr("abs_client.link.threading.Thread", Late)
+        patch.setattr("abs_client.connection.link.threading.Thread", Late)
         in_two_threads(lambda: link.subscribe("x", print))
     link.close()
     assert len(Late.joined) == 2
@@ -53,7 +53,7 @@ def test_two_threads_that_subscribe_at_once_are_both_waited_for(bus, endpoint, m
 def test_a_thread_that_begins_while_the_connection_is_closed_does_not_keep_it_from_closing(bus, endpoint, monkeypatch):
     link = Link(endpoint, "demo")
     with monkeypatch.context() as patch:
-        patch.setattr("abs_client.link.threading.Thread", Late)
+        patch.setattr("abs_client.connection.link.threading.Thread", Late)
         beginning = Thread(target=link.subscribe, args=("x", print))
         beginning.start()
         time.sleep(0.05)

@@ -13,11 +13,11 @@ from typing import Any, Self
 
 import zenoh
 
-from abs_client import shared_memory
+from abs_client.connection import shared_memory
+from abs_client.connection.received import Received
+from abs_client.connection.tls import Tls
+from abs_client.connection.wake import Wake
 from abs_client.errors import MalformedError, UnknownNameError, UnreachableError
-from abs_client.received import Received
-from abs_client.tls import Tls
-from abs_client.wake import Wake
 
 #: Where a rig listens unless its file says otherwise.
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"

@@ -104,7 +104,7 @@ def end_with(error: Exception, arguments: argparse.Namespace) -> int:
 def _handler(file: Path | None) -> logging.Handler:
     if file is None:
         return logging.StreamHandler(sys.stderr)
-    from abs_service.commands.parts.log_file import LogFile  # noqa: PLC0415 - needed for a file only
+    from abs_service.commands.parts.log.log_file import LogFile  # noqa: PLC0415 - needed for a file only
 
     try:
         return LogFile(file, encoding="utf-8")

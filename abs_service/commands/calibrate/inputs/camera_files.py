@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from abs_service.calibration.files import exchange
-from abs_service.commands.calibrate import calibrations
+from abs_service.commands.calibrate.inputs import calibrations
 from calib.camera import Camera
 from calib.files import limited
 from calib.formats import plausibility

@@ -12,7 +12,15 @@ from abs_service.tracker.terms.depth.outline.rim_classes import RimClass
 from abs_service.tracker.terms.depth.outline.rim_cost import FARTHEST
 from abs_service.tracker.terms.depth.outline.rim_motion import displacement
 from tests.abs_service.tracker.scenes import flat, sheet, sparse
-from tests.abs_service.tracker.terms.depth.outline_scene import BESIDE_M, CAMERA, MESH, look, moved, outline, picture
+from tests.abs_service.tracker.terms.depth.outline.outline_scene import (
+    BESIDE_M,
+    CAMERA,
+    MESH,
+    look,
+    moved,
+    outline,
+    picture,
+)
 
 
 def classes(distance: np.ndarray, mesh: Mesh = MESH) -> dict[RimClass, int]:

@@ -8,7 +8,7 @@ from urllib.parse import quote
 import numpy as np
 
 from abs_service import config
-from abs_service.commands.parts.harmless_devices import HARMLESS
+from abs_service.commands.parts.checks.harmless_devices import HARMLESS
 from abs_service.config.problems import Problem, allowed_instead
 from abs_service.tracker.measurements import measurement
 from calib.rig import Noise

@@ -1,0 +1,1 @@
+"""The log of every command: its options, its file, and the output of native libraries."""

@@ -1,0 +1,1 @@
+"""Estimates of a tracker, from their messages to the newest one that is whole."""

@@ -1,0 +1,1 @@
+"""Statistics that several experiments share: differences of two methods, and the regions of covariances."""
