@@ -13,6 +13,9 @@ from calib.lenses import lookup
 from calib.lenses.lens import Lens, LensModel
 from calib.pose import Pose
 
+#: Largest image [pixels along a side]: a larger one is a mistake, and no memory holds its rays.
+LARGEST_SIDE = 65_535
+
 
 class CameraError(ValueError):
     """Invalid camera parameters; names parameter, value and what is allowed."""
@@ -45,8 +48,8 @@ class Camera:
     def __post_init__(self) -> None:
         for name in ("width", "height"):
             size = getattr(self, name)
-            if not isinstance(size, Integral) or size < 1:
-                raise CameraError(f"{name} = {size!r}: must be a whole number of pixels, at least 1")
+            if not isinstance(size, Integral) or not 1 <= int(size) <= LARGEST_SIDE:
+                raise CameraError(f"{name} = {size!r}: must be a whole number of pixels, 1 to {LARGEST_SIDE}")
         for name in ("fx", "fy", "cx", "cy"):
             _check_number(name, getattr(self, name), positive=name in ("fx", "fy"))
         # The first of them is told by its class; all that a protocol asks for takes fifty times as long to see.

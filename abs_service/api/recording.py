@@ -51,9 +51,9 @@ class Recording:
         trackers: names of the trackers with estimates in it.
     """
 
-    def __init__(self, path: Path):
-        self._contents = scan(path)
-        self.path = path
+    def __init__(self, path: str | Path):
+        self.path = checks.path(path)
+        self._contents = scan(self.path)
         self.duration_s = (self._contents.end_ns - self._contents.start_ns) * 1e-9
         self.truncated = self._contents.truncated
         self.trackers = trackers(self._contents)
@@ -143,7 +143,7 @@ def open_recording(path: str | Path) -> Recording:
         ArgumentError: no path.
         RecordingError: no such file, or no MCAP file.
     """
-    return Recording(checks.path(path))
+    return Recording(path)
 
 
 def _image(frame: Frame) -> Image:

@@ -74,6 +74,14 @@ def _trackers(file: dict[str, Any]) -> Iterator[Problem]:
                 )
             if sensor in used[:index]:
                 yield Problem(("trackers", name, "sensors", index), "named twice", sensor)
+        synthesis = tracker.get("synthesis")
+        view = synthesis.get("sensor") if isinstance(synthesis, dict) else None
+        if used and isinstance(view, str) and view not in ("", *used):
+            yield Problem(
+                ("trackers", name, "synthesis", "sensor"),
+                f"no sensor of this tracker, {allowed_instead(view, used)}",
+                view,
+            )
         if not (tracker.get("reference") or shared):
             yield Problem(
                 ("trackers", name, "reference"),

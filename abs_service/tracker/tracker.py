@@ -99,10 +99,8 @@ class Tracker:
         """Analysis by synthesis: ask, deform, synthesise and score, tell, until the search returns."""
         thetas = next(search)  # ask: candidates (population, dim)
         while True:
-            surface = frame.surfaces.deform(thetas)  # eqs. 2–8
-            costs = frame.cost(
-                thetas, surface
-            )  # synthesised into every sensor (eqs. 10, 11, 20) and scored (eqs. 16–22)
+            surface = frame.surfaces.deform(thetas)  # deform: eqs. 2–8
+            costs = frame.cost(thetas, surface)  # synthesise into every sensor (eqs. 10, 11, 20), score (eqs. 16–22)
             budget.evaluations += len(thetas)
             try:
                 thetas = search.send(costs)  # tell, and ask again

@@ -68,7 +68,8 @@ class Settings:
 
     def __post_init__(self) -> None:
         if (self.width_m == 0) != (self.height_m == 0):
-            raise ValueError("width_m and height_m belong together: give both, or neither")
+            given = f"width_m = {self.width_m}, height_m = {self.height_m}"
+            raise ValueError(f"{given}: they belong together; give both, or neither")
 
     @property
     def board(self) -> tuple[float, float]:

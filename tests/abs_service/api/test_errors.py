@@ -177,6 +177,7 @@ def test_numbers_of_numpy_are_numbers():
         (a.Tracker(CAMERA, a.Rigid()).replay, 5, r"recording = 5: must be a recording, open_recording\(path\)"),
         (a.Tracker(CAMERA, a.Rigid()).replay, "x.mcap", r"recording = 'x\.mcap': must be a recording"),
         (a.open_recording, 5, r"path = 5: must be the path of a file"),
+        (a.Recording, None, r"path = None: must be the path of a file"),
         (a.load_rig, None, r"path = None: must be the path of a file"),
         (a.Nurbs, 4, r"long = 4, short = None: give both, or neither"),
         (lambda weights: a.Nurbs(4, 4, weights=weights), ((1.0, 2.0),), r"Nurbs: weights must be 4 rows of 4"),

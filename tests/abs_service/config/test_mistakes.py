@@ -155,6 +155,16 @@ def test_a_recording_that_begins_with_tracking_needs_a_tracker():
     assert found == 'record.when = "not_tracking": the rig has no tracker; allowed are "always" and "asked"'
 
 
+def test_the_view_into_which_images_are_warped_is_that_of_a_sensor_of_the_tracker():
+    tracker = """[trackers.sheet]
+sensors = ["tof"]
+model = { type = "rigid" }
+synthesis = { type = "warped", sensor = "color" }
+"""
+    (found,) = mistakes(SENSORS + tracker)
+    assert found == 'trackers.sheet.synthesis.sensor = "color": no sensor of this tracker, allowed: tof'
+
+
 def test_a_tracker_needs_sensors_with_noise_models_and_a_reference():
     tracker = '[trackers.tof]\nsensors = ["tof", "rgb", "color", "tof"]\nreference = "tov/depth"\n'
     found = "\n".join(mistakes(SENSORS.replace('reference = "tof/depth"', "") + tracker))

@@ -200,9 +200,12 @@ def test_what_is_known_of_bends_and_height_keeps_them_in_range():
     assert (MODEL.prior @ theta_of(height=FULL_HEIGHT))[8] == pytest.approx(2.5)
 
 
-@pytest.mark.parametrize("sizes", [{"width_m": 0.3}, {"height_m": 0.2}])
-def test_half_a_size_is_refused(sizes):
-    with pytest.raises(ValueError, match="width_m and height_m belong together"):
+@pytest.mark.parametrize(
+    ("sizes", "given"),
+    [({"width_m": 0.3}, "width_m = 0.3, height_m = 0.0"), ({"height_m": 0.2}, "width_m = 0.0, height_m = 0.2")],
+)
+def test_half_a_size_is_refused(sizes, given):
+    with pytest.raises(ValueError, match=f"{given}: they belong together; give both, or neither"):
         Settings(**sizes)
 
 
