@@ -175,7 +175,7 @@ def rig(config: ServiceConfig, tracker: str, cameras: Mapping[str, Camera]) -> R
 
 
 def cameras(config: ServiceConfig, known: Mapping[str, Camera]) -> dict[str, Camera]:
-    """The cameras of the sensors: those that are known from elsewhere, by sensor, with what the configuration says."""
+    """The cameras of the sensors: those that are known from elsewhere, by sensor, overridden by the configuration."""
     tables = {name: table.camera for name, table in config.sensors.items()}
     own = {name: camera for name, table in tables.items() if (camera := table.own()) is not None}
     return own | {name: table.applied_to(known[name]) for name, table in tables.items() if name in known}

@@ -92,7 +92,7 @@ class FrameBuilder:
         return FrameSet(self._seq - 1, t_ns, frames)
 
     def without_return(self, frames: FrameSet) -> tuple[str, ...]:
-        """A reason for no estimate, if `depth_m` is given and none of its pixels holds a distance; else nothing."""
+        """Reason for no estimate: `depth_m` is given and none of its pixels holds a distance; else empty."""
         head, _, kind = self._arguments["depth_m"].partition("/")
         depth = frames.frames.get((head, kind))
         if depth is None or np.greater(depth.data, 0).any():

@@ -15,7 +15,7 @@ _NONE: Mapping[str, Camera] = MappingProxyType({})
 
 
 class Rig:
-    """All that a rig file says; `load_rig` reads one, `Recording.rig` has that of a recording.
+    """A rig file; `load_rig` reads one, `Recording.rig` is that of a recording.
 
     Args:
         settings: the configuration.

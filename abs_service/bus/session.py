@@ -27,7 +27,7 @@ SHARED_MEMORY_POOL_BYTES = 32 << 20
 #: Pools that have to fit into what is free, so that those of a rig do into the 64 MB that a container has by default.
 SHARED_MEMORY_POOLS = 8
 #: Free shared memory without which none is used: what zenoh needs beside the pools is 1.3 MB a process.
-LEAST_SHARED_MEMORY_BYTES = 32 << 20
+MIN_SHARED_MEMORY_BYTES = 32 << 20
 
 #: A larger message is refused before it is put together: an image of `message_check.LARGEST_IMAGE` and its attachment.
 LARGEST_MESSAGE_BYTES = LARGEST_IMAGE + (1 << 20)
@@ -139,7 +139,7 @@ def pool_bytes() -> int:
         _log.info("locked memory is limited (ulimit -l) to too little: images are copied through sockets")
         return 0
     free = shared_memory.free_bytes()
-    if free < LEAST_SHARED_MEMORY_BYTES:
+    if free < MIN_SHARED_MEMORY_BYTES:
         _log.warning("%s has %.0f MB free: images are copied through sockets", shared_memory.FOLDER, free * 1e-6)
         return 0
     return own_size(min(SHARED_MEMORY_POOL_BYTES, free // SHARED_MEMORY_POOLS))

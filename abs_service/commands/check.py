@@ -1,4 +1,4 @@
-"""Validates a configuration and prints what it describes. No device is touched and nothing is started.
+"""Validates a configuration and prints its parts. No device is opened, no process is started.
 
   abs-service check                 the simulated demo rig
   abs-service check rig.toml        your own

@@ -54,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Makes the folder, or nothing."""
+    """Makes the folder with all of its certificates; none is left after an error."""
     out, names = arguments.out, arguments.only or roles.NAMES
     if roles.RIG in names and not arguments.host:
         raise KeysError(f"--host: give the name of the host that listens, for the certificate of {roles.RIG}")

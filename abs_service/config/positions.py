@@ -1,4 +1,4 @@
-"""Lines of a TOML text at which its keys stand, which `tomllib` does not tell."""
+"""Line numbers of the keys of a TOML text, which `tomllib` does not give."""
 
 import re
 import tomllib

@@ -90,7 +90,7 @@ def _drawn(estimate: Estimate, frames: Iterable[Frame], cameras: Mapping[str, Ca
 
 
 def _with_text(image: Picture, text: str) -> Picture:
-    """The picture with a line of text below; its height is even, as the format wants."""
+    """The picture with a line of text below; its height is even, as the format requires."""
     below = np.zeros((TEXT_PX + len(image) % 2, image.shape[1], 3), np.uint8)
     cv2.putText(below, text, (8, 20), cv2.FONT_HERSHEY_SIMPLEX, 0.6, (255, 255, 255), 1, cv2.LINE_AA)
     return np.vstack([image, below])

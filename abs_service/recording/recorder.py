@@ -1,4 +1,4 @@
-"""Records all messages of a rig, images as the settings say; reports losses and failures in its health."""
+"""Records all messages of a rig, images as configured; reports losses and failures in its health."""
 
 import logging
 import shutil
@@ -98,7 +98,7 @@ class Recorder:
 
     @property
     def failed(self) -> str:
-        """Reason for which recording has failed; "" if all is well. `failures` counts the failures."""
+        """Reason why recording has failed; "" if it works. `failures` counts the failures."""
         return self._failed
 
     def start(self) -> None:

@@ -124,7 +124,7 @@ def remove_interrupted(directory: Path) -> None:
 
 
 def set_aside(source: Path) -> Path:
-    """Renames `x.mcap.active` to `x.mcap.broken`, as which it is nobody's to finish; returns the new path.
+    """Renames `x.mcap.active` to `x.mcap.broken`, which no recorder finishes; returns the new path.
 
     Raises:
         OSError: it cannot be renamed.

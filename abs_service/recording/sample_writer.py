@@ -25,7 +25,7 @@ _LATCHED = frozenset({header.CALIBRATION, header.CONFIG, header.MODEL, header.TO
 
 
 class SampleWriter:
-    """Writes samples to a file, images as the encoder says, and refuses what is no message of ours.
+    """Writes samples to a file, images as encoded, and refuses messages of other schemas.
 
     Args:
         encode_image: makes the recorded message of an image.

@@ -86,7 +86,7 @@ class Column:
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """A table: caption, columns, and rows of as many cells; the first cell of a row says what the row is about."""
+    """A table: caption, columns, and rows of as many cells; the first cell of a row is its heading."""
 
     caption: str
     columns: tuple[Column, ...]
@@ -188,7 +188,7 @@ def _block(block: str | Table | Picture) -> dict[str, Any]:
 
 
 def _plain(value: Any) -> Any:
-    """Levels by name, arrays as lists, nothing that JSON lacks."""
+    """Values for JSON: levels by name, arrays as lists."""
     if isinstance(value, Level):
         return str(value)
     if isinstance(value, np.ndarray | np.generic):

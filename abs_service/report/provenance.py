@@ -77,13 +77,13 @@ def trace(
 def commit(folder: Path) -> str:
     """The commit that a folder is a checkout of, with a + if files were changed; "" if it is none."""
     try:
-        said = [
+        answers = [
             subprocess.run(["git", *what], cwd=folder, capture_output=True, text=True, check=True).stdout.strip()
             for what in (("rev-parse", "--short", "HEAD"), ("status", "--porcelain", "--untracked-files=no"))
         ]
     except (OSError, subprocess.CalledProcessError):
         return ""
-    return f"{said[0]}+" if said[1] else said[0]
+    return f"{answers[0]}+" if answers[1] else answers[0]
 
 
 def fingerprint(path: Path) -> DataFile:

@@ -1,4 +1,4 @@
-"""Texts that come again and again: a failure that nobody mends must not fill a log."""
+"""Limits repeated messages: a lasting failure must not fill a log."""
 
 import re
 import threading
@@ -9,7 +9,7 @@ AT_ONCE = 5
 #: Time after which it is told again then, at first and at most: it doubles each time [ns].
 FIRST_NS, LONGEST_NS = 60_000_000_000, 600_000_000_000
 #: Texts that are remembered.
-MOST = 1000
+MAX_TEXTS = 1000
 
 #: They differ from one time to the next: numbers of processes, times.
 _NUMBERS = re.compile(r"\d+")
@@ -19,7 +19,7 @@ _TRACEBACK = "Traceback (most recent call last):"
 
 
 @dataclass
-class _Told:
+class _Report:
     t_ns: int
     times: int = 1
     pause_ns: int = 0
@@ -27,33 +27,33 @@ class _Told:
 
 
 class Repeats:
-    """Remembers what was told. May be called from any thread."""
+    """Reports of each message so far. May be called from any thread."""
 
     def __init__(self) -> None:
-        self._told: dict[str, _Told] = {}
+        self._reports: dict[str, _Report] = {}
         self._lock = threading.Lock()
 
     def take(self, text: str, now_ns: int) -> int | None:
-        """Number of times that a text was left out since it was told last; None if it is left out now, too.
+        """Number of times that a text was left out since its last report; None if it is left out now, too.
 
         Args:
-            text: what is to be told; numbers in it make no difference.
+            text: the message; numbers in it make no difference.
             now_ns: monotonic time [ns].
         """
         key = _NUMBERS.sub("0", text)
         with self._lock:
-            last = self._told.get(key)
+            last = self._reports.get(key)
             # What has not come for long is new.
             if last is None or now_ns - last.t_ns > 2 * max(last.pause_ns, FIRST_NS):
-                if len(self._told) >= MOST:
-                    self._told.clear()
-                self._told[key] = _Told(now_ns)
+                if len(self._reports) >= MAX_TEXTS:
+                    self._reports.clear()
+                self._reports[key] = _Report(now_ns)
                 return last.left_out if last else 0
             if now_ns - last.t_ns < last.pause_ns:
                 last.left_out += 1
                 return None
             longer_ns = min(max(2 * last.pause_ns, FIRST_NS), LONGEST_NS)
-            self._told[key] = _Told(now_ns, last.times + 1, longer_ns if last.times + 1 >= AT_ONCE else 0)
+            self._reports[key] = _Report(now_ns, last.times + 1, longer_ns if last.times + 1 >= AT_ONCE else 0)
             return last.left_out
 
 
@@ -70,7 +70,7 @@ class Tracebacks:
         self._held: dict[str, list[str]] = {}
 
     def take(self, component: str, line: str, now_ns: int) -> list[str]:
-        """The lines to tell, now that a process has written another one. Each process has a thread of its own.
+        """The lines to report after a process has written another one. Each process has a thread of its own.
 
         Args:
             component: name of the process.

@@ -168,7 +168,7 @@ class Supervisor:
                 child.limit_ns += paused_ns
 
     def _expect_health(self, child: Child, now_ns: int, busy: bool) -> None:
-        child.heard_ns, child.busy, child.limit_ns = now_ns, busy, now_ns + self._limits.startup_ns
+        child.received_ns, child.busy, child.limit_ns = now_ns, busy, now_ns + self._limits.startup_ns
         child.deadline_ns = child.limit_ns if busy else now_ns + self._limits.stall_ns
         child.overdue_ns = now_ns + (FIRST_LOOK_NS if busy else OVERDUE_NS)
 
@@ -194,7 +194,7 @@ class Supervisor:
             if now_ns >= child.deadline_ns:
                 self._treat_silence(child, now_ns)
             elif child.is_overdue(now_ns, self._limits.stall_ns):
-                child.reason = f"no health for {(now_ns - child.heard_ns) / 1e9:.0f} s"
+                child.reason = f"no health for {(now_ns - child.received_ns) / 1e9:.0f} s"
             return
         child.exit_code, child.worst_code = code, max(child.worst_code, code)
         if code == Exit.ENDED:
@@ -206,7 +206,7 @@ class Supervisor:
 
     def _treat_silence(self, child: Child, now_ns: int) -> None:
         if now_ns < child.deadline_ns + min(child.waited_ns(now_ns), self._limits.startup_ns):
-            silent_s = (now_ns - child.heard_ns) / 1e9
+            silent_s = (now_ns - child.received_ns) / 1e9
             child.reason = f"no health for {silent_s:.0f} s, because it waits for a processor"
             return
         child.process.kill()

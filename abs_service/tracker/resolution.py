@@ -10,7 +10,7 @@ import scipy  # its parts are imported when they are first used
 Vertices = Literal["auto"] | int
 
 #: Usual number of vertices; that of a template's mesh, which is made before the object is seen.
-USUAL_VERTICES = 300
+TYPICAL_VERTICES = 300
 
 #: A coarser grid loses too much of a small object at its rim.
 MIN_VERTICES = 100
@@ -28,7 +28,7 @@ CUBIC = 3
 
 def vertices(pixels: int) -> int:
     """Number of vertices for an object of so many pixels in the first depth image: never more than it has pixels."""
-    return min(USUAL_VERTICES, max(pixels, MIN_VERTICES))
+    return min(TYPICAL_VERTICES, max(pixels, MIN_VERTICES))
 
 
 def degree(cells: Iterable[float]) -> int:

@@ -1,4 +1,4 @@
-"""Observations from frame sets: every sensor's frames are decoded as its kind of measurement says."""
+"""Observations from frame sets: every sensor's frames are decoded by its kind of measurement."""
 
 from collections.abc import Collection, Iterable
 

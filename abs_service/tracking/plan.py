@@ -119,8 +119,8 @@ class Plan:
 
 
 def build_template(settings: TemplateSettings, vertices: resolution.Vertices) -> Template:
-    """The template, whose mesh has a usual number of vertices if none is given."""
-    return settings.build(resolution.USUAL_VERTICES if vertices == "auto" else vertices)
+    """The template, whose mesh has a typical number of vertices if none is given."""
+    return settings.build(resolution.TYPICAL_VERTICES if vertices == "auto" else vertices)
 
 
 def make_posterior(

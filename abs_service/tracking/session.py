@@ -23,7 +23,7 @@ from abs_service.tracker.tracker import Tracker
 from abs_service.tracking.monitors import loss_monitor
 from abs_service.tracking.monitors.appearance_monitor import AppearanceMonitor
 from abs_service.tracking.monitors.first_view import FirstView
-from abs_service.tracking.monitors.growth_monitor import LEAST_GROWTH, GrowthMonitor
+from abs_service.tracking.monitors.growth_monitor import MIN_GROWTH, GrowthMonitor
 from abs_service.tracking.observer import Observer
 from abs_service.tracking.offsets.vertex_offsets import FixedOffsets, VertexOffsets
 from abs_service.tracking.plan import Plan, build_template, derived, make_tracker
@@ -144,7 +144,7 @@ class TrackingSession:
         self._requested.append(region or self._configured)
 
     def _forget(self, host_clock: str) -> None:
-        """Forgets the object: on another clock, nobody knows how much time has passed since the last frame."""
+        """Discards the object: on another clock, the time since the last frame is unknown."""
         self._host_clock = host_clock
         self._tracker = None
         self._region = self._configured = self._plan.region.build()
@@ -208,7 +208,7 @@ class TrackingSession:
     def _renew(self, old: Mesh, observation: Observation) -> None:
         """Replaces the mesh by a new one of about the same size and colours, or with sides that the first image hid."""
         built = self._build(observation, self._region)
-        grown = built.mesh.area > LEAST_GROWTH * old.area and not self._loss_monitor.is_lost
+        grown = built.mesh.area > MIN_GROWTH * old.area and not self._loss_monitor.is_lost
         if not (grown and self._view is not None and self._view.hid(built.mesh, self._vertices)):
             self._loss_monitor.check_likeness(built.mesh, old)
         self._adopt(built, observation)
@@ -217,7 +217,7 @@ class TrackingSession:
     def _grow(self, old: Mesh, observation: Observation) -> None:
         """Replaces the mesh if much more of the object is in sight."""
         built = self._build(observation, self._region)
-        if built.mesh.area > LEAST_GROWTH * old.area:
+        if built.mesh.area > MIN_GROWTH * old.area:
             self._adopt(built, observation)
             self._loss_monitor.restart("a larger mesh was made")
 

@@ -96,7 +96,7 @@ def answer_reinitialize(
 
 
 def answer_record(bus: Bus, headers: HeaderFactory, health: Health, act: Callable[[bool], str]) -> Subscription:
-    """Answers requests to record, or to wait; counts and tells them as `answer_reinitialize`.
+    """Answers requests to record, or to wait; counts and logs them as `answer_reinitialize`.
 
     Args:
         bus: of the rig.
@@ -119,7 +119,7 @@ def answer_record(bus: Bus, headers: HeaderFactory, health: Health, act: Callabl
 def answer_reload(
     bus: Bus, headers: HeaderFactory, health: Health, act: Callable[[], tuple[Sequence[str], Sequence[str]]]
 ) -> Subscription:
-    """Answers requests to read the rig file again; counts and tells them as `answer_reinitialize`.
+    """Answers requests to read the rig file again; counts and logs them as `answer_reinitialize`.
 
     Args:
         bus: of the rig.
@@ -183,32 +183,32 @@ def answer_valid(
     act: Callable[[bytes], CommandAnswer],
     details: Callable[[bytes], str],
 ) -> Subscription:
-    """Answers commands on a topic; counts and tells them as `answer_reinitialize`.
+    """Answers commands on a topic; counts and logs them as `answer_reinitialize`.
 
     `act` gets the payload of those that are valid and returns what is particular of their answer, or raises
     RefusedError, or any other error, which is logged; `details` makes what the log says of them.
     """
-    told_ns: deque[int] = deque(LINES * [-LINES_NS], maxlen=LINES)
+    logged_ns: deque[int] = deque(LINES * [-LINES_NS], maxlen=LINES)
 
     def reply(command: Sample) -> bytes:
         now_ns = headers.clock.monotonic()
-        if is_told := now_ns - told_ns[0] >= LINES_NS:
-            told_ns.append(now_ns)
+        if is_logged := now_ns - logged_ns[0] >= LINES_NS:
+            logged_ns.append(now_ns)
         reason, sender = _refusal(command, message, headers.rig)
-        answer, said = CommandAnswer(), ""
+        answer, detail = CommandAnswer(), ""
         if not reason:
-            said = details(command.payload)
+            detail = details(command.payload)
             try:
                 answer = act(command.payload)
             except RefusedError as error:
                 reason = str(error)
             except Exception as error:  # a mistake of ours, which whoever asks has to know of, too
                 reason = f"{type(error).__name__}: {error}"
-                if is_told:
+                if is_logged:
                     _log.exception("%s", topic)
         count = health.counted("commands.refused" if reason else "commands.accepted")
-        line = printable(f"{topic}{said} from {sender}: {reason or 'accepted'}")
-        if is_told:  # a program that asks without end must not fill the disk
+        line = printable(f"{topic}{detail} from {sender}: {reason or 'accepted'}")
+        if is_logged:  # a program that asks without end must not fill the disk
             _log.warning("command %d: %s", count, line)
         health.label("command", line)
         answer.MergeFrom(CommandAnswer(header=headers.now(count), accepted=not reason, reason=printable(reason)))

@@ -1,4 +1,4 @@
-"""Commands to the devices of a rig: to set their controls, and to tell which ones they have."""
+"""Commands to the devices of a rig: set controls, list controls."""
 
 import json
 from collections.abc import Callable, Mapping
@@ -19,7 +19,7 @@ Act = Callable[[Mapping[str, Value]], Mapping[ControlInfo, Value]]
 
 
 def answer_controls(bus: Bus, device: str, headers: HeaderFactory, health: Health, act: Act) -> Subscription:
-    """Answers requests to set controls of a device; counts and tells them as `commands.answer_reinitialize`.
+    """Answers requests to set controls of a device; counts and logs them as `commands.answer_reinitialize`.
 
     Args:
         bus: of the rig.
@@ -47,7 +47,7 @@ def answer_controls(bus: Bus, device: str, headers: HeaderFactory, health: Healt
 def set_controls(
     bus: Bus, device: str, headers: HeaderFactory, timeout_s: float, values: Mapping[str, Value]
 ) -> CommandAnswer | None:
-    """Asks a device to set controls, none to be told which it has; returns its answer, None if there is none.
+    """Asks a device to set controls, or without any to list them; returns its answer, None if there is none.
 
     Args:
         bus: of the rig.

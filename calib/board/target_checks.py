@@ -3,7 +3,7 @@
 import math
 
 #: Least and largest length of a board [m], and one that is usual.
-LEAST_M, LARGEST_M, USUAL_M = 0.01, 5.0, 0.3
+MIN_M, LARGEST_M, TYPICAL_M = 0.01, 5.0, 0.3
 
 
 class TargetError(ValueError):
@@ -28,10 +28,10 @@ def check_length(name: str, length: float) -> None:
 def check_extent(name: str, spacing: float, count: int) -> None:
     """Checks the longer side of a board, `count` times `spacing` [m], as units are mixed up by powers of ten."""
     extent = count * spacing
-    if not LEAST_M <= extent <= LARGEST_M:
-        factor = 10.0 ** round(math.log10(USUAL_M / extent))
+    if not MIN_M <= extent <= LARGEST_M:
+        factor = 10.0 ** round(math.log10(TYPICAL_M / extent))
         raise TargetError(
-            f"{name}: {spacing:g} m makes the board {extent:g} m long, which must be from {LEAST_M:g} to {LARGEST_M:g} "
+            f"{name}: {spacing:g} m makes the board {extent:g} m long, which must be from {MIN_M:g} to {LARGEST_M:g} "
             f"m; {name}_mm is in millimetres, {name} in metres. {factor * spacing:g} m would make it "
             f"{factor * extent:g} m"
         )

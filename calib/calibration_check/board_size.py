@@ -13,7 +13,7 @@ from calib.solve.start.board_poses import pose_candidates
 GROSS = 1.2
 
 #: Least number of estimates. Most of them have to agree with their median up to a share of it.
-LEAST, AGREEING, TOLERANCE = 3, 0.7, 0.05
+MIN_KNOWN, AGREEING, TOLERANCE = 3, 0.7, 0.05
 
 #: Pairs of sensors that stand nearer to each other than this share of the board's distance say nothing.
 SHORTEST = 0.02
@@ -33,7 +33,7 @@ def gross_size(stored: Stored, views: Views) -> float:
     estimates = [_by_pair(stored, *pair) for seen in boards.values() for pair in combinations(seen, 2)]
     estimates += [_by_plane(stored, seen, view) for view in views.planes for seen in boards.get(view.shot, [])[:1]]
     known = np.array([each for each in estimates if np.isfinite(each)])
-    size = float(np.median(known)) if len(known) >= LEAST else 1.0
+    size = float(np.median(known)) if len(known) >= MIN_KNOWN else 1.0
     is_gross = size > 0 and abs(np.log(size)) > np.log(GROSS)
     return size if is_gross and np.mean(np.abs(known / size - 1) < TOLERANCE) > AGREEING else 1.0
 

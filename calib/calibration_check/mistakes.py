@@ -23,7 +23,7 @@ MAX_SHOTS = 10
 
 #: Corners that miss by less than this share of the image's width are no mistake. Without the mistake they do, and miss
 #: this many times less.
-LEAST_SHARE, BETTER = 0.005, 5.0
+MIN_SHARE, BETTER = 0.005, 5.0
 
 #: Corners that miss by this many times less with the camera of another sensor are probably of that one.
 LIKELIER = 1.5
@@ -74,7 +74,7 @@ def find(stored: Stored, corners: Sequence[CornerView]) -> list[Mistake]:
     given = _miss(stored, shots)
     there = {view.sensor for views in shots for view in views}
     names = [name for name in stored.sensors if name in there]
-    least = LEAST_SHARE * max((stored.sensors[name].camera.width for name in names), default=0)
+    least = MIN_SHARE * max((stored.sensors[name].camera.width for name in names), default=0)
     if given <= least:
         return []
     if same := same_images(view for views in shots for view in views):

@@ -104,7 +104,7 @@ def linearise(stored: Stored, views: Views) -> Linearised:
     offset, radius = _middle(views)
     by_shot: dict[int, list[_View]] = {}
     for views_of_group in _views(equations, _changes(stored, found, equations)):
-        for number, view in _of_usual_noise(views_of_group).items():
+        for number, view in _of_typical_noise(views_of_group).items():
             by_shot.setdefault(number, []).append(view)
     shots = []
     for number, parts in sorted(by_shot.items()):
@@ -157,7 +157,7 @@ def _views(equations: Equations, changes: Array) -> list[dict[int, _View]]:
     return found
 
 
-def _of_usual_noise(views: dict[int, _View]) -> dict[int, _View]:
+def _of_typical_noise(views: dict[int, _View]) -> dict[int, _View]:
     """Views of one group, normalised by what a board pose of their own leaves, outliers left out."""
     left = {shot: view.residuals - view.board @ _fit(view) for shot, view in views.items()}
     sigma = max(robust.scale(np.concatenate([*left.values()]), sum(len(each) for each in left.values())), 1e-12)

@@ -140,16 +140,16 @@ def unlike_the_rest(task: Task, state: State) -> str:
         camera, T_rb = state.sensors[view.sensor].camera, state.boards[view.shot]
         errors = np.hypot(*(camera.project(pose.transform(T_rb, view.points_b)) - view.pixels).T)
         misses.setdefault(view.sensor, {})[view.shot] = float(np.median(np.nan_to_num(errors, nan=np.inf)))
-    usual = {sensor: float(np.median([*by_shot.values()])) for sensor, by_shot in misses.items()}
+    typical = {sensor: float(np.median([*by_shot.values()])) for sensor, by_shot in misses.items()}
     far: dict[int, tuple[float, str]] = {}
     for sensor, by_shot in misses.items():
         for shot, miss in by_shot.items():
-            if miss > max(FAR_RATIO * usual[sensor], FAR_PX):
+            if miss > max(FAR_RATIO * typical[sensor], FAR_PX):
                 far[shot] = max(far.get(shot, (0.0, "")), (miss, sensor))
     runs = [list(shots) for is_far, shots in groupby(task.shots, key=far.__contains__) if is_far]
     if not runs:
         return ""
-    said = "; ".join(_missing(run, task.shots, far, usual) for run in runs)
+    said = "; ".join(_missing(run, task.shots, far, typical) for run in runs)
     gaps = groupby(enumerate(sorted(far)), key=lambda item: item[1] - item[0])  # where there may be no shot to skip
     parts = [[shot for _, shot in part] for _, part in gaps]
     numbers = ",".join(f"{part[0]}-{part[-1]}" if len(part) > 1 else f"{part[0]}" for part in parts)
@@ -157,12 +157,12 @@ def unlike_the_rest(task: Task, state: State) -> str:
 
 
 def _missing(
-    run: Sequence[int], shots: Sequence[int], far: Mapping[int, tuple[float, str]], usual: Mapping[str, float]
+    run: Sequence[int], shots: Sequence[int], far: Mapping[int, tuple[float, str]], typical: Mapping[str, float]
 ) -> str:
     """Clause on shots in a row, by how much they miss; first or last ones may be of another time of the rig."""
     sensors = dict.fromkeys(far[shot][1] for shot in run)
     numbers = f"shots {run[0]} to {run[-1]}" if len(run) > 1 else f"shot {run[0]}"
-    miss, median = float(np.median([far[shot][0] for shot in run])), max(usual[name] for name in sensors)
+    miss, median = float(np.median([far[shot][0] for shot in run])), max(typical[name] for name in sensors)
     said = f"{numbers} of {' and '.join(sensors)} by {miss:.2g} px, {median:.2g} px are usual"
     if len(run) < MIN_VIEWS or (run[0] > shots[0]) == (run[-1] < shots[-1]):
         return said

@@ -32,7 +32,7 @@ def link(given: argparse.Namespace) -> Link:
     return Link(given.endpoint, given.rig, Tls(*given.tls) if given.tls else None)
 
 
-def told_to_end() -> threading.Event:
+def end_signal() -> threading.Event:
     """Set by Ctrl-C or SIGTERM."""
     end = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):

@@ -62,7 +62,7 @@ type = "nurbs"
 
 
 class RigFailedError(ClientError):
-    """The service ended or did not track in time; the message holds what it said."""
+    """The service ended or did not track in time; the message holds its output."""
 
 
 @dataclass(frozen=True)

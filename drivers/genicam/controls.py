@@ -31,7 +31,7 @@ def make(link: CameraLink) -> Controls:
 
 
 def exposure_s(nodes: Any) -> float:
-    """Exposure at this moment [s], NaN if it is not told."""
+    """Exposure at this moment [s], NaN if the camera does not report it."""
     time_us = value(nodes, "ExposureTime")
     return float("nan") if time_us is None else time_us * 1e-6
 

@@ -22,7 +22,7 @@ _NUMBERS = 65535
 
 @dataclass(frozen=True, slots=True, eq=False)
 class First:
-    """The first exposure after opening, which tells what will come.
+    """The first exposure after opening, from which the streams follow.
 
     Attributes:
         shot: its images.

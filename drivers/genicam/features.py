@@ -107,7 +107,7 @@ def distances(nodes: Any, uri: str) -> Distances:
 
 
 def camera(nodes: Any, width: int, height: int, address: Address) -> Camera:
-    """Factory calibration; the principal point is in the middle if nothing tells it.
+    """Factory calibration; the principal point is in the middle if the camera reports none.
 
     Raises:
         DeviceError: nothing tells the focal length, or it is invalid.
@@ -130,7 +130,7 @@ def camera(nodes: Any, width: int, height: int, address: Address) -> Camera:
 
 
 def _distortion(nodes: Any) -> Iterable[float]:
-    """OpenCV's k1, k2, p1, p2, k3; zeros where the camera tells none."""
+    """OpenCV's k1, k2, p1, p2, k3; zeros where the camera reports none."""
     for number in range(5):
         selector = settable(nodes, "CalibLensDistortionValueSelector")
         if selector is not None:

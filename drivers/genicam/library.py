@@ -106,16 +106,16 @@ def files() -> list[str]:
 
 
 def _found(info: Any) -> Found:
-    serial = _told(info, "serial_number") or _told(info, "id_")
-    model = " ".join(filter(None, (_told(info, "vendor"), _told(info, "model")))) or "GenICam"
-    link = _told(info, "tl_type")
+    serial = _text(info, "serial_number") or _text(info, "id_")
+    model = " ".join(filter(None, (_text(info, "vendor"), _text(info, "model")))) or "GenICam"
+    link = _text(info, "tl_type")
     identity = DeviceInfo(f"genicam://{serial}", model, serial, link=_LINKS.get(link, link))
-    if _told(info, "access_status") in _FREE:
+    if _text(info, "access_status") in _FREE:
         return Found(identity)
     return Found(identity, Availability.BUSY, "another program uses it", "close that one")
 
 
-def _told(info: Any, name: str) -> str:
+def _text(info: Any, name: str) -> str:
     try:
         return str(getattr(info, name) or "")
     except Exception:  # the producer's, for what it does not know

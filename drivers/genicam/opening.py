@@ -33,7 +33,7 @@ def discover(timeout_s: float) -> list[Found]:
 
 
 def open_device(uri: str, clock: Callable[[], int]) -> GenicamDevice:
-    """Opens a camera, such as `genicam://24551234`, and takes its first image, which tells its streams.
+    """Opens a camera, such as `genicam://24551234`, and takes its first image, from which its streams follow.
 
     Raises:
         AddressError: invalid address.
@@ -77,8 +77,8 @@ def of_link(link: CameraLink, info: DeviceInfo, address: Address, clock: Callabl
         camera = features.camera(nodes, depth.width, depth.height, address)
         rate_hz = features.value(nodes, "AcquisitionFrameRate") or _RATE_HZ
         firmware = features.value(nodes, "DeviceFirmwareVersion", "DeviceVersion") or ""
-    asked = urlsplit(address.uri).query
-    known = replace(info, uri=f"{info.uri}?{asked}" if asked else info.uri, firmware=str(firmware))
+    query = urlsplit(address.uri).query
+    known = replace(info, uri=f"{info.uri}?{query}" if query else info.uri, firmware=str(firmware))
     try:
         return GenicamDevice(link, known, First(shot, distances, camera, float(rate_hz)), clock)
     except PixelError as error:

@@ -106,8 +106,8 @@ def _stream(sensor: Any, role: Role, mode: Mode, uri: str) -> Stream:
     fitting = [profile for profile in usable if _fits(profile, mode)]
     if not fitting:
         there_are = ", ".join(f"{w}x{h}@{rate}" for w, h, rate in sorted(set(map(_size_and_rate, usable)))) or "none"
-        asked = f"{mode.width}x{mode.height}" + (f"@{mode.rate_hz}" if mode.rate_hz else "")
-        raise DeviceError(f"{uri}: {role.sensor}/{role.stream} has no {asked}; it has: {there_are}")
+        requested = f"{mode.width}x{mode.height}" + (f"@{mode.rate_hz}" if mode.rate_hz else "")
+        raise DeviceError(f"{uri}: {role.sensor}/{role.stream} has no {requested}; it has: {there_are}")
     best = min(fitting, key=lambda profile: _rank(profile, preferred, list(FORMATS[role.kind])))
     return Stream(role, sensor, best, FORMATS[role.kind][best.get_format().name])
 
@@ -121,7 +121,7 @@ def _videos(profiles: Any) -> Iterable[Any]:
 
 def _fits(profile: Any, mode: Mode) -> bool:
     pairs = zip((mode.width, mode.height, mode.rate_hz), _size_and_rate(profile), strict=True)
-    return all(asked in {0, given} for asked, given in pairs)
+    return all(requested in {0, given} for requested, given in pairs)
 
 
 def _rank(profile: Any, preferred: Any, formats: Sequence[str]) -> tuple[bool, bool, int]:

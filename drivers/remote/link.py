@@ -19,7 +19,7 @@ from drivers.zenoh_session.callbacks import from_non_daemon_thread
 ANSWER_S = 3.0
 
 #: Free shared memory without which zenoh does not connect with it [bytes]; what is received needs no room.
-LEAST_SHARED_BYTES = 1 << 20
+MIN_SHARED_BYTES = 1 << 20
 
 #: Callback with topic, payload and attachment of a message, from a zenoh thread; must not block.
 OnMessage = Callable[[str, bytes, bytes], None]
@@ -106,7 +106,7 @@ def open_link(address: Address, timeout_s: float = ANSWER_S) -> Link:
             "link": {"tx": {"lease": connection.LEASE_MS}},
             "shared_memory": {
                 "enabled": address.shared_memory
-                and shared_memory.free_bytes() >= LEAST_SHARED_BYTES
+                and shared_memory.free_bytes() >= MIN_SHARED_BYTES
                 and shared_memory.may_be_locked()
             },
         },

@@ -149,7 +149,7 @@ def _from_index(summary: Summary, stream: BinaryIO) -> Contents:
 
 
 def _channels(index: ChunkIndex) -> frozenset[int] | None:
-    """Channels with messages in a chunk; None for a writer that tells none."""
+    """Channels with messages in a chunk; None for a writer that lists none."""
     return frozenset(index.message_index_offsets) or None
 
 

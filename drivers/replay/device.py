@@ -161,7 +161,7 @@ class ReplayDevice:
         self._gate.drop("unpaired", self._recording.unpaired)
 
     def _wait_for(self, t_host_ns: int, stop: threading.Event) -> bool:
-        """Waits until a host time; returns True if the replay is stopped. A long wait is said."""
+        """Waits until a host time; returns True if the replay is stopped. A long wait is logged."""
         left_s = max(t_host_ns - self._clock(), 0) * 1e-9
         is_pause = left_s > PAUSE_S
         if is_pause:

@@ -21,7 +21,7 @@ VERSION = 4
 #: Longest name of a sensor [bytes].
 LONGEST_NAME = 1024
 #: Most frames: six days at 30 Hz.
-MOST_FRAMES = 1 << 24
+MAX_FRAMES = 1 << 24
 #: Units of depth that a metre may have.
 SHIFTS = (1.0, 1e6)
 
@@ -126,9 +126,9 @@ def read(stream: BinaryIO) -> Header:
     least, most = SHIFTS
     if not least <= shift <= most:
         raise SensError(f"depth_shift = {shift}: must be from {least:g} to {most:g} units per metre")
-    if not 0 < count <= MOST_FRAMES:
+    if not 0 < count <= MAX_FRAMES:
         why = "" if count else "; a recorder that was interrupted leaves 0"
-        raise SensError(f"num_frames = {count}: must be from 1 to {MOST_FRAMES}{why}")
+        raise SensError(f"num_frames = {count}: must be from 1 to {MAX_FRAMES}{why}")
     return Header(
         ImageHeader("color", color_K, color_T, color, color_width, color_height),
         ImageHeader("depth", depth_K, depth_T, depth, depth_width, depth_height),

@@ -1,4 +1,4 @@
-"""Pixels of the images in a .sens file: never more than the header says."""
+"""Pixels of the images in a .sens file: never more than the header announces."""
 
 import zlib
 from collections.abc import Mapping

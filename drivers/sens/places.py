@@ -1,4 +1,4 @@
-"""Places of the images in a .sens file: nothing but the heads of its frames is read."""
+"""Places of the images in a .sens file: only the headers of its frames are read."""
 
 import struct
 from collections.abc import Iterator, Mapping

@@ -101,7 +101,7 @@ class Followed:
 
     @property
     def wrong(self) -> NDArray[np.bool_]:
-        """True where TRACKING is said and wrong."""
+        """True where an estimate is TRACKING and wrong."""
         return self.tracking & (self.error_m > np.maximum(WRONG_M, 3 * self.sigma_m))
 
     @property

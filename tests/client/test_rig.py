@@ -17,7 +17,7 @@ from abs_service.bus.contract import IMAGES
 from abs_service.bus.health import Health
 from abs_service.bus.session import Role
 from abs_service.bus.stamps import HeaderFactory, WallClock
-from abs_service.capture.asked_controls import AskedControls
+from abs_service.capture.requested_controls import RequestedControls
 from abs_service.wire import commands, control_commands
 from drivers.encoding import codec
 from drivers.simulated.address import parse
@@ -118,7 +118,7 @@ def test_the_recorder_records_and_waits(bus, rig, headers):
 
 
 def test_controls_of_a_device_are_told_and_set(bus, rig, headers):
-    act = partial(AskedControls().set, device=adjustable())
+    act = partial(RequestedControls().set, device=adjustable())
     control_commands.answer_controls(bus, "cam", headers, Health(bus, "capture", headers), act)
     before = {"exposure_s": 0.01, "auto_exposure": True, "infrared_gain": 12, "sync_role": "free"}
     assert rig.controls("cam") == before

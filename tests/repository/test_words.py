@@ -1,6 +1,8 @@
 """The house's language: docstrings that state, and a glossary whose rows are complete."""
 
+import io
 import re
+import tokenize
 from pathlib import Path
 
 import pytest
@@ -18,6 +20,18 @@ def test_a_docstring_says_what_a_thing_is_or_returns(folder):
         for found in QUESTION.finditer(path.read_text(encoding="utf-8"))
     ]
     assert asking == []
+
+
+@pytest.mark.parametrize("folder", [folder for folder in FOLDERS if folder != "tests"])
+def test_names_use_the_standard_terms(folder):
+    """Of the conventions: received, reported, typical and recent; tests may tell what they see."""
+    found = {
+        f"{path.relative_to(ROOT)}: {token.string}"
+        for path in sorted((ROOT / folder).rglob("*.py"))
+        for token in tokenize.generate_tokens(io.StringIO(path.read_text(encoding="utf-8")).readline)
+        if token.type == tokenize.NAME and {"heard", "told", "usual", "lately"} & set(token.string.lower().split("_"))
+    }
+    assert found == set()
 
 
 def test_every_row_of_the_glossary_has_all_columns():

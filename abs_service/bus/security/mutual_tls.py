@@ -1,4 +1,4 @@
-"""Mutual TLS of the bus. Its files are checked before zenoh opens, which only reports that nothing answers."""
+"""Mutual TLS of the bus. Its files are checked first, as zenoh reports any mistake in them as a lack of answers."""
 
 import json
 import socket
@@ -40,7 +40,7 @@ class Certificate:
 
 @dataclass(frozen=True, slots=True)
 class NoSecurity:
-    """A bus without TLS: whoever reaches its endpoint may do everything."""
+    """A bus without TLS: every program that reaches its endpoint has all rights."""
 
     #: Parts of zenoh's configuration: of its links, of a router.
     link: Mapping[str, Any] = field(default_factory=dict)
@@ -114,7 +114,7 @@ class MutualTls:
         return Certificate(found.name, min(found.ends, *(_end(one) for one in server.get_ca_certs())))
 
     def refusal(self, endpoint: str) -> str:
-        """See `NoSecurity`; connects once more, since zenoh does not say it."""
+        """See `NoSecurity`; connects once more, since zenoh does not report it."""
         host, port = _host(endpoint), int(endpoint.partition("#")[0].rpartition(":")[2])
         try:
             with (

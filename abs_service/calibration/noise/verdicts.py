@@ -150,7 +150,7 @@ def _undetermined(found: NoiseCalibration) -> list[Verdict]:
 
 
 def _missing(found: NoiseCalibration) -> list[Verdict]:
-    """Frequency of missing returns, if targets tell."""
+    """Frequency of missing returns, if targets were recorded."""
     if not found.missing.targets:
         return []
     share, distance, cosine = (

@@ -84,13 +84,13 @@ class LiveShots:
         Raises:
             ShotsError: a device failed, or frames timed out.
         """
-        number, last, heard_ns = 0, None, self._clock()
+        number, last, received_ns = 0, None, self._clock()
         while not self._is_over():
             ended = all(inbox.state == DeviceState.CLOSED for inbox in self._inboxes.values())
             self._check_devices()
             sets = self._new_sets()
             if sets:
-                heard_ns = self._clock()
+                received_ns = self._clock()
                 pair = [last or sets[0], *sets][-2:]
                 last = pair[1]
                 # The very first set has no predecessor, so its motion is unknown.
@@ -99,7 +99,7 @@ class LiveShots:
                     number += 1
             elif ended:
                 return
-            elif self._clock() - heard_ns > SILENCE_S * 1e9:
+            elif self._clock() - received_ns > SILENCE_S * 1e9:
                 raise ShotsError(f"no images for {SILENCE_S:g} s; `abs-service devices` shows what is connected")
             else:
                 next(iter(self._inboxes.values())).wait(0.05)

@@ -98,5 +98,5 @@ def _structured_light(recording: Recording, head: str) -> str:
     """Noise model of a head: that of a PrimeSense camera, or more if its first depth images scatter more."""
     frames = (frame for frame in recording.frames({(head, "depth")}) if isinstance(frame, Frame))
     measured = np.median([scatter(frame.si()) for frame in islice(frames, _IMAGES)] or [np.nan])
-    usual = np.hypot(_PRIMESENSE.noise, _PRIMESENSE.step / np.sqrt(12))
-    return _SCATTERED.format(measured * 1e3) if measured > _MORE * usual else STRUCTURED_LIGHT
+    typical = np.hypot(_PRIMESENSE.noise, _PRIMESENSE.step / np.sqrt(12))
+    return _SCATTERED.format(measured * 1e3) if measured > _MORE * typical else STRUCTURED_LIGHT

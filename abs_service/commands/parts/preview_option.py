@@ -33,7 +33,7 @@ def add_argument(parser: argparse.ArgumentParser) -> None:
 
 
 def check(path: Path) -> None:
-    """Refuses a path that says no format.
+    """Refuses a path without the suffix of a format.
 
     Raises:
         PictureOptionError: its suffix is none of `SUFFIXES`.

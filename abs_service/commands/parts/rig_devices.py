@@ -1,4 +1,4 @@
-"""The devices of a rig as its configuration wants them: controls, and cameras and noise models of their sensors."""
+"""The devices of a rig by its configuration: their controls, and cameras and noise models of their sensors."""
 
 from collections.abc import Mapping
 

@@ -111,14 +111,14 @@ def stop_on_signals() -> threading.Event:
 
     SIGHUP says that the terminal is gone, often twice: by the kernel and by the shell. `nohup` lets it be ignored.
     """
-    stop, told = threading.Event(), False
+    stop, is_signalled = threading.Event(), False
     hand_over = _in_thread(stop.set)
 
     def on_signal(number: int, frame: FrameType | None) -> None:
-        nonlocal told
-        if told:
+        nonlocal is_signalled
+        if is_signalled:
             os._exit(128 + number)
-        told = True
+        is_signalled = True
         hand_over(number, frame)
 
     signal.signal(signal.SIGTERM, on_signal)

@@ -19,10 +19,10 @@ from abs_service.bus.frames import FramePublisher
 from abs_service.bus.health import Health, Level
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.capture import sensor_metadata
-from abs_service.capture.asked_controls import AskedControls
 from abs_service.capture.device_supervisor import DeviceSupervisor
 from abs_service.capture.metadata_publisher import MetadataPublisher
 from abs_service.capture.point_clouds import PointCloudPublisher
+from abs_service.capture.requested_controls import RequestedControls
 from abs_service.commands.parts import rig_devices, rig_process
 from abs_service.supervision.exit_codes import Exit
 from abs_service.supervision.process_setup import process_tuning
@@ -87,11 +87,11 @@ def _supervisor(
     health: Health,
     answer: Callable[..., Subscription],
 ) -> DeviceSupervisor:
-    asked = AskedControls()
+    requested = RequestedControls()
 
     def on_open(device: Device) -> None:
         rig_devices.set_controls(device, rig.devices[name].controls, f"{source}: devices.{name}.controls")
-        asked.renew(device)
+        requested.renew(device)
         metadata.add(rig_devices.cameras(rig, name, device))
         process_tuning.freeze_loaded_objects()
 
@@ -105,7 +105,7 @@ def _supervisor(
         health,
         time.monotonic_ns,
     )
-    answer(name, act=lambda values: supervisor.use(partial(asked.set, values)))
+    answer(name, act=lambda values: supervisor.use(partial(requested.set, values)))
     return supervisor
 
 

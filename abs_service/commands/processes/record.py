@@ -152,7 +152,7 @@ def recover_again_and_again(
 
 
 def recover_leftovers(settings: RecorderSettings, health: Health, begun_s: float) -> bool:
-    """Recovers what recorders have left; health and log say what came of it.
+    """Recovers unfinished files of earlier recorders; reports the result in health and log.
 
     Args:
         settings: of the recorder.

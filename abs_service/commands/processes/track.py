@@ -65,11 +65,11 @@ def run(arguments: argparse.Namespace) -> int:
     stop = rig_process.stop_on_signals()
     while not stop.is_set():
         with rig_process.open_bus(settings, arguments, "tracker") as bus:
-            _track(bus, settings, name, plan, noises, stop)
+            track_until_recalibrated(bus, settings, name, plan, noises, stop)
     return Exit.OK
 
 
-def _track(
+def track_until_recalibrated(
     bus: CheckedBus,
     settings: config.ServiceConfig,
     name: str,

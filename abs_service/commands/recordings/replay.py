@@ -1,4 +1,4 @@
-"""Tracks a recording again: every frame set, nothing dropped, the same estimates each time; writes them to a new file.
+"""Tracks a recording again: every frame set without a drop, the same estimates each time; writes them to a new file.
 
   abs-service replay recordings/x.mcap                          with the configuration that it was recorded with
   abs-service replay recordings/x.mcap --config rig.toml        with another one

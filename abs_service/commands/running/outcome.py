@@ -7,17 +7,17 @@ from abs_service.supervision.health.rig_view import RigView
 from abs_service.tracking.log.tracker_log import TrackerLog
 
 
-def code(view: RigView, is_told: bool) -> Exit:
-    """FAILED if the recording lacks something, or nothing was tracked before the rig ended without being told to.
+def code(view: RigView, is_stopped: bool) -> Exit:
+    """FAILED if the recording lacks something, or if the rig ended by itself and nothing was tracked.
 
-    Who ends a rig before it has found its object is not told of a failure: systemd would start it again.
+    A user who stops a rig before it has found its object has not failed: systemd would start it again.
     """
-    failed = not is_told and untracked(view.live.trackers)
+    failed = not is_stopped and untracked(view.live.trackers)
     return Exit.FAILED if failed else recording_code(view)
 
 
 def recording_code(view: RigView) -> Exit:
-    """FAILED if a recorder has said, at its end or before, that something is missing, though all else went well."""
+    """FAILED if a recorder has reported losses or a failure, whatever else went well."""
     worst = any(child.component == "record" and child.worst_code for child in view.children)
     return Exit.FAILED if worst or view.live.counters("record")["failures"] else Exit.OK
 

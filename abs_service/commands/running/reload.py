@@ -46,6 +46,6 @@ def request(bus: Bus, headers: HeaderFactory) -> int:
     if not answer.accepted:
         print(f"the rig refuses: {answer.reason}")
         return Exit.FAILED
-    said = (("starts again", answer.restarts), ("ends", answer.ends))
-    print("; ".join(f"{what}: {', '.join(names)}" for what, names in said if names) or "nothing has changed")
+    changes = (("starts again", answer.restarts), ("ends", answer.ends))
+    print("; ".join(f"{what}: {', '.join(names)}" for what, names in changes if names) or "nothing has changed")
     return Exit.OK

@@ -1,4 +1,4 @@
-"""A rig file that somebody may be writing at this moment: an editor, a copy from another host."""
+"""A rig file that another program may be writing at this moment: an editor, a copy from another host."""
 
 import time
 from collections.abc import Callable
@@ -30,7 +30,7 @@ class Time:
 
 
 def read(path: Path, load: Callable[[], T], ends: Callable[[T], bool], time_: Time = Time()) -> T:
-    """Content of a file that nobody has written to for a while.
+    """Content of a file that has not changed for a while.
 
     Args:
         path: the file.

@@ -91,9 +91,11 @@ def _part(component: str, health: Health | None) -> dict[str, Any]:
 
 
 def _absent(components: Mapping[str, Health | None]) -> list[dict[str, Any]]:
-    """The processes of which `run` alone can tell: they start, or start again, or were given up."""
+    """Processes that only `run` reports: they start, start again, or were given up."""
     run = components.get("run") or Health()
-    told = {name.removeprefix(PROCESS): text for name, text in run.labels.items() if name.startswith(PROCESS) and text}
+    reasons = {
+        name.removeprefix(PROCESS): text for name, text in run.labels.items() if name.startswith(PROCESS) and text
+    }
     return [
         {
             "component": name,
@@ -101,7 +103,7 @@ def _absent(components: Mapping[str, Health | None]) -> list[dict[str, Any]]:
             "state": "",
             "reason": text,
         }
-        for name, text in told.items()
+        for name, text in reasons.items()
         if name not in components
     ]
 

@@ -13,7 +13,7 @@ SHARED = ("camera", "noise", "texture", "outlier_share", "range_m", "no_return",
 
 
 class DepthTable(Table):
-    """`depth`: systematic error of a depth sensor, which is taken off before anything else is done with a distance.
+    """`depth`: systematic error of a depth sensor, which is subtracted from every distance first.
 
     measured = (1 + scale) · distance + offset, for radial distances.
 

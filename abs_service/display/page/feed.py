@@ -154,7 +154,7 @@ class Feed:
         return None
 
     def cameras(self) -> dict[str, Camera]:
-        """The camera of every sensor that said it."""
+        """The camera of every sensor that published one."""
         with self._lock:
             models = [one for one, _ in self._newest.values() if isinstance(one, SensorModel)]
         for model in models:

@@ -91,7 +91,7 @@ class Page:
         return self._server.gui
 
     def run(self, stop: threading.Event, tick: Callable[[], None]) -> None:
-        """Updates the page until stopped; calls `tick` at least twice a second."""
+        """Updates the page until it is stopped; calls `tick` at least twice a second."""
         periods_s = {self._draw_meshes: MESH_S, self._draw_images: IMAGES_S, self._write: WORDS_S}
         while not stop.is_set():
             tick()

@@ -75,7 +75,7 @@ def under_ray(
 
 
 def picture(frame: Frame) -> Picture:
-    """A frame as red, green, blue (height, width, 3): distances in colours, all else as it looks."""
+    """A frame as red, green, blue (height, width, 3): distances in false colours, other images unchanged."""
     if frame.encoding in _BAYER:
         return np.asarray(cv2.cvtColor(np.asarray(frame.data, np.uint8), _BAYER[frame.encoding]), np.uint8)
     if frame.data.ndim == 3:

@@ -27,7 +27,7 @@ class Player:
 
     def __init__(self, gui: viser.GuiApi, playback: Playback) -> None:
         self._playback = playback
-        self._asked: SimpleQueue[Callable[[], None]] = SimpleQueue()
+        self._requests: SimpleQueue[Callable[[], None]] = SimpleQueue()
         with gui.add_folder("Recording", order=ORDER):
             longest_s = max(round(playback.duration_s, 2), 0.01)
             self._time = gui.add_slider("Time [s]", 0.0, longest_s, 0.01, 0.0)
@@ -35,7 +35,7 @@ class Player:
             step = gui.add_button_group("Step", ("Back", "Forward"), hint="To the estimate before or after this one")
             speed = gui.add_dropdown("Speed", SPEEDS, initial_value=SPEEDS[3])
         self._time.on_update(self._moved)
-        self._play.on_click(lambda _: self._asked.put(self._toggle))
+        self._play.on_click(lambda _: self._requests.put(self._toggle))
         step.on_click(lambda event: self._ask_step(event.target.value == "Forward"))
         speed.on_update(lambda event: self._ask_speed(float(event.target.value.split()[0])))
 
@@ -43,7 +43,7 @@ class Player:
         """Does what was asked for, and delivers the messages of the present time."""
         while True:
             try:
-                self._asked.get_nowait()()
+                self._requests.get_nowait()()
             except Empty:
                 break
         self._playback.advance()
@@ -57,7 +57,7 @@ class Player:
     def _moved(self, event: viser.GuiEvent[viser.GuiSliderHandle[float]]) -> None:
         if event.client is not None:  # not by `tick`
             position_s = event.target.value
-            self._asked.put(lambda: self._playback.jump(position_s))
+            self._requests.put(lambda: self._playback.jump(position_s))
 
     def _toggle(self) -> None:
         if self._playback.playing:
@@ -66,10 +66,10 @@ class Player:
             self._playback.play()
 
     def _ask_step(self, forward: bool) -> None:
-        self._asked.put(lambda: self._playback.step(forward))
+        self._requests.put(lambda: self._playback.step(forward))
 
     def _ask_speed(self, speed: float) -> None:
         def change() -> None:
             self._playback.speed = speed
 
-        self._asked.put(change)
+        self._requests.put(change)

@@ -62,7 +62,7 @@ LINE_LENGTH = 46
 
 
 def draw(preview: Preview, tracker: str, model: str, path: Path) -> None:
-    """Draws a preview; the file's suffix says the format.
+    """Draws a preview in the format of the file's suffix.
 
     Args:
         preview: to draw.
@@ -101,7 +101,7 @@ def title(preview: Preview, tracker: str, model: str) -> str:
 
 
 def note(preview: Preview) -> str:
-    """Doubts about the object, and the reason why the first frame shows none; "" if there is nothing to say."""
+    """Warnings about the object, and the reason why the first frame shows none; "" without any."""
     if preview.found is None:
         return preview.reason
     late = (f"Not found in the first frame: {preview.reason}",) if preview.reason else ()

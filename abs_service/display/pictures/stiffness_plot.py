@@ -9,7 +9,7 @@ from abs_service.tracking.bending_stiffness.hanging_strip import Profiles
 
 
 def draw(profiles: Profiles, title: str, path: Path) -> None:
-    """Draws the side view, and the inclination along the strip; the file's suffix says the format.
+    """Draws the side view, and the inclination along the strip, in the format of the file's suffix.
 
     Raises:
         ValueError: no such format.

@@ -39,7 +39,7 @@ class JournalDisplay:
     def __init__(self, send: Callable[[Mapping[str, str]], None]) -> None:
         self._send = send
         self._rig = ""
-        self._told: dict[tuple[str, str], str] = {}
+        self._reported: dict[tuple[str, str], str] = {}
         self._repeats = Repeats()
         self._now_ns = self._next_ns = 0
 
@@ -88,12 +88,12 @@ class JournalDisplay:
         return 0
 
     def _tell_change(self, field: str, component: str, value: str, reason: str, priority: str) -> None:
-        if self._told.get((field, component)) == value:
+        if self._reported.get((field, component)) == value:
             return
         message = f"{component}: {value}" + (f": {reason}" if reason else "")
         if field != "ABS_STATUS" and self._repeats.take(message, self._now_ns) is None:
             return
-        self._told[field, component] = value
+        self._reported[field, component] = value
         self._entry({"MESSAGE": message, "PRIORITY": priority, "ABS_COMPONENT": component, field: value})
 
     def _entry(self, fields: Mapping[str, str]) -> None:

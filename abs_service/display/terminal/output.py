@@ -1,4 +1,4 @@
-"""Output that nobody waits for, be it to a halted terminal (Ctrl-S), a pipe that nobody reads, or a full disk."""
+"""Output that never blocks: not by a halted terminal (Ctrl-S), a pipe without a reader, or a full disk."""
 
 import os
 import threading
@@ -91,7 +91,7 @@ class Output(Background[str]):
 
     @property
     def file(self) -> IO[str]:
-        """It, for rich, which wants a whole file but writes and flushes only."""
+        """The same as a file object for rich, which only writes and flushes."""
         return cast(IO[str], self)
 
     def write(self, text: str) -> int:

@@ -1,4 +1,4 @@
-"""The bytes of a file whose disk may have bad blocks, or that somebody cuts while it is read.
+"""The bytes of a file whose disk may have bad blocks, or that is truncated while it is read.
 
 A file that is mapped into memory would end the process then (SIGBUS), at every start.
 """

@@ -1,4 +1,4 @@
-"""A disk that does not answer, as that of a server that is gone: whoever writes to it waits, and cannot be ended."""
+"""Detects a disk that does not answer, as that of a lost server: a thread that writes to it waits forever."""
 
 from collections.abc import Callable
 
@@ -22,7 +22,7 @@ class DiskStall:
         self._alive_ns = 0
 
     def alive(self) -> None:
-        """Called by the thread that writes, again and again, once a second at least."""
+        """To be called by the thread that writes, at least once a second."""
         self._alive_ns = self._clock()
 
     def report(self) -> None:

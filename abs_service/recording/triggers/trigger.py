@@ -60,7 +60,7 @@ class Asked:
         self._post_roll_ns = int(post_roll_s * 1e9)
         self._clock = clock
         self._statuses: dict[str, int] = {}
-        self._asked = False
+        self._is_requested = False
         self._event, self._until_ns = "", 0
         self._lock = threading.Lock()
 
@@ -68,14 +68,14 @@ class Asked:
     def reason(self) -> str:
         """See `Trigger`."""
         with self._lock:
-            if self._asked:
+            if self._is_requested:
                 return "asked for"
             return self._event if self._clock() < self._until_ns else ""
 
     def ask(self, recording: bool) -> str:
         """Accepts. A command to end also ends what an event began."""
         with self._lock:
-            self._asked = recording
+            self._is_requested = recording
             if not recording:
                 self._until_ns = 0
         return ""
@@ -83,7 +83,7 @@ class Asked:
     def resume(self) -> None:
         """Resumes the recording of a killed recorder: until a command ends it, or as after an event."""
         with self._lock:
-            self._asked = not self._watches_status
+            self._is_requested = not self._watches_status
             self._event, self._until_ns = "the recorder was interrupted", self._clock() + self._post_roll_ns
 
     def watch(self, sample: Sample) -> None:

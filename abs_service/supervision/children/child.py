@@ -68,7 +68,7 @@ class Child:
     started_ns: int = 0
     backoff_ns: int = FIRST_BACKOFF_NS // 2
     start_at_ns: int = 0
-    heard_ns: int = 0
+    received_ns: int = 0
     busy: bool = False
     limit_ns: int = 0
     threads: Mapping[int, ThreadTimes] = field(default_factory=dict, repr=False)
@@ -82,7 +82,7 @@ class Child:
 
     def waited_ns(self, now_ns: int) -> int:
         """Longest time that one of its threads has waited for a processor since its last health [ns]."""
-        return longest_wait_ns(self.threads, self.process.threads(), now_ns - self.heard_ns)
+        return longest_wait_ns(self.threads, self.process.threads(), now_ns - self.received_ns)
 
     def is_overdue(self, now_ns: int, patience_ns: int) -> bool:
         """True if its health should have come.

@@ -72,7 +72,7 @@ def ensure_running() -> None:
 
 
 def detach() -> None:
-    """In the fork server: leaves the terminal, or whoever reads our output, to `run`.
+    """In the fork server: leaves the terminal and its reader to `run`.
 
     It ends when `run` has ended, and removes what `run` cannot if it was killed.
     """

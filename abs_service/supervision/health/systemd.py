@@ -33,7 +33,7 @@ class Notifier:
         self._watchdog_ns = watchdog_ns
         self._ready = False
         self._proven: Mapping[str, int] = {}
-        self._proven_ns = self._extended_ns = self._told_ns = -EXTENSION_NS
+        self._proven_ns = self._extended_ns = self._sent_ns = -EXTENSION_NS
         self._text = ""
 
     def update(self, view: RigView) -> None:
@@ -65,8 +65,8 @@ class Notifier:
 
     def _tell(self, view: RigView) -> None:
         text = _words(view)
-        if text != self._text and view.now_ns - self._told_ns >= TEXT_PERIOD_NS:
-            self._text, self._told_ns = text, view.now_ns
+        if text != self._text and view.now_ns - self._sent_ns >= TEXT_PERIOD_NS:
+            self._text, self._sent_ns = text, view.now_ns
             self._send(f"STATUS={text}")
 
 

@@ -12,7 +12,7 @@ VARIABLE = "NUMBA_CACHE_DIR"
 #: The environment variable for the folder of the user in which it keeps them where it cannot beside the code.
 USER = "XDG_CACHE_HOME"
 #: Room for the kernels of a rig, on a disk that is not full [bytes].
-LEAST_BYTES = 50_000_000
+MIN_BYTES = 50_000_000
 
 
 def ensure() -> None:
@@ -44,6 +44,4 @@ def _can_be_written(folder: str) -> bool:
     while not os.path.exists(folder):
         folder = os.path.dirname(os.path.abspath(folder))
     free = os.statvfs(folder)
-    return (
-        free.f_bavail * free.f_frsize > LEAST_BYTES and os.path.isdir(folder) and os.access(folder, os.W_OK | os.X_OK)
-    )
+    return free.f_bavail * free.f_frsize > MIN_BYTES and os.path.isdir(folder) and os.access(folder, os.W_OK | os.X_OK)

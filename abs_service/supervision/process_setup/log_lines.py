@@ -30,7 +30,7 @@ class JsonFormatter(logging.Formatter):
 
 
 def line(time_s: float, level: str, process: str, message: str, fields: Mapping[str, Any]) -> str:
-    """One record. `time_s` is seconds since 1970; values that JSON does not know are written as text."""
+    """One record. `time_s` is seconds since 1970; values without a type in JSON are written as text."""
     time = datetime.fromtimestamp(time_s, UTC).isoformat(timespec="microseconds").replace("+00:00", "Z")
     record = {"time": time, "level": level, "process": process, "message": message, "fields": fields}
     return json.dumps(record, ensure_ascii=False, default=str)

@@ -10,7 +10,7 @@ _AREA = np.ones((AREA_PX, AREA_PX))
 
 #: Share of the pixels around a gap [px] that are gaps as well, from which on returns are missing everywhere. Along the
 #: outline of a thing before a background, a row of two pixels without return has less: it separates both.
-WINDOW_PX, LEAST_SHARE = 15, 0.2
+WINDOW_PX, MIN_SHARE = 15, 0.2
 
 
 def dropouts(missing: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -34,7 +34,7 @@ def sparse_gaps(known: NDArray[np.bool_]) -> NDArray[np.bool_]:
     gaps = dropouts(~known)
     box = WINDOW_PX, WINDOW_PX
     missing, there = (cv2.boxFilter(one.view(np.uint8), cv2.CV_32F, box) for one in (gaps, gaps | known))
-    return gaps & (missing > LEAST_SHARE * there)
+    return gaps & (missing > MIN_SHARE * there)
 
 
 def fill_gaps(distance: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -28,7 +28,7 @@ SCALES = 1.02 ** np.arange(-6.0, 7.0)
 
 #: A displacement is told from this length on [px of the reduced image, root mean square over the jumps]. Structured
 #: light makes things two or three pixels wider, and calibrations that were fitted to one scene are off by as much.
-LEAST = 4.0
+MIN_DISPLACEMENT_PX = 4.0
 
 #: It has to stand out from all others that are looked for by so many standard deviations, and those of this share of so
 #: many random halves of the cells have to be so near to it [px, root mean square]. Of 2033 depth images, each beside an
@@ -36,7 +36,7 @@ LEAST = 4.0
 DEVIATIONS, SHARE, HALVES, AGREEMENT = 6.0, 0.9, 60, 3.0
 
 #: A jump is larger than this share of the distance, and than this [m]: steps and noise are not.
-JUMP, LEAST_JUMP_M = 0.03, 0.02
+JUMP, MIN_JUMP_M = 0.03, 0.02
 
 #: Jumps without others beside them, on most of a line of so many pixels, are wrong distances.
 LINE = 7
@@ -46,7 +46,7 @@ GAP = 1 / 40
 
 #: How many jumps are compared at most, cells along a row of the image, and least number of cells with jumps: those
 #: within one are no independent witnesses.
-MOST, CELLS, FEWEST = 800, 10, 8
+MAX_JUMPS, CELLS, FEWEST = 800, 10, 8
 
 #: An edge counts by its strength over that usual around it, at most this, and weaker ones than a share of all less.
 STRONGEST, WEAK = 3.0, 0.2
@@ -90,7 +90,7 @@ def alignment_warnings(detection: InitialDetection, images: Mapping[str, Image],
 
 
 def displacement(detection: InitialDetection, image: ColorImage | ChannelImage, camera: Camera) -> Displacement | None:
-    """Displacement of an image's edges from the jumps of the distances; None if there is none, or if nothing tells.
+    """Displacement of an image's edges from the jumps of the distances; None if there is none, or if it is uncertain.
 
     Args:
         detection: the object, with its surroundings.
@@ -121,7 +121,7 @@ def _jumps(distance: NDArray[np.float32]) -> NDArray[np.intp]:
         distance: radial distances (height, width) [m], NaN without return.
     """
     here, gap = np.nan_to_num(distance), max(2, round(GAP * distance.shape[1]))
-    jump, found = np.maximum(JUMP * here, LEAST_JUMP_M), []
+    jump, found = np.maximum(JUMP * here, MIN_JUMP_M), []
     for right, down in ((1, 0), (-1, 0), (0, 1), (0, -1)):
         before, last, after = (_beside(here, steps * right, steps * down) for steps in (-2, -1, 1))
         line = np.zeros((2 * gap + 1, 2 * gap + 1), np.uint8)
@@ -149,7 +149,7 @@ def _seen(
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Pixels (k, 2) of its reduced image where a camera has some of the jumps, and if rows of it cross them (k,)."""
     jumps = _jumps(detection.surroundings)
-    jumps = jumps[np.linspace(0, len(jumps) - 1, min(len(jumps), MOST)).astype(np.intp)]
+    jumps = jumps[np.linspace(0, len(jumps) - 1, min(len(jumps), MAX_JUMPS)).astype(np.intp)]
     distance = detection.surroundings[jumps[:, 1], jumps[:, 0], None]
 
     def points(steps: float) -> NDArray[np.float64]:
@@ -180,8 +180,8 @@ def _edges(image: NDArray[np.float32]) -> list[NDArray[np.float32]]:
         slope = np.asarray(cv2.Sobel(smooth, cv2.CV_32F, right, down, ksize=1)).reshape(image.shape)
         square = np.sum(np.square(slope), axis=2)
         around = np.maximum(cv2.blur(square, (_SIDE, _SIDE)), np.finfo(np.float32).tiny)  # running sums err below 0
-        usual = np.sqrt(around) + WEAK * np.sqrt(square.mean())
-        edge = np.minimum(np.sqrt(square) / usual, STRONGEST)
+        typical = np.sqrt(around) + WEAK * np.sqrt(square.mean())
+        edge = np.minimum(np.sqrt(square) / typical, STRONGEST)
         found.append(np.pad(edge - cv2.blur(edge, (_SIDE, _SIDE)), _SIDE // 2))
     return found
 
@@ -206,7 +206,7 @@ def _common(sums: NDArray[np.float32], off: NDArray[np.float64], counts: NDArray
     total = piles.sum(axis=0)
     scale, shift = _highest(total)
     moves = shift + (scale - 1) * off
-    if length(moves) < LEAST or total.max() <= DEVIATIONS * total.std():
+    if length(moves) < MIN_DISPLACEMENT_PX or total.max() <= DEVIATIONS * total.std():
         return None
     order = np.random.default_rng(0).permuted(np.tile(np.arange(len(piles)), (HALVES, 1)), axis=1)
     halves = np.tensordot((order < len(piles) / 2).astype(np.float32), piles, axes=1)

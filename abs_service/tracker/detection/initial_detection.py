@@ -14,7 +14,7 @@ class DetectionError(ValueError):
 
 
 class UndecidedError(DetectionError):
-    """More images are needed to say where the object is."""
+    """More images are needed to locate the object."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -49,7 +49,7 @@ def detect_object(
 def _noise_scale(
     noise: DepthNoise, image: DepthImage, distance: NDArray[np.float32], inside: NDArray[np.bool_]
 ) -> float:
-    """Factor on the noise model's deviation if distances scatter much more than it says about flat things; else 1.
+    """Factor on the noise model's deviation if distances of flat surfaces scatter much more than it states; else 1.
 
     The noise model weighs all measurements: with too small a deviation, many of a good mesh would seem to disagree.
 

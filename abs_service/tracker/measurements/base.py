@@ -26,7 +26,7 @@ Decoder = Callable[[Mapping[Kind, Frame]], Image]
 
 @dataclass(frozen=True)
 class Comparison:
-    """Comparison of images with the mesh, as an objective wants it.
+    """Comparison of images with the mesh, as an objective configures it.
 
     Attributes:
         bounds: costs of the outlier model.
@@ -91,7 +91,7 @@ class PictureKind(MeasurementKind, Protocol):
 
 @runtime_checkable
 class ColorKind(Protocol):
-    """Pictures that say which colours the vertices have.
+    """Images from which the vertices take their colours.
 
     Attributes:
         color_rank: pictures of a higher rank count only for vertices that none of a lower rank shows.

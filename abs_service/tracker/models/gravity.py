@@ -82,8 +82,8 @@ class Gravity:
     """
 
     def __init__(self, strip: Strip, segments: int, is_free: bool, vertices: int, down: NDArray[np.float64]):
-        least = int(np.ceil((COLUMNS_PER_SEGMENT * segments) ** 2 * strip.width / strip.length))
-        flat = strip.flat_mesh(max(vertices, least))
+        minimum = int(np.ceil((COLUMNS_PER_SEGMENT * segments) ** 2 * strip.width / strip.length))
+        flat = strip.flat_mesh(max(vertices, minimum))
         columns = int(flat.chart[:, 0].max()) + 1
         self.strip, self.segments, self._down = strip, segments, down
         self._T_rg, self._step = strip.T_rg, strip.length / segments

@@ -98,8 +98,8 @@ class Settings:
         """Numbers of control points along the long and the short side of a mesh, and the degree of the splines."""
         lengths, cells = _sides(mesh)
         if self.control_points != "auto":
-            usual = min(resolution.CUBIC, min(self.control_points) - 1)
-            return self.control_points, usual if self.degree == "auto" else self.degree
+            highest = min(resolution.CUBIC, min(self.control_points) - 1)
+            return self.control_points, highest if self.degree == "auto" else self.degree
         degree = resolution.degree(cells) if self.degree == "auto" else self.degree
         bend_rad, noise_m = np.deg2rad(self.bend_deg), mesh.pixel_deviation
         along, across = resolution.spans(lengths, cells, len(mesh.vertices), noise_m, float(bend_rad), degree)

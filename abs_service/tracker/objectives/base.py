@@ -63,7 +63,7 @@ class ObservedObjective(Protocol):
 
 
 class TermSum:
-    """The sum of all sensors' terms (eq. 16); a sensor without a frame contributes nothing."""
+    """The sum of all sensors' terms (eq. 16); a sensor without a frame contributes zero."""
 
     def __init__(self, synthesizer: Synthesizer, terms: Sequence[Term]):
         self._synthesizer = synthesizer

@@ -88,8 +88,8 @@ def inclination_profile(model: Gravity, theta: Vector, covariance: NDArray[np.fl
     jacobian = np.stack(
         [(model.inclination(theta + step) - model.inclination(theta - step)) / (2 * STEP) for step in offsets], axis=1
     )
-    least = MIN_DEVIATION**2 * np.eye(model.segments + 1)
-    return InclinationProfile(model.inclination(theta), jacobian @ covariance @ jacobian.T + least)
+    minimum = MIN_DEVIATION**2 * np.eye(model.segments + 1)
+    return InclinationProfile(model.inclination(theta), jacobian @ covariance @ jacobian.T + minimum)
 
 
 def estimate_stiffness(

@@ -9,7 +9,7 @@ from abs_service.tracker.mesh import Mesh
 from calib.pose import nearest_rotation
 
 #: Share of the vertices that may have been in sight beside the object: the region leaves out pixels at its rim.
-_MOST_BESIDE = 0.1
+_MAX_BESIDE = 0.1
 
 #: Distances that differ by less are of one surface [m], and so are shapes, by this share of their size.
 _SAME_M, _SAME_SHAPE = 0.02, 0.02
@@ -48,4 +48,4 @@ class FirstView:
         shown = np.isfinite(at_points(self._detection.distance, camera, at_first))
         with np.errstate(invalid="ignore"):
             explained = (nearest < distance - _SAME_M) | shown & (nearest < distance + _SAME_M)
-        return bool(np.mean(~explained) < _MOST_BESIDE)
+        return bool(np.mean(~explained) < _MAX_BESIDE)

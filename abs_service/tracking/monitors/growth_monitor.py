@@ -8,7 +8,7 @@ from abs_service.tracker.terms.base import SensorFit
 MIN_SHARE, MIN_VERTICES = 0.5, 4
 
 #: The new mesh replaces the old one if its area is larger by this factor.
-LEAST_GROWTH = 1.1
+MIN_GROWTH = 1.1
 
 
 class GrowthMonitor:

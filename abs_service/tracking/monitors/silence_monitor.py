@@ -1,4 +1,4 @@
-"""Notices that a tracker publishes nothing any more, whatever the cause."""
+"""Detects that a tracker no longer publishes, whatever the cause."""
 
 from collections import deque
 from collections.abc import Callable

@@ -38,7 +38,7 @@ class Progress:
 
 
 def ignore(progress: Progress) -> None:
-    """For those who do not want to know."""
+    """Null object: progress is not reported."""
 
 
 @contextmanager

@@ -9,7 +9,7 @@ from contextlib import suppress
 
 
 def main() -> None:
-    """Compiles; answers each request with an error, or with nothing."""
+    """Compiles kernels; answers each request with an error as text, "" if there was none."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent, whose end closes the input
     answers = os.dup(sys.stdout.fileno())
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())

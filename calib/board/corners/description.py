@@ -13,7 +13,7 @@ from calib.board.corners.to_8bit import Grey
 from calib.board.target import DICTIONARIES, Charuco, Target
 
 #: Minimum number of markers that say which dictionary a board has, and how they stand.
-LEAST, LEAST_PLACED = 4, 6
+MIN_MARKERS, MIN_PLACED = 4, 6
 
 #: Images are searched at this size at most [px]; markers need not be exact.
 _LARGEST = 1600
@@ -76,11 +76,11 @@ def mismatch(target: Target, levels: Grey) -> str:
     own = (_family(target.dictionary), 1) if isinstance(target, Charuco) else (_APRIL_GRID, BORDER)
     every = [(name, 1) for name in dict.fromkeys(map(_family, DICTIONARIES)) if not _SLOW.search(name)]
     seen = _markers(image, *own)
-    if len(seen.ids) < LEAST:
-        if len(_markers(255 - image, *own).ids) >= LEAST:
+    if len(seen.ids) < MIN_MARKERS:
+        if len(_markers(255 - image, *own).ids) >= MIN_MARKERS:
             return "shows markers in white on black instead of black on white"
         seen = max((_markers(image, *each) for each in (*every, (_APRIL_GRID, BORDER))), key=lambda each: len(each.ids))
-    if len(seen.ids) < LEAST:
+    if len(seen.ids) < MIN_MARKERS:
         return ""
     if isinstance(target, AprilGrid) != (seen.border == BORDER) or not isinstance(target, Charuco | AprilGrid):
         kind = "an AprilGrid" if seen.border == BORDER else f"a ChArUco with markers of the dictionary {seen.name}"
@@ -157,7 +157,7 @@ def _misplaced(target: Charuco | AprilGrid, seen: _Markers) -> str:
 def _layout(target: Charuco | AprilGrid, seen: _Markers) -> tuple[int, bool]:
     """Number of columns, and whether the upper left square is black; 0 columns if the markers do not tell."""
     own = target.columns, _is_first_black(target)
-    if len(seen.ids) < LEAST_PLACED:
+    if len(seen.ids) < MIN_PLACED:
         return 0, True
     colors = (True, False) if isinstance(target, Charuco) else (True,)
     tried = {

@@ -16,7 +16,7 @@ FLAT_PERCENT, SMOOTH_PERCENT = 25, 10
 
 #: The larger patches count up to so many times the small ones; more is relief. Ratio in real images: stereo 2.5,
 #: structured light 1.1 to 1.7, time of flight 1.2.
-MOST_SHARED = 3.0
+MAX_SHARED = 3.0
 
 #: Fewer patches say nothing.
 MIN_PATCHES = 40
@@ -35,7 +35,7 @@ def scatter(distance: NDArray[np.floating]) -> float:
     plane, bent = (np.ones_like(row), row, column), (row**2, row * column, column**2)
     alone = _scatter(distance, SMALL_PX, [part[:SMALL_PX, :SMALL_PX] for part in plane], SMALL_PX, FLAT_PERCENT)
     shared = _scatter(distance, LARGE_PX, [*plane, *bent], LARGE_PX // 2, SMOOTH_PERCENT)
-    return alone if np.isnan(shared) else max(alone, min(shared, MOST_SHARED * alone))
+    return alone if np.isnan(shared) else max(alone, min(shared, MAX_SHARED * alone))
 
 
 def _scatter(

@@ -14,7 +14,7 @@ from calib.solve.validation.free_shape import FreeShape, Members, along, disagre
 from calib.solve.validation.steadiness import HARMLESS, from_middle_px, of_focal, optics
 
 #: Minimum number of distinct poses, as any few fall into two groups, and of those in the smaller group.
-POSES, LEAST = 12, 3
+POSES, MIN_MEMBERS = 12, 3
 
 #: Minimum gain of a pose in squared deviations, as the poses disagree within their groups. Real sets of one camera have
 #: 3.5 at most, 2.0 for focal lengths; where those of a third of the images differ by 3 %, that is 7 to 70.
@@ -137,7 +137,7 @@ def _grown(members: Members, own: Array, whole: Array, pulls: Array) -> tuple[fl
     for _ in range(STEPS):
         together = whole[members].sum(axis=0)
         curvature = own[members].sum(axis=0) - together.T @ together
-        if not LEAST <= members.sum() <= len(members) - LEAST or np.linalg.cond(curvature) > CONDITION:
+        if not MIN_MEMBERS <= members.sum() <= len(members) - MIN_MEMBERS or np.linalg.cond(curvature) > CONDITION:
             return 0.0, members, np.zeros_like(change)
         pull = pulls[members].sum(axis=0)
         change = np.linalg.solve(curvature, pull)

@@ -20,7 +20,7 @@ from calib.solve.solution import Solution
 from calib.solve.validation.free_shape import FreeShape, along, disagreement, once, without
 
 #: Minimum number of distinct poses before and after a change.
-LEAST = 4
+MIN_POSES = 4
 
 #: Random orders of the poses, the share of them that may disagree as much, and the factor by which the change disagrees
 #: more than any order of the poses without it.
@@ -94,7 +94,7 @@ def focal_scatter(free: FreeShape, needed_px: float) -> dict[str, float]:
     found = {}
     for name, directions in optics(free):
         information, scores = once(free.poses)
-        if len(scores) < 2 * LEAST:
+        if len(scores) < 2 * MIN_POSES:
             continue
         ratio, deviation = of_focal(information, free.poses.prior, scores, directions[:, 0])
         harm = deviation * from_middle_px(free.solution, name)
@@ -133,7 +133,7 @@ def _split(free: FreeShape, directions: Array) -> tuple[int, Array] | None:
     """First shot after a change along directions (k, m), and its size (m,); None if there is none."""
     adjustment = free.solution.adjustment
     numbers, first = np.unique(adjustment.equations.poses, return_index=True)
-    if len(numbers) < 2 * LEAST:
+    if len(numbers) < 2 * MIN_POSES:
         return None
     order = np.argsort(first)
     information, scores = (part[order] for part in once(free.poses))
@@ -173,7 +173,7 @@ class _Split:
 
 def _best(own: Array, whole: Array, pulls: Array) -> _Split:
     """Of poses in their order: information (poses, m, m), its root from all (poses, k, m), and pulls (poses, m)."""
-    before, together, pull = (np.cumsum(part, axis=0)[LEAST - 1 : -LEAST] for part in (own, whole, pulls))
+    before, together, pull = (np.cumsum(part, axis=0)[MIN_POSES - 1 : -MIN_POSES] for part in (own, whole, pulls))
     curvature = before - together.transpose(0, 2, 1) @ together
     curvature += _UNSEEN * np.diag(own.sum(axis=0).diagonal() + _UNSEEN)
     # Of all poses the pulls cancel, so that those after the split are the opposite of those before.
@@ -181,7 +181,7 @@ def _best(own: Array, whole: Array, pulls: Array) -> _Split:
     squares = np.sum(sizes * pull, axis=1)
     best = int(np.argmax(squares))
     variances = np.linalg.inv(curvature[best]).diagonal()
-    return _Split(float(squares[best]), best + LEAST, sizes[best], np.sqrt(np.maximum(variances, 0)))
+    return _Split(float(squares[best]), best + MIN_POSES, sizes[best], np.sqrt(np.maximum(variances, 0)))
 
 
 def _from_middle(solution: Solution, name: str) -> Array:

@@ -73,7 +73,7 @@ class Link:
         return not self._end.alive
 
     def wake_at_end(self, wake: Wake) -> None:
-        """Signals `wake` when the link is closed, so that nobody waits for it any more."""
+        """Signals `wake` when the link is closed, so that no thread waits for it any more."""
         with self._lock:
             self._waiting.add(wake)
 
@@ -95,7 +95,7 @@ class Link:
         self._start(_receive_answers, lambda: self._session.get(key, timeout=QUERY_S), on_message)
 
     def query(self, topic: str, payload: bytes | None = None, message: str = "") -> list[Received]:
-        """The answers to a query; none if nobody answers within `QUERY_S`.
+        """The answers to a query; none after `QUERY_S` without one.
 
         Args:
             topic: what is asked for.

@@ -8,7 +8,7 @@ from pathlib import Path
 FOLDER = Path("/dev/shm")
 PROCESS = Path("/proc/self")
 #: Free shared memory without which messages come through sockets [bytes].
-LEAST_BYTES = 1 << 20
+MIN_BYTES = 1 << 20
 #: Eight pools of a large rig [bytes].
 LOCKED_BYTES = 8 * (36 << 20)
 #: Bit of the capability that lifts the limit of locked memory (capabilities(7)).
@@ -24,7 +24,7 @@ def is_usable() -> bool:
     except OSError:
         return False
     free = 0 if status.f_flag & os.ST_RDONLY else status.f_bavail * status.f_frsize
-    return free > LEAST_BYTES and may_be_locked()
+    return free > MIN_BYTES and may_be_locked()
 
 
 def may_be_locked() -> bool:

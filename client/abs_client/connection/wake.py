@@ -1,4 +1,4 @@
-"""A signal from receiving threads to whoever waits for it: a thread, or a task of asyncio."""
+"""A signal from receiving threads to a waiting thread, or task of asyncio."""
 
 import asyncio
 import threading

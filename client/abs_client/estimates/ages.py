@@ -29,11 +29,11 @@ class Ages:
         self._ask = ask
         self._lock = threading.Lock()
         self._host_clock = ""
-        self._asked_ns = 0
+        self._requested_ns = 0
         self._readings: deque[tuple[int, int, int]] = deque(maxlen=READINGS)  # when asked, round trip, offset
 
     def age_s(self, state: DeformationState, arrived_ns: int) -> float:
-        """Time since the exposure [s]; the least that it can be if the clock is not known yet.
+        """Time since the exposure [s]; its lower bound if the clock is not known yet.
 
         Args:
             state: the estimate.
@@ -51,14 +51,14 @@ class Ages:
         now_ns = self._clock()
         with self._lock:
             if reading.host_clock == self._host_clock:
-                middle_ns = (self._asked_ns + now_ns) // 2
-                self._readings.append((self._asked_ns, now_ns - self._asked_ns, middle_ns - reading.t_host_ns))
+                middle_ns = (self._requested_ns + now_ns) // 2
+                self._readings.append((self._requested_ns, now_ns - self._requested_ns, middle_ns - reading.t_host_ns))
 
     def _offset_ns(self, now_ns: int) -> int | None:
         with self._lock:
             errors = [
-                (round_trip_ns / 2 + DRIFT * (now_ns - asked_ns), offset_ns)
-                for asked_ns, round_trip_ns, offset_ns in self._readings
+                (round_trip_ns / 2 + DRIFT * (now_ns - requested_ns), offset_ns)
+                for requested_ns, round_trip_ns, offset_ns in self._readings
             ]
         return min(errors)[1] if errors else None
 
@@ -68,7 +68,7 @@ class Ages:
             if is_new:
                 self._host_clock = host_clock
                 self._readings.clear()
-            if not host_clock or not (is_new or now_ns - self._asked_ns > PERIOD_NS):
+            if not host_clock or not (is_new or now_ns - self._requested_ns > PERIOD_NS):
                 return
-            self._asked_ns = now_ns
+            self._requested_ns = now_ns
         self._ask(host_clock)

@@ -135,7 +135,7 @@ class State:
 
     @property
     def sensor_shares(self) -> Mapping[str, Mapping[str, float]]:
-        """The shares of each sensor, likewise; empty if the service tells none."""
+        """The shares of each sensor, likewise; empty if the service sends none."""
         return MappingProxyType({one.sensor: _shares(one) for one in self.message.sensors})
 
     @property

@@ -76,7 +76,7 @@ class StateSource:
         self._skipped = 0
         # What receives holds neither the source nor the link, so that both end with their stream.
         self._subscriptions = _subscribe(link, tracker, self._assembly, wake)
-        self._asked_ns = clock()
+        self._requested_ns = clock()
         self._living: set[str] = set()
         link.ask_living(_keys_into(self._living))
         link.ask(f"{tracker}/topology", _topology_into(self._assembly, wake))  # there is one already, most often
@@ -108,7 +108,7 @@ class StateSource:
         return max((self._stale_ns - self._clock()) * 1e-9, 0.0)
 
     def close(self) -> None:
-        """Receives nothing any more."""
+        """Stops receiving."""
         for end in self._subscriptions:
             end()
 
@@ -138,8 +138,8 @@ class StateSource:
         return f"{reason}; there are {', '.join(f'{parts[-1]} of rig {parts[1]}' for parts in names)}"
 
     def _ask_for_topology(self) -> None:
-        if self._assembly.lacks_topology and self._clock() - self._asked_ns > PAUSE_NS:
-            self._asked_ns = self._clock()
+        if self._assembly.lacks_topology and self._clock() - self._requested_ns > PAUSE_NS:
+            self._requested_ns = self._clock()
             self._link.ask(f"{self._tracker}/topology", _topology_into(self._assembly, self._wake))
 
     def _ask_clock(self, host_clock: str) -> None:

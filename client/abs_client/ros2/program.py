@@ -17,7 +17,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return programs.complain(
             f"{error.name} is not installed: pip install './client[ros2]' in a clone of abs-service"
         )
-    end = programs.told_to_end()
+    end = programs.end_signal()
     name = given.node or f"abs_{layout.ros_name(given.rig)}"
     try:
         with node.RosNode(given.router, name, given.domain) as ros_node, programs.link(given) as link:

@@ -67,7 +67,7 @@ class Republisher:
         return self._node.published
 
     def run(self, end: threading.Event) -> None:
-        """Looks for trackers, and tells its own counters, once a second until `end`; then closes the link."""
+        """Searches for trackers, and publishes its own counters, once a second until `end`; then closes the link."""
         while not end.wait(LOOK_S):
             for tracker in self._link.trackers() - self._trackers.keys():
                 stream = states.states(self._link, tracker, self._largest_age_s)

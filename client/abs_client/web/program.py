@@ -12,7 +12,7 @@ from abs_client.web.server import EstimateServer
 def main(arguments: Sequence[str] | None = None) -> int:
     """Serves until Ctrl-C or SIGTERM; returns the exit status."""
     given = _parser().parse_args(arguments)
-    end = programs.told_to_end()
+    end = programs.end_signal()
     try:
         with (
             programs.link(given) as link,

@@ -166,10 +166,10 @@ REGISTRATION = likelihood.Settings(texture_registration_px=0.2)
 PRIORS: Mapping[str, priors.Settings] = {
     "all": priors.Settings(),
     "no stretch prior": priors.Settings(stretch=FREE),
-    "no motion prior": priors.Settings(speed=FREE, least_speed=FREE),
-    "fixed motion prior": priors.Settings(least_speed=priors.Settings().speed),
+    "no motion prior": priors.Settings(speed=FREE, minimum_speed=FREE),
+    "fixed motion prior": priors.Settings(minimum_speed=priors.Settings().speed),
     "no prediction": priors.Settings(memory_s=1e-6),
-    "neither stretch nor motion": priors.Settings(stretch=FREE, speed=FREE, least_speed=FREE),
+    "neither stretch nor motion": priors.Settings(stretch=FREE, speed=FREE, minimum_speed=FREE),
 }
 
 

@@ -190,7 +190,7 @@ def _tracking(job: Job, variant: Variant, mean: float) -> TrackingSession:
         optimizer=variant.optimizer,
         evaluations=EVALUATIONS,
         vertices=variant.vertices,
-        priors=priors.Settings(variant.priors.stretch, variant.priors.speed, least_speed=variant.priors.speed),
+        priors=priors.Settings(variant.priors.stretch, variant.priors.speed, minimum_speed=variant.priors.speed),
         status=status.Settings(),
         reinitialization=loss_monitor.Settings(),
         seed=job.seed,

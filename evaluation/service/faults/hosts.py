@@ -102,7 +102,7 @@ class Hosts:
 
 
 def await_port(endpoint: str) -> None:
-    """Waits until somebody listens."""
+    """Waits until a program listens."""
     host, _, port = endpoint.rpartition("/")[2].rpartition(":")
     deadline_s = time.monotonic() + START_S
     while True:

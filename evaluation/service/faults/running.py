@@ -44,7 +44,7 @@ class Processes(Protocol):
 
 
 class RunningRig:
-    """A rig and somebody who listens to it; a context manager that ends both.
+    """A rig and a listener of it; a context manager that ends both.
 
     Args:
         folder: an empty folder, with `takes` in it where that is a file system of its own.

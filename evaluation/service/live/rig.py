@@ -48,7 +48,7 @@ def endpoint_of(rig: Path) -> str:
 
 
 def free_port() -> int:
-    """A TCP port that nobody uses."""
+    """A TCP port that is not in use."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])

@@ -31,5 +31,5 @@ def test_a_try_that_gets_no_answer_does_not_keep_from_the_next(client, endpoint)
         with socket.create_server(("127.0.0.1", int(endpoint.rpartition(":")[2]))) as silent:
             silent.settimeout(PATIENCE_S)
             first, _ = silent.accept()
-            with first, silent.accept()[0]:
-                pass
+            with first, silent.accept()[0] as second:
+                assert second.getpeername() != first.getpeername()

@@ -7,6 +7,7 @@ import pytest
 
 from abs_service import config
 from abs_service.config import references
+from abs_service.tracker.measurements import measurement
 from tests.abs_service.config.sensors_file import SENSORS, loads
 
 
@@ -217,4 +218,6 @@ def test_a_device_without_end_is_no_rig_file():
 
 @pytest.mark.parametrize("offered", re.findall(r"\{.*?\}", references.NOISE_EXAMPLES))
 def test_a_noise_model_that_a_message_offers_is_one(offered):
-    loads(SENSORS.replace('head = "rgb"', f"noise = {offered}"))
+    noise = loads(SENSORS.replace('head = "rgb"', f"noise = {offered}")).sensors["color"].noise
+    assert noise is not None
+    assert measurement(noise)

@@ -17,7 +17,7 @@ class FakeProcess:
     def __init__(self, world, component, pid):
         self.world, self.component, self.pid = world, component, pid
         self.code = None
-        self.told = False
+        self.is_asked_to_end = False
         self.its_threads = {}
 
     def threads(self):
@@ -28,11 +28,11 @@ class FakeProcess:
 
     def terminate(self):
         self.world.events.append(("terminate", self.component))
-        if self.told and self.code is None:
+        if self.is_asked_to_end and self.code is None:
             self.code = 128 + signal.SIGTERM
         elif self.component not in self.world.stubborn:
             self.code = 0
-        self.told = True
+        self.is_asked_to_end = True
 
     def kill(self):
         if self.code is None:
@@ -47,7 +47,7 @@ class FakeProcess:
 
 
 class World:
-    """Time, and every process that was ever started."""
+    """Time, and every process that was ever started; none is while the host has a lack."""
 
     def __init__(self):
         self.now_ns = 0
@@ -55,8 +55,11 @@ class World:
         self.started = []
         self.stubborn = set()
         self.words = ""
+        self.lack: OSError | None = None
 
     def spawn(self, component, arguments):
+        if self.lack is not None:
+            raise self.lack
         self.started.append(FakeProcess(self, component, len(self.started) + 1))
         return self.started[-1]
 

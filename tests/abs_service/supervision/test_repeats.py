@@ -3,7 +3,7 @@
 import logging
 
 from abs_service.supervision.exit_codes import Exit
-from abs_service.supervision.repeats import MOST, Repeats, Tracebacks
+from abs_service.supervision.repeats import MAX_TEXTS, Repeats, Tracebacks
 from tests.abs_service.supervision.fake_processes import S, World, ends, passes
 
 HOURS_S = 2 * 3600
@@ -37,7 +37,7 @@ def test_the_first_are_told_and_what_has_not_come_for_long_is_new():
     assert [repeats.take("x ended: 5", t * S) for t in (63, 65, 70, 180, 190)] == [None, 3, None, None, 2]
     assert repeats.take("x ended: 5", (190 + 2 * 240 + 1) * S) == 0
     assert repeats.take("y ended: 5", 0) == 0
-    for number in range(2 * MOST):
+    for number in range(2 * MAX_TEXTS):
         repeats.take("y" * number, 0)
 
 

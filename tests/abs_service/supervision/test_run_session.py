@@ -97,16 +97,15 @@ def test_a_rig_has_one_process_per_tracker_and_stops_its_recorder_last(tmp_path)
 
 
 class Bench:
-    """A session around processes that do nothing, one of which may end."""
+    """A session around processes that do nothing, one of which may end; none is started while the host has a lack."""
 
     def __init__(self, display, trackers=()):
         self.bus = LoopbackBus()
         self.killed = []
+        self.lack: OSError | None = None
         limits = Limits(startup_ns=10**12, stall_ns=0, restarts=0)
         children = [Child("capture", (), 0), Child("record", (), 1)]
-        self.supervisor = Supervisor(
-            children, lambda component, _: Idle(component, self.killed), time.monotonic_ns, limits
-        )
+        self.supervisor = Supervisor(children, self._spawn, time.monotonic_ns, limits)
         self.session = RunSession(
             CheckedBus(self.bus, time.monotonic_ns),
             "bench",
@@ -117,6 +116,11 @@ class Bench:
             display,
             WallClock(),
         )
+
+    def _spawn(self, component, _):
+        if self.lack is not None:
+            raise self.lack
+        return Idle(component, self.killed)
 
 
 class Gone(io.StringIO):

@@ -1,4 +1,4 @@
-import os
+import errno
 
 import pytest
 
@@ -218,15 +218,15 @@ def test_a_child_that_waits_for_ever_is_killed_in_the_end(world):
     assert ("kill", "track/a") in world.events
 
 
-def test_a_child_for_which_the_host_lacks_something_is_started_when_it_can_be(world, monkeypatch):
+def test_a_child_for_which_the_host_lacks_something_is_started_when_it_can_be(world):
     supervisor = world.supervisor("capture")
-    with monkeypatch.context() as full:
-        full.setattr(supervisor, "_spawn", lambda *_: os.stat("/nowhere/at/all"))
-        for _ in range(20):
-            ends(world, supervisor, "capture", 1)
-        capture = supervisor.children["capture"]
-        assert (capture.state, capture.restarts) == (State.BACKOFF, 1)
-        assert "cannot be started: [Errno 2]" in capture.reason
+    world.lack = OSError(errno.EAGAIN, "Resource temporarily unavailable")
+    for _ in range(20):
+        ends(world, supervisor, "capture", 1)
+    capture = supervisor.children["capture"]
+    assert (capture.state, capture.restarts) == (State.BACKOFF, 1)
+    assert "cannot be started: [Errno 11]" in capture.reason
+    world.lack = None
     passes(world, supervisor, 4)
     assert capture.state is State.RUNNING
 

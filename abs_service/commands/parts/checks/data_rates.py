@@ -24,25 +24,25 @@ def describe(streams: Mapping[str, Iterable[StreamInfo]], table: RecordTable) ->
         streams: by sensor; none of a sensor whose device is not open.
         table: settings of the recorder.
     """
-    sensors, least, most = {}, 0.0, 0.0
+    sensors, lowest, highest = {}, 0.0, 0.0
     for sensor, infos in streams.items():
         for info in infos:
             rate = _bytes_per_s(info)
             shares = LEFT[codec_of(info.encoding, ImageCodec(table.depth_codec), ImageCodec(table.color_codec))]
             sensors[sensor] = sensors.get(sensor, 0.0) + rate
-            least, most = least + shares[0] * rate, most + shares[1] * rate
+            lowest, highest = lowest + shares[0] * rate, highest + shares[1] * rate
     return {
         "sent_mb_s": _megabytes(sum(sensors.values())),
         "sensors_mb_s": {sensor: _megabytes(rate) for sensor, rate in sensors.items()},
-        "recorded_mb_s": [_megabytes(least), _megabytes(most)] if table.enabled else [0.0, 0.0],
+        "recorded_mb_s": [_megabytes(lowest), _megabytes(highest)] if table.enabled else [0.0, 0.0],
         "unknown": [sensor for sensor in streams if sensor not in sensors],
     }
 
 
 def text(rates: Mapping[str, Any]) -> str:
     """The same for people."""
-    least, most = rates["recorded_mb_s"]
-    written = f"{most:g}" if least == most else f"{least:g} to {most:g}, by how noisy they are"
+    lowest, highest = rates["recorded_mb_s"]
+    written = f"{highest:g}" if lowest == highest else f"{lowest:g} to {highest:g}, by how noisy they are"
     without = f"; without {', '.join(rates['unknown'])}, known once open" if rates["unknown"] else ""
     shares = ", ".join(f"{sensor} {rate:g}" for sensor, rate in rates["sensors_mb_s"].items())
     each = f" ({shares})" if len(rates["sensors_mb_s"]) > 1 else ""

@@ -47,7 +47,7 @@ class DeviceControls:
             for device, answer in answers.items():
                 if answer is not None and answer.accepted:
                     self._show(device, answer.controls)
-            self._answer.content = "\n\n".join(filter(None, map(_told, answers, answers.values())))
+            self._answer.content = "\n\n".join(filter(None, map(_answer_text, answers, answers.values())))
 
     def set(self, device: str) -> None:
         """Sets what the user has changed, and shows how the controls are then."""
@@ -67,7 +67,7 @@ class DeviceControls:
             answer = self._send(device, changed)
             if answer is not None and answer.accepted:
                 self._show(device, answer.controls)
-            self._answer.content = _told(device, answer) or _kept(device, changed)
+            self._answer.content = _answer_text(device, answer) or _kept(device, changed)
 
     def _show(self, device: str, controls: Iterable[Control]) -> None:
         now = {one.name: one for one in controls}
@@ -120,8 +120,8 @@ def _parsed(control: Control, given: bool | str) -> Value:
         raise ValueError(f"{control.name} = {json.dumps(given)}: must be {noun}") from None
 
 
-def _told(device: str, answer: CommandAnswer | None) -> str:
-    """Words about an answer with which there is nothing to do."""
+def _answer_text(device: str, answer: CommandAnswer | None) -> str:
+    """Text of an answer that needs no action."""
     if answer is None:
         return f"{device} gives no answer. Is it captured?"
     if not answer.accepted:

@@ -40,7 +40,7 @@ class Eye:
         return points_e[:, :2] / ahead / (2 * np.tan(self.fov / 2)) + (self.aspect / 2, 0.5)
 
     def sees_like(self, other: "Eye") -> bool:
-        """True if nothing has moved between the two."""
+        """True if neither pose nor size differs between the two."""
         return np.allclose(self.T_re, other.T_re, atol=1e-4) and self.aspect == other.aspect
 
 

@@ -22,9 +22,9 @@ ALWAYS = (
 
 
 def unavailable(feed: Feed) -> str:
-    """The reason for which recording cannot be started or stopped; "" if it can, or nothing is known against it."""
-    heard = feed.newest(keys.health("record"), Health)
-    if heard is None or heard[1] > 3 * STALE_S:
+    """Reason why recording cannot be started or stopped; "" if it can, or if the configuration is unknown."""
+    received = feed.newest(keys.health("record"), Health)
+    if received is None or received[1] > 3 * STALE_S:
         return "No recorder runs: there is no recording to start or stop."
     config = feed.newest(keys.CONFIG, Config)
     return ALWAYS if config and _when(config[0].toml) == "always" else ""

@@ -18,7 +18,7 @@ Send = Callable[[str, Choice], CommandAnswer | None]
 
 
 @dataclass(frozen=True, slots=True)
-class _Asked:
+class _Request:
     """A request: tracker, when [s], version of its mesh before, and the lines that make its choice last."""
 
     tracker: str
@@ -38,7 +38,7 @@ class Reinitialization:
 
     def __init__(self, feed: Feed, send: Send, say: Callable[[str], None]) -> None:
         self._feed, self._send, self._say = feed, send, say
-        self._asked: _Asked | None = None
+        self._request: _Request | None = None
 
     def ask(self, tracker: str, choice: Choice = AS_CONFIGURED) -> None:
         """Asks a tracker to detect its object anew, the one that was chosen."""
@@ -46,26 +46,25 @@ class Reinitialization:
         self._say(f"Asks the tracker to detect its object again{choice} …")
         answer = self._send(tracker, choice)
         if answer is None or not answer.accepted:
-            self._asked = None
+            self._request = None
             self._say(f"The tracker refuses: {answer.reason if answer else 'it gives no answer'}.")
         else:
-            self._asked = _Asked(tracker, self._feed.now_s, version, answer.region)
+            self._request = _Request(tracker, self._feed.now_s, version, answer.region)
 
     def look(self) -> None:
         """Returns the result of the last request in words, once it is known."""
-        asked = self._asked
-        if asked is None:
+        request = self._request
+        if request is None:
             return
-        if (now := self._version(asked.tracker)) != asked.version:
-            keep = (
-                f"\n\nTo keep this choice, write into the rig file, in place of its region:\n```toml\n{asked.region}```"
-            )
-            self._say(f"New mesh, version {now}.{keep if asked.region else ''}")
-        elif self._feed.now_s - asked.t_s > ANSWER_S:
+        if (now := self._version(request.tracker)) != request.version:
+            advice = "To keep this choice, write into the rig file, in place of its region"
+            keep = f"\n\n{advice}:\n```toml\n{request.region}```" if request.region else ""
+            self._say(f"New mesh, version {now}.{keep}")
+        elif self._feed.now_s - request.t_s > ANSWER_S:
             self._say("No object was found; the tracker goes on as it was.")
         else:
             return
-        self._asked = None
+        self._request = None
 
     def _version(self, tracker: str) -> int:
         found = self._feed.newest(keys.state(tracker), DeformationState)

@@ -13,7 +13,7 @@ _WORST = (*(words.STATUS[name][1] for name in ("LOST", "DEGRADED")), words.STALE
 
 @dataclass(frozen=True, slots=True)
 class Neighbour:
-    """Another rig: its name, the address of its page, its messages, and what to do while nothing is heard of it."""
+    """Another rig: its name, the address of its page, its messages, and advice while it publishes none."""
 
     name: str
     url: str

@@ -16,7 +16,7 @@ _STATUSES = tuple(f"{name}: " for name in STATUS)
 
 
 def lines(feed: Feed, tracker: str, silence: str) -> list[Words]:
-    """All that there is to say, the most important first.
+    """Messages for the user, the most important first.
 
     Args:
         feed: of the rig.
@@ -30,8 +30,8 @@ def lines(feed: Feed, tracker: str, silence: str) -> list[Words]:
     trackers = [*(() if preparing and not known else [tracker]), *(other for other in known if other != tracker)]
     found = {name: _tracker(feed, name) for name in trackers}
     found |= {name: words.preparing(kernels) for name, kernels in preparing.items() if name not in found}
-    told = [replace(one, title=f"{name}: {one.title}") if len(found) > 1 else one for name, one in found.items()]
-    return [*told, *_warnings(feed)]
+    titled = [replace(one, title=f"{name}: {one.title}") if len(found) > 1 else one for name, one in found.items()]
+    return [*titled, *_warnings(feed)]
 
 
 def _preparing(feed: Feed) -> dict[str, str]:
@@ -62,7 +62,7 @@ def _slow(feed: Feed, tracker: str) -> str:
 
 
 def _warnings(feed: Feed) -> Iterator[Words]:
-    """Components that report a warning or an error, but for what estimates say already, or contradict."""
+    """Components that report a warning or an error, without those that the estimates contain already, or contradict."""
     for health, age_s in feed.healths():
         message = _unsaid(feed, health)
         if age_s < 3 * STALE_S and health.level >= Health.LEVEL_WARNING and (message or not health.message):
@@ -77,8 +77,8 @@ def _unsaid(feed: Feed, health: Health) -> str:
     """
     newest = feed.newest(keys.state(_tracked(health.component)), DeformationState)
     if newest is not None:
-        told = health.message.startswith(_STATUSES) or health.message == "; ".join(newest[0].warnings)
-        return "" if told else health.message
+        titled = health.message.startswith(_STATUSES) or health.message == "; ".join(newest[0].warnings)
+        return "" if titled else health.message
     if health.component != "run":
         return health.message
     estimating = tuple(f"track/{name}" for name in feed.trackers() if _is_fresh(feed, name))

@@ -83,7 +83,7 @@ def slow(rate_hz: float, camera_hz: float, skipped: int) -> str:
 
 
 def silence(age_s: float, remedy: str) -> Words | None:
-    """The rig as a whole: None as long as it says something, else how long it has not, and what to do."""
+    """Silence of the whole rig: its duration and advice; None while the rig publishes."""
     if age_s <= 3 * STALE_S:
         return None
     since = "yet" if age_s == float("inf") else f"for {age(age_s)}"

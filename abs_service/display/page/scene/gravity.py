@@ -1,4 +1,4 @@
-"""Direction of gravity, where a rig's configuration says it: in the models of its trackers."""
+"""Direction of gravity, from the configuration of a tracker's model."""
 
 import math
 import tomllib

@@ -1,1 +1,1 @@
-"""Pixels of one thing in a depth image: connected surfaces, grown from seeds."""
+"""Segments of a depth image: connected surfaces, grown from seeds."""

@@ -57,7 +57,7 @@ class AppearanceMisfit:
     def __init__(self, mesh: Mesh):
         self._mean = mean_around(mesh)
         self._around = self._mean @ self._mean  # within two edges
-        self._least_precision = len(mesh.vertices) / (mesh.area * REACH**2)
+        self._minimum_precision = len(mesh.vertices) / (mesh.area * REACH**2)
 
     def variance(self, optimum: Optimum) -> NDArray[np.float64]:
         """Variance (n,) [m²] of the vertices of an estimate; samples between the vertices show none."""
@@ -68,7 +68,7 @@ class AppearanceMisfit:
                 chain_rule.sum_squares(part.rows, part.points, np.ones(len(part.points)), squares)
                 chain_rule.sum_at_points(part.rows, part.points, part.residual[:, None], gradient)
         excess, around = np.empty(n), (self._around.indptr, self._around.indices)
-        beyond_noise(*around, squares, gradient, optimum.surface.normals[0], self._least_precision, excess)
+        beyond_noise(*around, squares, gradient, optimum.surface.normals[0], self._minimum_precision, excess)
         np.maximum(excess, 0.0, out=excess)
         return np.maximum(self._mean @ excess, excess.mean())
 
@@ -80,7 +80,7 @@ def beyond_noise(
     squares: NDArray[np.float64],
     gradient: NDArray[np.float64],
     normals: NDArray[np.float32],
-    least_precision: float,
+    minimum_precision: float,
     excess: NDArray[np.float64],
 ) -> None:
     """|d|² beyond `INLIER_DEVIATIONS` of noise (n,) [m²], into `excess`; negative where there is none.
@@ -89,7 +89,7 @@ def beyond_noise(
         start, around: first place (n + 1,) of every vertex in the list of those around it, itself included (k,).
         squares, gradient: JᵀJ (n, 3, 3) [1/m²] and Jᵀr (n, 3, 1) [1/m] of every vertex.
         normals: of the surface (3, n).
-        least_precision: 1 / L² [1/m²].
+        minimum_precision: 1 / L² [1/m²].
         excess: result.
     """
     for v in range(excess.size):
@@ -101,7 +101,7 @@ def beyond_noise(
             scale = 1 / max(np.sqrt(x * x + y * y), 1e-12)
             tx, ty, tz = y * scale, -x * scale, 0.0
         ux, uy, uz = y * tz - z * ty, z * tx - x * tz, x * ty - y * tx
-        a, b, c, f, g = least_precision, 0.0, least_precision, 0.0, 0.0
+        a, b, c, f, g = minimum_precision, 0.0, minimum_precision, 0.0, 0.0
         for k in range(start[v], start[v + 1]):
             square, force = squares[around[k]], gradient[around[k]]
             px = square[0, 0] * tx + square[0, 1] * ty + square[0, 2] * tz
@@ -119,5 +119,5 @@ def beyond_noise(
         determinant = a * c - b * b
         one, other = c * f - b * g, a * g - b * f
         # With G = (A + 1 / L²)⁻¹, the trace of G A G is that of G − G² / L².
-        noise = (a + c) / determinant - least_precision * (a * a + 2 * b * b + c * c) / determinant**2
+        noise = (a + c) / determinant - minimum_precision * (a * a + 2 * b * b + c * c) / determinant**2
         excess[v] = (one * one + other * other) / determinant**2 - INLIER_DEVIATIONS**2 * noise

@@ -1,4 +1,4 @@
-"""Correlation of residuals: neighbouring points share errors that no noise model knows.
+"""Correlation of residuals: neighbouring points share errors that noise models do not contain.
 
 The model cannot follow every fold, the appearance of the first frame has its own noise, an outline is off by half a
 pixel along a whole edge. If the errors within a cluster of neighbouring points are correlated, their scores Jᵀr do not

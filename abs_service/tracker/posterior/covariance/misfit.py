@@ -20,7 +20,7 @@ from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.terms.base import INLIER_DEVIATIONS
 
 #: Share of the vertices that miss the measurements above which the mesh may slide, and below which it fits again.
-MOST, HARDLY_ANY = 0.5, 0.1
+MAJORITY, HARDLY_ANY = 0.5, 0.1
 
 #: Weight of a new frame in the running mean along the surface: if its misfit is larger, as that of a single frame may
 #: be, and if it is smaller, so that half is left after 14 frames.
@@ -50,7 +50,7 @@ class Misfit:
         excess, unnoticed = self._common.excess_and_unnoticed(distance, deviation**2)
         across = self._common.mean @ excess + unnoticed
         missing = np.count_nonzero(excess) / len(excess)
-        of_most = float(across.mean()) if missing > MOST else 0.0
+        of_most = float(across.mean()) if missing > MAJORITY else 0.0
         kept = self._along if missing > HARDLY_ANY else 0.0
         self._along = kept + (RISE if of_most > kept else FALL) * (of_most - kept)
         return across, np.maximum(across, self._along)

@@ -47,7 +47,7 @@ def unobserved_motion(
         optimum: the estimate of the frame.
         prediction: its motion prior.
     """
-    gain = solved(_with_widest(optimum, prediction, 1.0), prediction.least_precision)
+    gain = solved(_with_widest(optimum, prediction, 1.0), prediction.minimum_precision)
     gain = gain.astype(np.float32)  # enough for a share that only tells the two apart, in half the time
     for _ in range(3):
         gain = gain @ gain

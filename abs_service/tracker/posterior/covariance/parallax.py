@@ -26,7 +26,7 @@ class Parallax(Protocol):
     """Covariance of the vertices by the parallax of their appearance."""
 
     def covariance(self, optimum: Optimum, frame: FramePosterior) -> NDArray[np.float64]:
-        """Covariance (n, 3, 3) [m²] of the vertices of an estimate; the first one tells how large it is."""
+        """Covariance (n, 3, 3) [m²] of the vertices of an estimate; its size is computed with the first one."""
         ...
 
 

@@ -20,7 +20,7 @@ from abs_service.tracker.posterior.linearized_cost import Sensed
 from abs_service.tracker.terms.linearization import add_squares
 
 #: Lower bound of 1 − h; below it, rounding errors dominate.
-LEAST_KEPT = 1e-6
+MIN_KEPT = 1e-6
 
 #: A value of each residual (m,), by source.
 PerResidual = Sequence[NDArray[np.float64]]
@@ -44,7 +44,7 @@ def gradient_covariance(
         effects: design effect D (sources,) of the residuals of every source, see `design_effect`.
     """
     result, each = priors.copy(), zip(sensed, leverage, effects)
-    weights = [source.residual**2 * (effect / np.maximum(1 - h, LEAST_KEPT)) for source, h, effect in each]
+    weights = [source.residual**2 * (effect / np.maximum(1 - h, MIN_KEPT)) for source, h, effect in each]
     add_squares(sensed, weights, result)
     return result
 

@@ -36,7 +36,7 @@ class ThetaCovariance:
         Args:
             optimum: the estimate, and the cost around it.
             prediction: the motion prior of the frame.
-            recent: the object's motion lately.
+            recent: the object's recent motion.
         """
         inverse, linearized, sensed = optimum.inverse_curvature, optimum.linearized, optimum.sensed
         leverage = leverages(inverse, sensed)

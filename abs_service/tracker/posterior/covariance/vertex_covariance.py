@@ -1,4 +1,4 @@
-"""Covariance of every vertex: by the errors of Θ, by those of the initial mesh, and by what neither knows of."""
+"""Covariance of every vertex: from the errors of Θ, those of the initial mesh, and misfit that neither explains."""
 
 from collections.abc import Sequence
 

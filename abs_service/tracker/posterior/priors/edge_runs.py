@@ -11,7 +11,7 @@ from calib.jit import kernel, prange
 _LANES = 16
 
 #: A block of lanes takes as long as about this many single edges, whose vertices are gathered one by one.
-_LEAST_EDGES = 4
+_MIN_EDGES = 4
 
 
 class EdgeRuns:
@@ -74,7 +74,7 @@ def _blocks(edges: NDArray[np.int64], vertices: int) -> tuple[NDArray[np.int64],
         across, first = divmod(keys[at], vertices)
         first = min(first, vertices - across - _LANES)  # the other ends must not run beyond the last vertex
         end = bisect_left(keys, across * vertices + first + _LANES, at)
-        if first >= 0 and end - at >= _LEAST_EDGES:
+        if first >= 0 and end - at >= _MIN_EDGES:
             inside = order[at:end]
             lane[inside] = edges[inside, 0] - first + _LANES * len(blocks)
             blocks.append((first, across))

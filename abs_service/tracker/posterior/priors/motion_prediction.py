@@ -46,7 +46,7 @@ class MotionPrediction:
         return self.metric.matrix / self._deviation_m**2
 
     @property
-    def least_precision(self) -> NDArray[np.float64]:
+    def minimum_precision(self) -> NDArray[np.float64]:
         """Inverse covariance (dim, dim) of the widest prior, that of an object whose motion is unknown."""
         return self.metric.matrix / (self.settings.speed * self.elapsed_s) ** 2
 

@@ -28,7 +28,7 @@ LAG_MARGIN = 10.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RecentMotion:
-    """The object's motion lately, as the estimates show it.
+    """The object's recent motion, from the estimates.
 
     Attributes:
         innovation: root mean square innovation of the last estimate, in deviations v of its motion prior and per

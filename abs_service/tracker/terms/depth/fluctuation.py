@@ -1,4 +1,4 @@
-"""Fluctuation of a sensor's distances from frame to frame, beyond what its noise model says.
+"""Fluctuation of a sensor's distances from frame to frame, beyond its noise model.
 
 Stereo cameras err by the same for tens of neighbouring pixels, and otherwise in the next image: a single image shows no
 more than a surface that is a little bent. What the distances are off the mesh changes from one frame to the next by
@@ -21,7 +21,7 @@ NEW, FEWEST = 0.1, 5
 TOO_MUCH = 1.5
 
 #: Fewer vertices that are measured in both frames say nothing.
-LEAST = 30
+MIN_VERTICES = 30
 
 
 class Fluctuation:
@@ -46,7 +46,7 @@ class Fluctuation:
         if before.shape != self._before.shape:
             return
         both = (before[1] > 0) & (deviation > 0)
-        if np.count_nonzero(both) < LEAST:
+        if np.count_nonzero(both) < MIN_VERTICES:
             return
         change = np.abs(distance - before[0])[both] / np.hypot(deviation, before[1])[both]
         self._frames += 1

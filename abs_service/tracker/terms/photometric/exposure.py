@@ -12,7 +12,7 @@ DARKEST, BRIGHTEST = 16.0, 250.0
 MIN_SAMPLES = 50
 
 #: Gains beyond these are no exposure: the image shows something else.
-LEAST, MOST = 0.25, 4.0
+MIN_GAIN, MAX_GAIN = 0.25, 4.0
 
 
 def gains(measured: NDArray[np.floating], expected: NDArray[np.floating]) -> NDArray[np.float32]:
@@ -43,4 +43,4 @@ def gains(measured: NDArray[np.floating], expected: NDArray[np.floating]) -> NDA
 def _gain(ratios: NDArray[np.floating]) -> float:
     """Median of ratios; 1 if it is no exposure."""
     ratio = median(ratios)
-    return ratio if LEAST <= ratio <= MOST else 1.0
+    return ratio if MIN_GAIN <= ratio <= MAX_GAIN else 1.0

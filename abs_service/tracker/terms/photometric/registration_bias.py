@@ -20,7 +20,7 @@ from abs_service.tracker.terms.image_noise import noise_deviation
 FACTOR = np.sqrt(1 / 120 + 1 / 320)
 
 #: Largest bias: half a pixel, beyond which another pixel would match better [px].
-MOST_PX = 0.5
+MAX_PX = 0.5
 
 
 class RegistrationBias:
@@ -74,7 +74,7 @@ def deviation_px(image: NDArray[np.float32] | NDArray[np.uint8], places: NDArray
     deviation, steps = noise_deviation(image, places), np.array([[-1], [0], [1]])
     right = _square(image[row, column + steps].astype(np.float64), column, deviation)
     down = _square(image[row + steps, column].astype(np.float64), row, deviation)
-    return float(min(FACTOR * np.sqrt((right + down) / 2), MOST_PX))
+    return float(min(FACTOR * np.sqrt((right + down) / 2), MAX_PX))
 
 
 def _square(values: NDArray[np.float64], line: NDArray[np.intp], deviation: NDArray[np.float64]) -> float:

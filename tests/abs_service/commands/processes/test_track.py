@@ -63,6 +63,6 @@ def test_it_begins_anew_until_it_is_stopped(tracked, monkeypatch):
         if len(begun) == 2:
             track.rig_process.stop_on_signals().set()
 
-    monkeypatch.setattr(track, "_track", track_until_another_calibration)
+    monkeypatch.setattr(track, "track_until_recalibrated", track_until_another_calibration)
     tracked()
     assert len(set(begun)) == 2

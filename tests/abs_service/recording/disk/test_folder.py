@@ -53,4 +53,5 @@ def test_a_disk_that_does_not_answer_does_not_keep_a_rig_from_tracking(tmp_path,
     monkeypatch.setattr(folder, "PATIENCE_S", 0.01)
     monkeypatch.setattr(tempfile, "TemporaryFile", lambda dir: answers.wait() and io.BytesIO())  # noqa: A006 - the library's name
     folder.check(tmp_path)
+    assert not answers.is_set()
     answers.set()

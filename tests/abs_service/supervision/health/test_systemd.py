@@ -6,6 +6,8 @@ import shutil
 import signal
 import socket
 import subprocess
+from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -181,6 +183,14 @@ def test_a_systemd_that_does_not_read_is_not_waited_for(tmp_path, monkeypatch):
         notifier = systemd.notifier({"NOTIFY_SOCKET": str(tmp_path / "notify")})
         for _ in range(1000):
             notifier.stopping()
+        manager.setblocking(False)
+        assert len(list(_unread(manager))) < 1000  # it was full
+
+
+def _unread(manager: socket.socket) -> Iterator[bytes]:
+    with suppress(BlockingIOError):
+        while True:
+            yield manager.recv(1024)
 
 
 @pytest.mark.slow

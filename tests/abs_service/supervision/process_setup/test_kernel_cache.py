@@ -68,5 +68,5 @@ def test_a_full_temporary_folder_is_replaced_by_one_in_memory(given, monkeypatch
 
 
 def test_a_full_disk_is_replaced(given, tmp_path, monkeypatch):
-    monkeypatch.setattr(kernel_cache, "LEAST_BYTES", 1 << 62)
+    monkeypatch.setattr(kernel_cache, "MIN_BYTES", 1 << 62)
     assert given(tmp_path) != str(tmp_path)

@@ -12,16 +12,16 @@ from numpy.typing import NDArray
 from abs_service.pairing.images import Window
 
 #: A field of view fills at least this share of the image: less may be objects before a background without return.
-LEAST_AREA = 0.5
+MIN_AREA = 0.5
 #: Along its edge it has returns in at least this share of the pixels, and in at least that share of something else
 #: than the object: what is before a background without return ends there by itself.
-LEAST_RETURNS, LEAST_OTHERS = 0.5, 0.25
+MIN_RETURNS, MIN_OTHERS = 0.5, 0.25
 #: Its edge is a stripe of this share of the image's width; returns may be missing in it.
 EDGE_SHARE = 0.01
 #: Returns within so many pixels of the predicted mesh may be the object's.
 NEAR_PX = 5
 #: Returns that are fewer in the square of three pixels a side around them are strays.
-LEAST_NEIGHBOURS = 3
+MIN_NEIGHBOURS = 3
 
 
 class BeyondView:
@@ -54,7 +54,7 @@ def beyond(missing: NDArray[np.bool_], expected: NDArray[np.bool_]) -> NDArray[n
     """
     nothing, returns = np.zeros(missing.shape, np.bool_), ~missing
     neighbours = cv2.boxFilter(returns.view(np.uint8), cv2.CV_8U, (3, 3), normalize=False)
-    corners = cv2.findNonZero((returns & (neighbours >= LEAST_NEIGHBOURS)).view(np.uint8))
+    corners = cv2.findNonZero((returns & (neighbours >= MIN_NEIGHBOURS)).view(np.uint8))
     if corners is None:
         return nothing
     hull = cv2.fillConvexPoly(np.zeros(missing.shape, np.uint8), cv2.convexHull(corners), 1)
@@ -63,8 +63,8 @@ def beyond(missing: NDArray[np.bool_], expected: NDArray[np.bool_]) -> NDArray[n
     edge = (hull > 0) & ~inner
     there, ours = edge & returns, cv2.dilate(expected.view(np.uint8), _square(NEAR_PX)) > 0
     length, measured, of_others = (np.count_nonzero(mask) for mask in (edge, there, there & ~ours))
-    ends = measured >= LEAST_RETURNS * length and of_others >= LEAST_OTHERS * length
-    return ~inner if ends and np.count_nonzero(hull) >= LEAST_AREA * hull.size else nothing
+    ends = measured >= MIN_RETURNS * length and of_others >= MIN_OTHERS * length
+    return ~inner if ends and np.count_nonzero(hull) >= MIN_AREA * hull.size else nothing
 
 
 def _square(reach: int) -> NDArray[np.uint8]:

@@ -1,4 +1,4 @@
-"""Classification of the depth images of one sensor, with what its first image tells of missing returns."""
+"""Classification of the depth images of one sensor, with the missing returns of its first image."""
 
 from dataclasses import replace
 

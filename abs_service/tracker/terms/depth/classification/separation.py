@@ -1,4 +1,4 @@
-"""Step in distance that tells the object from what it lies on: for a flat thing on a table, a finer one than usual."""
+"""Step in distance that separates the object from its support; a finer one for a flat object on a table."""
 
 from itertools import islice
 

@@ -35,7 +35,7 @@ class Continuation(Protocol):
 
 
 class NoContinuation:
-    """Null object: nothing is known."""
+    """Null object: the share is unknown."""
 
     def observe(self, shown: NDArray[np.bool_], window: Window = WHOLE) -> None:
         """No effect."""

@@ -9,7 +9,7 @@ mesh that explain most of it.
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.terms.depth.outline.rim_motion import LEAST_OF_A_SIDE, without_motion
+from abs_service.tracker.terms.depth.outline.rim_motion import MIN_OF_A_SIDE, without_motion
 from abs_service.tracker.terms.image_noise import NORMAL_MEDIAN
 from abs_service.tracker.terms.median import median
 
@@ -21,7 +21,7 @@ LIMIT_PX = 8.0
 
 #: So ragged are outlines of sensors that resolve edges, at the usual deviation: real ones of structured light 1.0 to
 #: 1.4 px about a mesh that was predicted [px].
-USUAL_PX = 1.5
+TYPICAL_PX = 1.5
 
 #: Share of the raggedness beyond the usual one that is added to the deviation. The edges of a side wander to either
 #: side, and less of it is left in their mean; with half of it, a print in colour let a sheet slide to the wrong place
@@ -36,18 +36,18 @@ class Raggedness:
     """That of one outline over time.
 
     Args:
-        least: deviation of an outline that is not ragged [px].
-        most: largest deviation [px]; no more than `least` for a deviation that does not change.
+        minimum: deviation of an outline that is not ragged [px].
+        maximum: largest deviation [px]; no more than `minimum` for a deviation that does not change.
 
     Attributes:
         deviation: of the outline [px].
         off_px: an edge that is farther from the outline may be off it for another reason [px]; 0 if unknown.
     """
 
-    def __init__(self, least: float, most: float):
-        self._least, self._most = least, most
-        self._square = least**2
-        self.deviation, self.off_px = least, 0.0
+    def __init__(self, minimum: float, maximum: float):
+        self._minimum, self._maximum = minimum, maximum
+        self._square = minimum**2
+        self.deviation, self.off_px = minimum, 0.0
 
     def update(self, away: NDArray[np.float64], directions: NDArray[np.float64], places: NDArray[np.float64]) -> None:
         """Takes another frame in; one with too few edges, or with most of them elsewhere, changes nothing.
@@ -59,11 +59,11 @@ class Raggedness:
         """
         known = np.flatnonzero(~np.isnan(away))
         near = np.count_nonzero(np.abs(away[known]) < LIMIT_PX)
-        if self._most <= self._least or near < max(LEAST_OF_A_SIDE, len(known) / 2):
+        if self._maximum <= self._minimum or near < max(MIN_OF_A_SIDE, len(known) / 2):
             return
         left = without_motion(np.clip(away[known], -LIMIT_PX, LIMIT_PX), directions[known], places[known])
         scatter = median(np.abs(left)) / NORMAL_MEDIAN
         self._square += NEW * (scatter**2 - self._square)
-        beyond = SHARE**2 * max(self._square - USUAL_PX**2, 0.0)
-        self.deviation = float(min(np.sqrt(self._least**2 + beyond), self._most))
+        beyond = SHARE**2 * max(self._square - TYPICAL_PX**2, 0.0)
+        self.deviation = float(min(np.sqrt(self._minimum**2 + beyond), self._maximum))
         self.off_px = OFF * float(np.sqrt(self._square))

@@ -7,13 +7,13 @@ from abs_service.tracker.terms.depth.outline.rim import by_side
 from abs_service.tracker.terms.median import median
 
 #: Edges that face one side of the image are judged together if there are so many of them.
-LEAST_OF_A_SIDE = 8
+MIN_OF_A_SIDE = 8
 
 #: Share of the squared distances from the outline that a motion of the mesh explains at least, if it has moved.
-LEAST_EXPLAINED = 0.7
+MIN_EXPLAINED = 0.7
 
 #: It is longer than so many pixels: mixed pixels along an outline let all edges of a side err alike.
-LEAST_PX = 2.0
+MIN_PX = 2.0
 
 
 def displacement(away: NDArray[np.float64], directions: NDArray[np.float64]) -> float:
@@ -47,13 +47,13 @@ def motion(away: NDArray[np.float64], directions: NDArray[np.float64], places: N
     Returns:
         Length of the motion of an edge [px]; 0 if there is none or too few edges tell.
     """
-    if len(away) < LEAST_OF_A_SIDE or not away.any():
+    if len(away) < MIN_OF_A_SIDE or not away.any():
         return 0.0
     (along, across, turn), left = _explained(away, directions, places)
     x, y = (places - places.mean(axis=0)).T
     length = median(np.hypot(along - turn * y, across + turn * x))
-    explained = left @ left < (1 - LEAST_EXPLAINED) * (away @ away)
-    return length if explained and length > LEAST_PX else 0.0
+    explained = left @ left < (1 - MIN_EXPLAINED) * (away @ away)
+    return length if explained and length > MIN_PX else 0.0
 
 
 def without_motion(
@@ -62,7 +62,7 @@ def without_motion(
     """The rest (k,) of the distances of edges from the outline that no slide and turn of the mesh explain [px].
 
     Args:
-        away, directions, places: as in `motion`; at least `LEAST_OF_A_SIDE`.
+        away, directions, places: as in `motion`; at least `MIN_OF_A_SIDE`.
     """
     return _explained(away, directions, places)[1]
 
@@ -80,7 +80,7 @@ def _explained(
 
 def _typical(away: NDArray[np.float64]) -> float:
     """Median of the edges of a side; NaN if there are too few."""
-    return median(away) if len(away) >= LEAST_OF_A_SIDE else np.nan
+    return median(away) if len(away) >= MIN_OF_A_SIDE else np.nan
 
 
 def _slide(one: float, other: float) -> float:

@@ -120,8 +120,8 @@ class RimOutline:
         residual = values / self._deviation
         use = np.flatnonzero(np.abs(residual) < FARTHEST)
         by_place = project_with_jacobian(self._camera, points[use].astype(np.float64))[1]
-        told = without_turn(gradients[use], by_place, points[use]) if self._is_round else gradients[use]
-        rows = np.einsum("vi,vij->vj", told / self._deviation, by_place)
+        shown = without_turn(gradients[use], by_place, points[use]) if self._is_round else gradients[use]
+        rows = np.einsum("vi,vij->vj", shown / self._deviation, by_place)
         outer, inner, beyond = self._ends
         jacobian = np.zeros((len(use), sparse_jacobian.dimension))
         of_points = sparse_jacobian.group, sparse_jacobian.parameters, sparse_jacobian.local

@@ -49,7 +49,7 @@ def is_round(
 def without_turn(
     gradients: NDArray[np.float64], by_place: NDArray[np.float64], points: NDArray[np.floating]
 ) -> NDArray[np.float64]:
-    """Image gradients (k, 2) of edges without what they say of a turn of the edges in their plane.
+    """Image gradients (k, 2) of edges, without their component that a rotation of the edges in their plane would cause.
 
     Args:
         gradients: of the distances of the edges (k, 2).

@@ -10,7 +10,7 @@ viser = pytest.importorskip("viser")
 
 from abs_service.bus.health import Health  # noqa: E402 - needs viser
 from abs_service.bus.stamps import HeaderFactory, WallClock  # noqa: E402 - needs viser
-from abs_service.capture.asked_controls import AskedControls  # noqa: E402 - needs viser
+from abs_service.capture.requested_controls import RequestedControls  # noqa: E402 - needs viser
 from abs_service.display.page.acting.controls import DeviceControls  # noqa: E402 - needs viser
 from abs_service.wire import control_commands  # noqa: E402 - needs viser
 from tests.abs_service.bus.loopback import LoopbackBus  # noqa: E402 - needs viser
@@ -32,7 +32,7 @@ class Bench:
         return handle
 
     def capture(self, name, device):
-        act = partial(AskedControls().set, device=device)
+        act = partial(RequestedControls().set, device=device)
         health = Health(LoopbackBus(), "capture", self.headers)
         control_commands.answer_controls(self.bus, name, self.headers, health, act)
         return device.controls

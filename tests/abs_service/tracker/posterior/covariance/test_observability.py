@@ -51,7 +51,7 @@ def test_the_frame_s_own_motion_prior_counts_for_nothing():
     """Its part in the curvature makes room for a share of the widest one."""
     narrow = replace(PREDICTION, speed=0.1, metric=ChangeMetric(np.array([1.0, 0.5]), np.ones((1, 2))))
     np.testing.assert_allclose(
-        narrow.exchanged(0.25), 0.25 * narrow.least_precision - narrow.precision, rtol=1e-12, atol=0
+        narrow.exchanged(0.25), 0.25 * narrow.minimum_precision - narrow.precision, rtol=1e-12, atol=0
     )
     likelihood, wide = np.diag([1e3, 1e6]), replace(narrow, speed=np.inf)
     found = single_frame_deviation(optimum(likelihood + narrow.precision), narrow)

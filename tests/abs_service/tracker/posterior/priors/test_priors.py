@@ -190,7 +190,7 @@ def follow(motion: MotionPrior, steps: list[float], held: float = 1.0, begin: in
 
 
 def test_a_calm_object_narrows_the_prior_to_its_bound_at_once():
-    assert [one.next.speed for one in follow(prior(), [1e-6] * 3)] == [Settings().least_speed] * 3
+    assert [one.next.speed for one in follow(prior(), [1e-6] * 3)] == [Settings().minimum_speed] * 3
 
 
 def test_the_prior_follows_the_size_of_erratic_innovations():
@@ -211,7 +211,7 @@ def test_without_measurements_the_motion_is_that_of_before():
 
 
 def test_equal_bounds_fix_the_prior():
-    motion = MotionPrior(np.zeros(2), ChangeMetric(np.ones(2), SMOOTH), Settings(speed=0.1, least_speed=0.1))
+    motion = MotionPrior(np.zeros(2), ChangeMetric(np.ones(2), SMOOTH), Settings(speed=0.1, minimum_speed=0.1))
     assert {one.next.speed for one in follow(motion, [1e-6, 1e-3, 0.1])} == {0.1}
 
 

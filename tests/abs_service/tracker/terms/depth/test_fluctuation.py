@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from abs_service.tracker.terms.depth.fluctuation import FEWEST, LEAST, Fluctuation
+from abs_service.tracker.terms.depth.fluctuation import FEWEST, MIN_VERTICES, Fluctuation
 
 DEVIATION = 1e-3
 
@@ -36,7 +36,7 @@ def test_a_misfit_that_lasts_or_moves_slowly_is_no_noise():
 
 
 def test_too_little_in_sight_and_another_mesh_change_nothing():
-    assert after(40, 4.0, np.zeros(LEAST - 1)) == 1
+    assert after(40, 4.0, np.zeros(MIN_VERTICES - 1)) == 1
     fluctuation, generator = Fluctuation(), np.random.default_rng(1)
     for k in range(40):  # every other frame has another number of vertices
         fluctuation.update(generator.normal(0, 0.1, 100 + k % 2), np.full(100 + k % 2, DEVIATION))

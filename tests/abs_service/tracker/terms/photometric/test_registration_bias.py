@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from abs_service.tracker.synthesis.sparse import SparseView
-from abs_service.tracker.terms.photometric.registration_bias import MOST_PX, RegistrationBias, deviation_px
+from abs_service.tracker.terms.photometric.registration_bias import MAX_PX, RegistrationBias, deviation_px
 from calib import pose
 from calib.camera import Camera
 from tests.abs_service.tracker.scenes import as_surface
@@ -78,7 +78,7 @@ def test_nothing_but_numbers_comes_of_any_image(seed):
     image[generator.random(image.shape) < generator.random()] = np.nan
     places = generator.uniform(-5, 20, (30, 2))
     places[generator.random(30) < 0.2] = np.nan
-    assert 0 <= deviation_px(image, places) <= MOST_PX
+    assert 0 <= deviation_px(image, places) <= MAX_PX
 
 
 def test_the_derivatives_are_those_of_a_shift_of_the_image():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from abs_service.tracker.terms.depth.outline.raggedness import SHARE, USUAL_PX, Raggedness
+from abs_service.tracker.terms.depth.outline.raggedness import SHARE, TYPICAL_PX, Raggedness
 from abs_service.tracker.terms.depth.outline.rim import Rim
 from abs_service.tracker.terms.depth.outline.rim_outline import RimOutline
 from tests.abs_service.tracker.terms.depth.outline.outline_scene import CAMERA, MESH, look, moved, picture
@@ -26,7 +26,7 @@ def wandering(px: float, frames: int = 60, seed: int = 1) -> list[np.ndarray]:
 @pytest.mark.parametrize("seed", range(3))
 def test_edges_that_wander_widen_the_outline(seed):
     ragged = after(wandering(4.0, seed=seed))
-    assert ragged.deviation == pytest.approx(np.sqrt(0.5**2 + SHARE**2 * (4.0**2 - USUAL_PX**2)), rel=0.15)
+    assert ragged.deviation == pytest.approx(np.sqrt(0.5**2 + SHARE**2 * (4.0**2 - TYPICAL_PX**2)), rel=0.15)
     assert ragged.off_px == pytest.approx(8.0, rel=0.15)
 
 

@@ -7,8 +7,8 @@ import pytest
 
 from abs_service.bus.health import Health
 from abs_service.bus.stamps import HeaderFactory, WallClock
-from abs_service.capture.asked_controls import AskedControls
 from abs_service.capture.device_supervisor import DeviceSupervisor
+from abs_service.capture.requested_controls import RequestedControls
 from drivers.contract.controls import Controls
 from drivers.contract.device import ControlError, DeviceError
 from tests.abs_service.bus.loopback import LoopbackBus
@@ -18,7 +18,7 @@ from tests.waiting import eventually
 
 
 def test_values_are_set_again_in_the_order_in_which_they_were_asked_for():
-    asked, opened_again = AskedControls(), adjustable()
+    asked, opened_again = RequestedControls(), adjustable()
     asked.set({"auto_exposure": False, "infrared_gain": 5}, adjustable())
     asked.set({"exposure_s": 0.02}, adjustable())
     asked.set({"auto_exposure": True}, adjustable())
@@ -28,7 +28,7 @@ def test_values_are_set_again_in_the_order_in_which_they_were_asked_for():
 
 
 def test_what_was_refused_is_not_asked_for_again(caplog):
-    asked, opened_again = AskedControls(), adjustable()
+    asked, opened_again = RequestedControls(), adjustable()
     with pytest.raises(ControlError):
         asked.set({"exposure_s": 7.0}, adjustable())
     asked.renew(opened_again)
@@ -37,7 +37,7 @@ def test_what_was_refused_is_not_asked_for_again(caplog):
 
 
 def test_a_control_that_is_gone_is_logged_and_does_not_end_the_device(caplog):
-    asked, opened_again = AskedControls(), adjustable()
+    asked, opened_again = RequestedControls(), adjustable()
     asked.set({"infrared_gain": 5}, adjustable())
     opened_again.controls = Controls()
     asked.renew(opened_again)
@@ -49,7 +49,7 @@ def test_a_device_is_set_while_it_is_open_and_not_after():
     device.start = FakeDevice().start
     make = partial(DeviceSupervisor, "cam", "fake://", lambda _: device, lambda _: None)
     supervisor = make(RecordingSink(), {}, health, time.monotonic_ns)
-    ask = partial(supervisor.use, partial(AskedControls().set, {"infrared_gain": 5}))
+    ask = partial(supervisor.use, partial(RequestedControls().set, {"infrared_gain": 5}))
 
     def refused():
         try:

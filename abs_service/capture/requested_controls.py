@@ -9,7 +9,7 @@ from drivers.contract.device import ControlError, Device
 _log = logging.getLogger(__name__)
 
 
-class AskedControls:
+class RequestedControls:
     """Remembers the values that users have asked for, so that they outlast a new opening of the device."""
 
     def __init__(self) -> None:
