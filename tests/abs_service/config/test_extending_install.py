@@ -6,9 +6,8 @@ import re
 import pytest
 
 from abs_service import config
+from tests.abs_service.config.extending_programs import ASKING, DERIVED
 from tests.abs_service.config.test_extending import (
-    ASKING,
-    DERIVED,
     PAGE,
     PARTS,
     PYPROJECT,
