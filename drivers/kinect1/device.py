@@ -15,7 +15,7 @@ from drivers.kinect1.camera import LINE_S, LONGEST_LINES, KinectCamera, Stream
 from drivers.kinect1.color_settings import ColorSettings
 from drivers.kinect1.stream_decoder import StreamDecoder, camera_of, stream_info
 from drivers.kinect1.transport.commands import Commands
-from drivers.kinect1.transport.loss_monitor import LossMonitor
+from drivers.kinect1.transport.image_losses import ImageLosses
 from drivers.kinect1.transport.port import Port
 
 #: Read timeout, and so the polling interval of the stop event [s].
@@ -120,7 +120,7 @@ class Kinect1Device:
         }
         self._decoders = decoders
         counted = dict.fromkeys(CAUSES, 0)
-        losses = LossMonitor(self._clock, self._gate.warn)
+        losses = ImageLosses(self._clock, self._gate.warn)
         delivered = 0
 
         def count() -> None:

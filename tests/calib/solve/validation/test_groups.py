@@ -15,7 +15,7 @@ from calib.solve.validation.free_shape import free_shape
 from calib.solve.validation.groups import groups
 from calib.solve.validation.verdict import assess
 from tests.calib.solve import board_views
-from tests.calib.solve.test_steadiness import SIZE, views
+from tests.calib.solve.validation.test_steadiness import SIZE, views
 
 ODD = (2, 3, 7, 11, 12, 16, 20, 21)
 

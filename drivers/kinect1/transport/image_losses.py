@@ -10,7 +10,7 @@ CONDITION = "lost images"
 _REMEDY = "attach the Kinect to a USB controller of its own, without hubs, and check its cable"
 
 
-class LossMonitor:
+class ImageLosses:
     """Warns when more than `TOLERATED` of a window's images were dropped; clears the warning when not.
 
     Args:

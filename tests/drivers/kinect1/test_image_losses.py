@@ -1,11 +1,11 @@
 """The loss monitor warns once per window, and clears the warning."""
 
-from drivers.kinect1.transport.loss_monitor import CONDITION, WINDOW_NS, LossMonitor
+from drivers.kinect1.transport.image_losses import CONDITION, WINDOW_NS, ImageLosses
 
 
 def test_the_warning_is_raised_and_cleared() -> None:
     now_ns, reports = 0, []
-    monitor = LossMonitor(lambda: now_ns, lambda condition, message: reports.append((condition, message)))
+    monitor = ImageLosses(lambda: now_ns, lambda condition, message: reports.append((condition, message)))
     monitor.update(100, 100)  # too early to judge
     assert reports == []
     for delivered, dropped in ((580, 20), (1120, 80), (1700, 100), (2300, 100)):
