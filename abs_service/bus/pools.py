@@ -10,7 +10,7 @@ from collections.abc import Callable, Set
 from contextlib import suppress
 from pathlib import Path
 
-#: A pool's size is a multiple of this plus the number of its process, which is less on Linux: so it tells whose it is.
+#: A pool's size is a multiple of this plus its owner's process number, which is less on Linux.
 UNIT_BYTES = 1 << 22
 #: Time after the end of a process in which its last images are still read [ns].
 READ_NS = 10_000_000_000

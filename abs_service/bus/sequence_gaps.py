@@ -10,7 +10,7 @@ from google.protobuf.message import DecodeError
 from abs_service.bus.contract import Sample
 from drivers.encoding.message_check import LARGEST_GAP
 
-#: Publishers of a topic that are followed: those heard last. Two hosts with cameras both publish `health/capture`.
+#: Publishers of a topic that are followed: the most recent ones. Two hosts with cameras both publish `health/capture`.
 PUBLISHERS = 4
 
 

@@ -38,7 +38,7 @@ CERTIFICATE_ENDS = timedelta(days=30)
 _ENDPOINT = re.compile(r"(tcp|tls|quic|udp|ws)/(?P<host>\[[0-9a-fA-F:.]+\]|[^\s:/?#\[\]]+):(?P<port>\d{1,5})([?#]\S*)?")
 
 
-#: Least levels of zenoh's log, which tells of refused clients in warnings.
+#: Lowest levels of zenoh's log, which has refused clients as warnings.
 LOG_LEVELS = f"{connection.LOG_LEVELS},zenoh_link_tls=warn"
 
 

@@ -18,7 +18,7 @@ from drivers.replay.contents import DAMAGE, Contents, RecordingError, read_chunk
 #: A gap is a break between two messages of at least so many of the topic's median period.
 GAP_PERIODS = 2.5
 
-#: First words of the counters of health that tell of losses.
+#: First words of the counters of health that count losses.
 LOSSES = ("dropped", "lost", "malformed", "refused", "skipped", "unused")
 
 _INFO, _STATE, _HEALTH, _MODEL = (

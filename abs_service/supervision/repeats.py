@@ -4,9 +4,9 @@ import re
 import threading
 from dataclasses import dataclass
 
-#: The same text is told so many times as it comes.
+#: Number of times that the same text is reported as it comes.
 AT_ONCE = 5
-#: Time after which it is told again then, at first and at most: it doubles each time [ns].
+#: Time after which it is reported again then, at first and at most: it doubles each time [ns].
 FIRST_NS, LONGEST_NS = 60_000_000_000, 600_000_000_000
 #: Texts that are remembered.
 MAX_TEXTS = 1000

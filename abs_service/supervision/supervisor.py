@@ -18,9 +18,9 @@ _log = logging.getLogger(__name__)
 LONGEST_BACKOFF_NS = 3_000_000_000
 #: After a run that was longer than this a process is started again at once, and the next backoff is the first one [ns].
 WORKED_NS = 10_000_000_000
-#: A process says nothing for this long: its health, which comes once a second, is overdue [ns].
+#: Time without health of a process, which is due once a second, after which it is overdue [ns].
 OVERDUE_NS = 1_800_000_000
-#: If `poll` was not called for longer than this, the supervisor itself was suspended, and heard no child [ns].
+#: If `poll` was not called for longer than this, the supervisor itself was suspended, and received no health [ns].
 PAUSE_NS = 1_000_000_000
 
 

@@ -11,7 +11,7 @@ from calib.jit import kernel
 #: Neighbouring faces are folded if their normals differ by more than 120°, and by less than 60° at rest.
 FOLDED_COSINE, UNFOLDED_COSINE = -0.5, 0.5
 
-#: Share of the edges that are stretched less than a mesh is said to be.
+#: Share of the edges that are stretched less than the stated stretch of a mesh.
 STRETCHED = 0.95
 
 

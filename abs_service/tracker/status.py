@@ -15,7 +15,7 @@ from abs_service.tracker.shape_quality import ShapeQuality
 from abs_service.tracker.terms.base import MIN_RIM, RimFit, SensorFit, inlier_share, occluded_share
 from abs_service.tracker.terms.vertex_counts import VertexCounts
 
-#: With fewer vertices that agree or disagree with a sensor, or should, their share says nothing.
+#: Minimum number of vertices that agree or disagree with a sensor, or should, for their share to be judged.
 MIN_JUDGED = 20
 
 
@@ -120,7 +120,7 @@ _FOLLOW = (
 )
 _FIND = "bring the object back into sight; it is looked for again, at once by abs-service reinitialize"
 
-#: Without any measurement, nobody can say that the object is out of sight.
+#: Without any measurement, the object may be in sight or not.
 _UNMEASURED = "no sensor delivered all its images, so that nothing was measured – see what unused.* of health counts"
 
 #: What may have happened where the free edges lie off the outline, and what to do.

@@ -31,7 +31,7 @@ _SCHEMAS: Mapping[str, type[Command]] = {
 }
 ANSWER = CommandAnswer.DESCRIPTOR.full_name
 
-#: Commands of a topic that the log tells within a period [ns]; their numbers show that there were more.
+#: Commands of a topic that are logged within a period [ns]; their numbers show that there were more.
 LINES, LINES_NS = 10, 1_000_000_000
 
 #: Column and row of a pixel.

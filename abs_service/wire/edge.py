@@ -160,7 +160,7 @@ SCHEMAS: Mapping[str, type[Message]] = {
     )
 }
 
-#: The topic that a message belongs to, where it says so.
+#: The topic that a message names, if it does.
 _TOPICS: Mapping[type[Message], Callable[[Any], str]] = {
     health_pb2.Health: lambda message: keys.health(message.component),
     deformation_state_pb2.DeformationState: lambda message: keys.state(message.tracker),

@@ -7,7 +7,7 @@ from contextlib import suppress
 from abs_service.bus.contract import Bus, Sample
 from abs_service.wire.message_header import MessageHeaderError, parse
 
-#: Time after which a second publisher that says no more is gone, of topics that are sent once a second [ns].
+#: Time without a message after which a second publisher is gone, of topics that are sent once a second [ns].
 GONE_NS = 3_000_000_000
 #: Publishers of a topic that are remembered: those that were restarted, and their rivals.
 REMEMBERED = 8

@@ -16,7 +16,7 @@ from drivers.genicam.pixels import PixelError
 
 #: Longest search for cameras, and wait for the first image [s].
 _SEARCH_S, _FIRST_S = 1.0, 5.0
-#: Rate of a camera that does not tell its own [Hz].
+#: Rate of a camera that does not report one [Hz].
 _RATE_HZ = 10.0
 
 _UNKNOWN = DeviceInfo("genicam://", "GenICam", "")

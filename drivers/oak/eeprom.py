@@ -38,7 +38,7 @@ class Extrinsics:
     T_to_camera: Pose
 
 
-#: Of a camera that is nobody's neighbour, or of which nothing is known.
+#: Pose of a camera without a neighbour, or without a calibration.
 UNKNOWN = Extrinsics(NO_SOCKET, pose.identity())
 
 

@@ -11,7 +11,7 @@ from drivers.contract.capabilities import ClockInfo
 from drivers.contract.frame import ENCODINGS, Frame, Kind, Reference
 from drivers.orbbec.streams import FORMATS, Role, StreamError
 
-#: The cameras' clock as the SDK tells it: unwrapped, in microseconds.
+#: The cameras' clock as the SDK returns it: unwrapped, in microseconds.
 CLOCK = ClockInfo("orbbec", 1e6)
 
 

@@ -14,7 +14,7 @@ from drivers.contract.frame_gate import FrameGate
 from drivers.replay.contents import RecordingError
 from drivers.replay.recording import Recording
 
-#: A recording in which nothing comes for longer [s] is said to pause: it is waited for as it was recorded.
+#: Longer gaps of a recording [s] are logged as a pause: they last as long as recorded.
 PAUSE_S = 5.0
 
 #: Longest time after images were delivered in which nothing is read, at most a quarter of that until the next ones [s].

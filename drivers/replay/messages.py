@@ -14,7 +14,7 @@ from drivers.replay.contents import DAMAGE, ChunkLocation, Contents, RecordingEr
 #: Largest time [ns].
 LAST_NS = (1 << 63) - 1
 
-#: Bytes that the disk reads ahead, so that nobody waits for it while others use it as well.
+#: Bytes that the disk reads ahead, so that no reader waits while others use the disk.
 AHEAD = 32 << 20
 
 

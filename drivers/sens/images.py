@@ -12,7 +12,7 @@ from drivers.sens.header import ImageHeader, SensError
 
 _COLOR: Mapping[int, str] = {0: "raw", 1: "png", 2: "jpeg"}
 _DEPTH: Mapping[int, str] = {0: "raw_ushort", 1: "zlib_ushort"}
-#: What the format knows, and nobody but its makers can decode.
+#: Compressions that the format names, without a public decoder.
 _UNREADABLE: Mapping[int, str] = {-1: "unknown"}
 _COMPRESSIONS = {"color": (_COLOR, _UNREADABLE), "depth": (_DEPTH, {**_UNREADABLE, 2: "occi_ushort"})}
 

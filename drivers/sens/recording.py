@@ -17,7 +17,7 @@ from drivers.sens.header import ImageHeader, SensError
 from drivers.sens.places import FramePlaces, places
 from drivers.sens.stamps import Stamps, Times
 
-#: Frames per second of a file without time stamps, if nobody says otherwise [Hz].
+#: Default rate of a file without time stamps [Hz].
 RATE_HZ = 30.0
 
 

@@ -7,11 +7,11 @@ LEASE_MS = 2000
 #: Time between the tries to connect again to a router that is gone: at first, and at most [ms].
 RETRY: Mapping[str, int] = {"period_init_ms": 250, "period_max_ms": 1000}
 #: Longest time of a try [ms]. One that begins while the network is cut would, by default, wait for 10 s: TCP repeats
-#: its question after 1, 3, 7 s and so does not know that the network is back.
+#: its question after 1, 3, 7 s and so notices late that the network is back.
 UNICAST: Mapping[str, int] = {"open_timeout": 2000}
 #: Batches of 64 kB that may wait for a socket: the most that zenoh has, so that an image finds room while its reader
 #: waits for a processor. Beside six busy processes on two cores, 7 instead of 30 % of 1800 images were lost.
 QUEUE: Mapping[str, Mapping[str, int]] = {"size": {"data_high": 16, "data": 16, "data_low": 16}}
-#: Levels of zenoh's log. What is off says of each message that its sender's wall clock is ahead, as another host's is,
+#: Levels of zenoh's log. What is off warns at each message that its sender's wall clock is ahead, as another host's is,
 #: or that one's own was set back. Only caches need these times, and zenoh mends those.
 LOG_LEVELS = "error,zenoh::net::routing::dispatcher::pubsub=off"

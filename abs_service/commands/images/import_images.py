@@ -61,11 +61,11 @@ from drivers.image_folder.listing import ImageFile, ImageFolderError, by_list, b
 from drivers.opening import open_recording
 from drivers.sens.recording import SensRecording
 
-#: Metres per unit of depth images whose camera file does not tell.
+#: Metres per unit of depth images whose camera file does not state it.
 DEPTH_SCALES = {"open3d": 0.001, "pairs": 0.001, "tum": 1 / 5000}
 #: Depth and colour images of the layouts whose images are numbered.
 PATTERNS = {"open3d": ("depth/*.png", "color/*"), "pairs": ("depth_*.png", "color_*.[jp]*g")}
-#: Layouts that are one file and know their cameras.
+#: Layouts that are one file and contain their cameras.
 RECORDINGS = ("azure", "o3r", "oak", "realsense", "ros2", "sens")
 #: Options of a layout; those that are not here have none.
 OPTIONS = {
@@ -74,7 +74,7 @@ OPTIONS = {
     "sens": ("rate", "frames"),
     "tum": ("camera", "frames"),
 }
-#: Exposures per second of numbered images, if no option tells [Hz].
+#: Default rate of numbered images [Hz].
 RATE_HZ = 30.0
 
 

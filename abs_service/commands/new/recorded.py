@@ -34,7 +34,7 @@ noise = {{ type = "structured_light", noise = {:.1f}e-3, step = 0.0 }}
 _TIME_OF_FLIGHT_NAME = re.compile(r"(?<![a-z])tof(?![a-z])", re.IGNORECASE)
 
 _PRIMESENSE = StructuredLight()
-#: Less more than that says nothing: images differ.
+#: A smaller excess is no evidence: images differ.
 _MORE = 1.2
 
 #: The scatter is the median of so many images.

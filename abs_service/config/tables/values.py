@@ -18,7 +18,7 @@ from abs_service.config import plugins
 FILE_SCHEMES = frozenset({"replay"})
 #: Longest name of a file or folder [bytes]: Linux allows no more.
 LONGEST_NAME = 255
-#: What every address of a device looks like.
+#: Pattern of every address of a device.
 URI = re.compile(r"[a-z][a-z0-9_]*:\S+")
 
 

@@ -19,7 +19,7 @@ from drivers.encoding.parsing import CodecError
 from drivers.replay.contents import Topic, scan
 from drivers.replay.messages import messages
 
-#: After a jump, messages of so long before are delivered as well, so that everything that is said often is there [s].
+#: After a jump, messages of this period before are delivered as well, so that all periodic ones are there [s].
 BEFORE_S = 3.0
 
 _STATE = DeformationState.DESCRIPTOR.full_name

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
 
-#: Colours of the classes of the rim, told apart by colour-blind people as well (Okabe and Ito), and of the rest.
+#: Colours of the classes of the rim, distinct for colour-blind people as well (Okabe and Ito), and of the rest.
 CLASS_COLORS: Mapping[RimClass, str] = {
     RimClass.FREE: "#00b37d",
     RimClass.CONTACT: "#e69f00",
@@ -27,7 +27,7 @@ CLASS_COLORS: Mapping[RimClass, str] = {
 }
 REGION, MESH, NO_RETURN = "#f0e442", "#ffffff", "#16256e"
 
-#: Background and text of the page, and text that says what is wrong.
+#: Background and text of the page, and text of warnings.
 PAGE, TEXT, WARNING = "#202020", "#f2f2f2", "#ffb09c"
 
 CLASS_WORDS: Mapping[RimClass, str] = {

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from abs_service.bus.health import Health, Level
 
-#: Time after which it is said that the disk does not answer, and from which on that is an error [ns].
+#: Time without an answer of the disk after which it is reported, and after which it is an error [ns].
 SAID_NS, ERROR_NS = 1_500_000_000, 10_000_000_000
 
 

@@ -15,7 +15,7 @@ PROCESS = "process."
 #: First backoff before a restart [ns].
 FIRST_BACKOFF_NS = 200_000_000
 #: Time between two looks whether a process that starts or compiles does anything; the first is earlier than its next
-#: health is due, so that the second still tells within two seconds [ns].
+#: health is due, so that the second still reports within two seconds [ns].
 FIRST_LOOK_NS, LOOK_NS = 1_000_000_000, 800_000_000
 
 

@@ -12,7 +12,7 @@ from abs_service.supervision.children.child import Child, State
 from abs_service.supervision.health.rig_state import Received, RigState
 from abs_service.tracking.log.tracker_log import EstimateReport
 
-#: A component that says nothing for this long, of its healths each second, has no present numbers [ns].
+#: Time without health of a component, which is due once a second, after which its numbers are out of date [ns].
 SILENT_NS = 5_000_000_000
 
 

@@ -26,7 +26,7 @@ WIDTH = 320
 REACH = 16
 SCALES = 1.02 ** np.arange(-6.0, 7.0)
 
-#: A displacement is told from this length on [px of the reduced image, root mean square over the jumps]. Structured
+#: Minimum length of a displacement [px of the reduced image, root mean square over the jumps]. Structured
 #: light makes things two or three pixels wider, and calibrations that were fitted to one scene are off by as much.
 MIN_DISPLACEMENT_PX = 4.0
 

@@ -15,7 +15,7 @@ from calib.noise.base import DepthNoise, subtract_mean_offset
 from calib.noise.fit.scatter import scatter
 from calib.rig import Rig
 
-#: Distances that scatter by this factor more than their noise model says contradict it. They are judged where they
+#: Distances that scatter by this factor more than their noise model states contradict it. They are judged where they
 #: differ from the object's by less than this share, because deviations change with the distance.
 TOO_MUCH_SCATTER, AS_FAR = 1.5, 0.25
 

@@ -19,7 +19,7 @@ from abs_client.connection.tls import Tls
 from abs_client.connection.wake import Wake
 from abs_client.errors import MalformedError, UnknownNameError, UnreachableError
 
-#: Where a rig listens unless its file says otherwise.
+#: Default address at which a rig listens.
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 #: By when a rig must answer that is connected to, and a query [s].
 CONNECT_S, QUERY_S = 3.0, 2.0

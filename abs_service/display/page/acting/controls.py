@@ -12,7 +12,7 @@ from absmsg.v1.command_pb2 import CommandAnswer, Control
 from abs_service.wire.control_commands import value
 from drivers.contract.controls import Value
 
-#: Sets controls of a device, none to be told which it has; returns its answer, None if there is none.
+#: Sets controls of a device, or without any lists them; returns its answer, None if there is none.
 Send = Callable[[str, Mapping[str, Value]], CommandAnswer | None]
 
 #: An input of the page; a number is a text, because the device knows its limits.

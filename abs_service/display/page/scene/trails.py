@@ -14,7 +14,7 @@ from abs_service.display.page.scene.fields import MeshView, joined
 #: Length of a trail [ns].
 TRAIL_NS = 10_000_000_000
 
-#: Places that are farther apart in time are not joined: nobody knows the way between them [ns].
+#: Places that are farther apart in time are not joined: the path between them is unknown [ns].
 GAP_NS = 500_000_000
 
 

@@ -15,7 +15,7 @@ from abs_service.tracker.detection.segments.depth_segments import deepest_pixel,
 from abs_service.tracker.detection.segments.dominant_plane import CLEARANCE_M, above_plane
 from abs_service.tracker.detection.segments.within import Polygon, Restricted, restricted
 
-#: A surface with less than this share of a wall's pixels says nothing against it.
+#: A surface with less than this share of a wall's pixels is ignored.
 SPECK = 0.02
 
 

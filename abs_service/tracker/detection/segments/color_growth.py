@@ -17,7 +17,7 @@ COLORS = 5
 #: Width of the seam in which the outline is looked for, on either side, as a share of the image's width.
 SEAM = 1 / 40
 
-#: Rounds of GrabCut, and the colours of object and background each that it tells apart.
+#: Rounds of GrabCut, and the numbers of colours of object and background each.
 ROUNDS, COMPONENTS = 5, 5
 
 

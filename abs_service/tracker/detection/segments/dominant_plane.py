@@ -11,7 +11,7 @@ from calib.sequences import plane
 #: Minimum share of the returns on a plane for it to be what the object lies on.
 MIN_SHARE = 0.2
 
-#: Height above the plane up to which a pixel belongs to it, unless said [m].
+#: Height above the plane up to which a pixel belongs to it by default [m].
 CLEARANCE_M = 0.01
 
 #: Number of pixels of the subsampled image in which the plane is found; more are slower but not more accurate.
