@@ -13,7 +13,7 @@ import pytest
 
 from abs_service import cli
 from abs_service.bus.security.mutual_tls import MutualTls
-from abs_service.bus.session import Role
+from abs_service.bus.session import SessionMode
 from abs_service.bus.zenoh_bus import ZenohBus
 from tests.ports import free_endpoint, free_port
 
@@ -111,7 +111,7 @@ def open_bus(endpoint):
     opened = []
 
     def open_bus():
-        opened.append(ZenohBus.open("demo", endpoint, Role.CLIENT if opened else Role.ROUTER))
+        opened.append(ZenohBus.open("demo", endpoint, SessionMode.CLIENT if opened else SessionMode.ROUTER))
         return opened[-1]
 
     yield open_bus
@@ -132,8 +132,8 @@ def secured(keys, endpoint):
     """Opens buses of the rig "demo" with mutual TLS, by the names of their certificates. All are closed afterwards."""
     opened = []
 
-    def secured(name, role=Role.CLIENT):
-        opened.append(ZenohBus.open("demo", encrypted(endpoint), role, security=mutual_tls(keys, name)))
+    def secured(name, mode=SessionMode.CLIENT):
+        opened.append(ZenohBus.open("demo", encrypted(endpoint), mode, security=mutual_tls(keys, name)))
         return opened[-1]
 
     yield secured

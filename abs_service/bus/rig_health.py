@@ -7,7 +7,7 @@ from absmsg.v1.health_pb2 import Health
 
 from abs_service.bus import keys
 from abs_service.bus.security.mutual_tls import NO_SECURITY, MutualTls, NoSecurity
-from abs_service.bus.session import Role, open_session
+from abs_service.bus.session import SessionMode, open_session
 from drivers.encoding.message_check import MessageError, parse_valid
 
 #: Timeout of the connection [ms].
@@ -35,7 +35,7 @@ def ask(endpoint: str, rig: str = "*", security: NoSecurity | MutualTls = NO_SEC
     """
     health: RigHealth = {}
     with (
-        open_session(endpoint, Role.CLIENT, False, CONNECT_MS, security) as session,
+        open_session(endpoint, SessionMode.CLIENT, False, CONNECT_MS, security) as session,
         session.declare_subscriber(keys.key(rig, keys.health("**"))) as subscriber,
     ):
         deadline_s = time.monotonic() + PATIENCE_S

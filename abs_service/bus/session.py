@@ -50,8 +50,8 @@ class UnansweredError(BusError, ConnectionError):
     """Nobody answers at the endpoint; who does not yet, or stands still, may do so later."""
 
 
-class Role(StrEnum):
-    """Role of a process in the zenoh network."""
+class SessionMode(StrEnum):
+    """Mode of a session, in zenoh's terms."""
 
     ROUTER = "router"  # listens on the endpoint; exactly one process of a rig
     CLIENT = "client"  # connects to it
@@ -59,7 +59,7 @@ class Role(StrEnum):
 
 def open_session(
     endpoint: str,
-    role: Role,
+    mode: SessionMode,
     shared_memory: bool = True,
     connect_timeout_ms: int = CONNECT_TIMEOUT_MS,
     security: NoSecurity | MutualTls = NO_SECURITY,
@@ -69,7 +69,7 @@ def open_session(
 
     Args:
         endpoint: where the router listens, such as tcp/127.0.0.1:7447.
-        role: whether to be the router or to connect to it.
+        mode: whether to be the router or to connect to it.
         shared_memory: whether large messages pass through shared memory between processes of one host.
         connect_timeout_ms: timeout of a client's connection [ms].
         security: authentication and access rights.
@@ -83,7 +83,7 @@ def open_session(
     check_endpoint(endpoint, security)
     for other in routers:
         check_endpoint(other, security, "bus.routers")
-    own = security.check(endpoint, role is Role.ROUTER)
+    own = security.check(endpoint, mode is SessionMode.ROUTER)
     if own and own.ends - datetime.now(UTC) < CERTIFICATE_ENDS:
         _log.warning('the certificate "%s" ends on %s; after that, nobody can connect', own.name, own.ends.date())
     if not sys.stdout.isatty():
@@ -91,13 +91,13 @@ def open_session(
     zenoh.init_log_from_env_or(LOG_LEVELS)
     try:
         settings = _settings(
-            endpoint, role, pool_bytes() if shared_memory else 0, connect_timeout_ms, security, routers
+            endpoint, mode, pool_bytes() if shared_memory else 0, connect_timeout_ms, security, routers
         )
         return zenoh.open(zenoh.Config.from_json5(json.dumps(settings)))
     except zenoh.ZError as error:
-        refusal = security.refusal(endpoint) if role is Role.CLIENT else ""
-        kind = UnansweredError if role is Role.CLIENT and not refusal else BusError
-        reason = refusal or _explain(str(error), role, connect_timeout_ms)
+        refusal = security.refusal(endpoint) if mode is SessionMode.CLIENT else ""
+        kind = UnansweredError if mode is SessionMode.CLIENT and not refusal else BusError
+        reason = refusal or _explain(str(error), mode, connect_timeout_ms)
         raise kind(f'bus.endpoint = "{endpoint}": {reason}') from error
 
 
@@ -118,13 +118,13 @@ def check_endpoint(endpoint: str, security: NoSecurity | MutualTls = NO_SECURITY
     return endpoint
 
 
-def _explain(error: str, role: Role, connect_timeout_ms: int) -> str:
+def _explain(error: str, mode: SessionMode, connect_timeout_ms: int) -> str:
     if "in use" in error:
         return (
             "the address is in use; is another abs-service running? Stop it, or set endpoint in the table [bus] of the "
             "rig file to another port; `abs-service new` writes a file"
         )
-    if role is Role.CLIENT:
+    if mode is SessionMode.CLIENT:
         return f"nothing answers there within {connect_timeout_ms / 1000:g} s; start `abs-service run` or use --listen"
     # zenoh appends its own source lines, which are of no use here.
     return "cannot listen there: " + re.sub(r"\s+at /\S+\.rs:\d+\.", "", error)
@@ -147,15 +147,15 @@ def pool_bytes() -> int:
 
 def _settings(
     endpoint: str,
-    role: Role,
+    mode: SessionMode,
     pool: int,
     connect_timeout_ms: int,
     security: NoSecurity | MutualTls,
     routers: Sequence[str],
 ) -> dict[str, object]:
-    listens = role is Role.ROUTER
+    listens = mode is SessionMode.ROUTER
     return {
-        "mode": role.value,
+        "mode": mode.value,
         "listen": {"endpoints": [endpoint] if listens else []},
         "connect": {
             "endpoints": list(routers) if listens else [endpoint],

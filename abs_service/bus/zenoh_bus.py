@@ -13,7 +13,7 @@ from abs_service.bus import keys
 from abs_service.bus.contract import EVENTS, Priority, Publisher, Qos, Sample, Subscription
 from abs_service.bus.security import link_log
 from abs_service.bus.security.mutual_tls import NO_SECURITY, MutualTls, NoSecurity
-from abs_service.bus.session import Role, open_session
+from abs_service.bus.session import SessionMode, open_session
 from drivers.zenoh_session.callbacks import from_non_daemon_thread
 
 _log = logging.getLogger(__name__)
@@ -50,15 +50,15 @@ class ZenohBus:
         cls,
         rig: str,
         endpoint: str,
-        role: Role,
+        mode: SessionMode,
         shared_memory: bool = True,
         security: NoSecurity | MutualTls = NO_SECURITY,
         routers: Sequence[str] = (),
     ) -> Self:
         """Opens a session and a bus on it; arguments and errors as in `open_session`."""
         keys.check_name(rig)  # before there is a session to be closed
-        bus = cls(open_session(endpoint, role, shared_memory, security=security, routers=routers), rig)
-        if role is Role.ROUTER and security.link:
+        bus = cls(open_session(endpoint, mode, shared_memory, security=security, routers=routers), rig)
+        if mode is SessionMode.ROUTER and security.link:
             bus._keep(from_non_daemon_thread(lambda: link_log.declare(bus._session)))
         return bus
 

@@ -21,7 +21,7 @@ from urllib.parse import parse_qsl, urlencode, urlsplit, urlunsplit
 
 from abs_service import config
 from abs_service.bus import keys
-from abs_service.bus.session import Role
+from abs_service.bus.session import SessionMode
 from abs_service.bus.stamps import WallClock
 from abs_service.commands.parts import rig_process
 from abs_service.commands.parts.log import logs
@@ -80,7 +80,7 @@ def run(arguments: argparse.Namespace) -> int:
     )
     stop = rig_process.stop_on_signals()
     with (
-        rig_process.open_bus_at(rig.bus.endpoint, Role.ROUTER, rig, arguments) as bus,
+        rig_process.open_bus_at(rig.bus.endpoint, SessionMode.ROUTER, rig, arguments) as bus,
         in_memory(rig) as file,
         choice.shown(as_json=arguments.json) as display,
         _logging_to(display, logs.on_stderr(arguments)) if not arguments.log_file else nullcontext(),

@@ -14,7 +14,7 @@ from abs_service.bus.health import Health, Level
 from abs_service.bus.pools import EndedPools
 from abs_service.bus.queues import LatestQueue
 from abs_service.bus.stamps import HeaderFactory, WallClock
-from abs_service.supervision.children.child import PROCESS, Child, State
+from abs_service.supervision.children.child import PROCESS, Child, ChildState
 from abs_service.supervision.health import rig_state
 from abs_service.supervision.health.rig_view import Display, RigView
 from abs_service.supervision.supervisor import Supervisor
@@ -35,10 +35,10 @@ RELOAD_TIMEOUT_S = 30.0
 #: Topics that one process of a rig publishes. Several may capture or record, but not the same sensor.
 SOLE = (keys.health("run"), keys.health("track/*"), keys.model("*"))
 
-_LEVELS: Mapping[State, Level] = {
-    State.BACKOFF: Level.WARNING,
-    State.STALLED: Level.WARNING,
-    State.FAILED: Level.ERROR,
+_LEVELS: Mapping[ChildState, Level] = {
+    ChildState.BACKOFF: Level.WARNING,
+    ChildState.STALLED: Level.WARNING,
+    ChildState.FAILED: Level.ERROR,
 }
 
 
@@ -236,7 +236,7 @@ class RunSession:
     def _report(self) -> None:
         for child in self._supervisor.children.values():
             self._health.count_up_to({f"restarts.{child.component}": child.restarts})
-            starved = child.state is State.RUNNING and child.reason
+            starved = child.state is ChildState.RUNNING and child.reason
             level = Level.WARNING if starved else Level.ERROR if child.lacks else _LEVELS.get(child.state, Level.OK)
             why = f"{child.component} {child.condition}" if child.reason else ""
             self._health.report(child.component, level, why)

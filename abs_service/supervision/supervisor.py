@@ -7,7 +7,7 @@ import logging
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from abs_service.supervision.children.child import FIRST_BACKOFF_NS, FIRST_LOOK_NS, Child, State, exit_reason
+from abs_service.supervision.children.child import FIRST_BACKOFF_NS, FIRST_LOOK_NS, Child, ChildState, exit_reason
 from abs_service.supervision.children.child_process import NO_PROCESS, Spawn
 from abs_service.supervision.exit_codes import Exit
 from abs_service.supervision.repeats import Repeats, counted
@@ -74,13 +74,13 @@ class Supervisor:
             child.end()
             self._leaving.remove(child)
         for child in self.children.values():
-            if child.state is State.RUNNING:
+            if child.state is ChildState.RUNNING:
                 self._check(child, now_ns)
-            if child.state is State.RENEWED and child.process.poll() is not None:
+            if child.state is ChildState.RENEWED and child.process.poll() is not None:
                 child.start_at_ns = now_ns
-            waits = child.state in (State.BACKOFF, State.STALLED, State.RENEWED, State.FAILED)
+            waits = child.state in (ChildState.BACKOFF, ChildState.STALLED, ChildState.RENEWED, ChildState.FAILED)
             if waits and now_ns >= child.start_at_ns:
-                child.restarts += child.state is State.FAILED
+                child.restarts += child.state is ChildState.FAILED
                 self._start(child, now_ns)
 
     def processes(self) -> frozenset[int]:
@@ -90,18 +90,18 @@ class Supervisor:
     def heartbeat(self, component: str, busy: bool = False) -> None:
         """Extends a component's deadline; further for a busy one, which compiles kernels."""
         child = self.children.get(component)
-        if child is not None and child.state is State.RUNNING:
+        if child is not None and child.state is ChildState.RUNNING:
             self._expect_health(child, self._clock(), busy)
             child.threads, child.reason = child.process.threads(), ""
 
     def renew(self, component: str) -> None:
         """Ends a process in order, and starts it again, which is no failure; also one that was given up."""
         child = self.children[component]
-        if child.state is State.RENEWED:
+        if child.state is ChildState.RENEWED:
             return  # it has been told, and a second SIGTERM would end it on the spot
         child.process.terminate()
         child.exits_ns.clear()
-        child.state, child.reason = State.RENEWED, "starts again with the configuration that was read"
+        child.state, child.reason = ChildState.RENEWED, "starts again with the configuration that was read"
         child.start_at_ns = self._clock() + self._limits.stop_ns
 
     def exchange(self, children: Iterable[Child]) -> None:
@@ -117,7 +117,7 @@ class Supervisor:
 
         Later, in a rig that works, a file may be wrong that another configuration names, or that somebody has replaced.
         """
-        failed = (child for child in self.children.values() if child.state is State.FAILED and child.starts == 1)
+        failed = (child for child in self.children.values() if child.state is ChildState.FAILED and child.starts == 1)
         return next((child for child in failed if child.exit_code == Exit.USER), None)
 
     def exit_code(self) -> Exit | None:
@@ -130,9 +130,9 @@ class Supervisor:
         capture = [child for child in self.children.values() if child.component == "capture"]
         trackers = [child for child in self.children.values() if child.component.startswith("track/")]
         for group in (capture, trackers):
-            if group and all(child.state is State.FAILED for child in group):
+            if group and all(child.state is ChildState.FAILED for child in group):
                 return Exit.FAILED
-        finished = any(child.state is State.FINISHED for child in capture)
+        finished = any(child.state is ChildState.FINISHED for child in capture)
         return Exit.OK if finished else None
 
     def stop(self, wait: Callable[[float], None]) -> None:
@@ -146,7 +146,7 @@ class Supervisor:
         for number, stage in enumerate(stages):
             children = [child for child in self.children.values() if child.stage == stage]
             for child in children:
-                if child.state is not State.RENEWED:  # which has been told
+                if child.state is not ChildState.RENEWED:  # which has been told
                     child.process.terminate()
             # Equal time for each of the earlier stages; the last one, which drains to disk, has all that is left.
             share = (number + 1) / (len(stages) + 1) if number + 1 < len(stages) else 1.0
@@ -178,13 +178,13 @@ class Supervisor:
             child.process = self._spawn(child.component, child.arguments)
         except (OSError, EOFError, RuntimeError, MemoryError) as error:  # RuntimeError: too many threads
             # The host lacks something, which is no failure of the process.
-            child.state, child.lacks, child.start_at_ns = State.BACKOFF, True, now_ns + LONGEST_BACKOFF_NS
+            child.state, child.lacks, child.start_at_ns = ChildState.BACKOFF, True, now_ns + LONGEST_BACKOFF_NS
             child.reason = f"cannot be started: {error}"
             self._tell(logging.WARNING, f"{child.component} {child.reason}; trying again")
             return
         started = {"component": child.component, "child": child.process.pid, "restarts": child.restarts}
         _log.info("%s is started", child.component, extra={"fields": started})
-        child.state, child.reason, child.lacks, child.starts = State.RUNNING, "", False, child.starts + 1
+        child.state, child.reason, child.lacks, child.starts = ChildState.RUNNING, "", False, child.starts + 1
         child.started_ns, child.threads, child.looked_at = now_ns, {}, {}
         self._expect_health(child, now_ns, busy=True)
 
@@ -198,11 +198,11 @@ class Supervisor:
             return
         child.exit_code, child.worst_code = code, max(child.worst_code, code)
         if code == Exit.ENDED:
-            child.state, child.process = State.FINISHED, NO_PROCESS
+            child.state, child.process = ChildState.FINISHED, NO_PROCESS
         elif code == Exit.USER and child.starts == 1:
             self._give_up(child, now_ns, child.process.output_tail())
         else:
-            self._schedule_restart(child, now_ns, exit_reason(code, child.process.output_tail()), State.BACKOFF)
+            self._schedule_restart(child, now_ns, exit_reason(code, child.process.output_tail()), ChildState.BACKOFF)
 
     def _treat_silence(self, child: Child, now_ns: int) -> None:
         if now_ns < child.deadline_ns + min(child.waited_ns(now_ns), self._limits.startup_ns):
@@ -210,9 +210,9 @@ class Supervisor:
             child.reason = f"no health for {silent_s:.0f} s, because it waits for a processor"
             return
         child.process.kill()
-        self._schedule_restart(child, now_ns, "sent no health in time", State.STALLED)
+        self._schedule_restart(child, now_ns, "sent no health in time", ChildState.STALLED)
 
-    def _schedule_restart(self, child: Child, now_ns: int, reason: str, state: State) -> None:
+    def _schedule_restart(self, child: Child, now_ns: int, reason: str, state: ChildState) -> None:
         while child.exits_ns and child.exits_ns[0] <= now_ns - self._limits.window_ns:
             child.exits_ns.popleft()
         if len(child.exits_ns) >= self._limits.restarts:
@@ -230,7 +230,7 @@ class Supervisor:
 
     def _give_up(self, child: Child, now_ns: int, reason: str) -> None:
         child.start_at_ns = now_ns + self._limits.window_ns
-        child.state, child.reason, child.process = State.FAILED, reason, NO_PROCESS
+        child.state, child.reason, child.process = ChildState.FAILED, reason, NO_PROCESS
         if child is not self.misconfigured():  # whose message is the last word of the whole run
             self._tell(logging.ERROR, f"{child.component} is given up: {reason}")
 
@@ -243,6 +243,6 @@ class Supervisor:
     def _finalize(self, child: Child) -> None:
         if child.process.poll() is None:
             child.reason = "did not end in time and was killed"
-        if child.state in (State.RUNNING, State.BACKOFF, State.STALLED, State.RENEWED):
-            child.state = State.STOPPED
+        if child.state in (ChildState.RUNNING, ChildState.BACKOFF, ChildState.STALLED, ChildState.RENEWED):
+            child.state = ChildState.STOPPED
             child.end()

@@ -8,7 +8,7 @@ import pytest
 
 from abs_service.bus import keys
 from abs_service.bus.frames import FramePublisher, FrameSubscriber
-from abs_service.bus.session import Role
+from abs_service.bus.session import SessionMode
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.bus.zenoh_bus import ZenohBus
 from abs_service.pairing.synchroniser import Synchroniser
@@ -57,7 +57,7 @@ def open_bus():
     opened = []
 
     def open_bus():
-        opened.append(ZenohBus.open("demo", endpoint, Role.CLIENT if opened else Role.ROUTER))
+        opened.append(ZenohBus.open("demo", endpoint, SessionMode.CLIENT if opened else SessionMode.ROUTER))
         return opened[-1]
 
     yield open_bus

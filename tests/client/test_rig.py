@@ -15,7 +15,7 @@ from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 from abs_service.bus import keys as topics
 from abs_service.bus.contract import IMAGES
 from abs_service.bus.health import Health
-from abs_service.bus.session import Role
+from abs_service.bus.session import SessionMode
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.capture.requested_controls import RequestedControls
 from abs_service.wire import commands, control_commands
@@ -142,7 +142,7 @@ def test_a_closed_connection_ends_its_streams_and_says_so(rig):
 
 
 def test_a_viewer_reads_and_only_an_operator_commands(secured, keys, endpoint, headers):
-    bus = secured("rig", Role.ROUTER)
+    bus = secured("rig", SessionMode.ROUTER)
     bus.answer_queries(topics.model("tof"), SensorModel.DESCRIPTOR.full_name, MODEL.SerializeToString)
     commands.answer_reinitialize(bus, "sheet", headers, Health(bus, "track/sheet", headers), lambda seed: "")
     files = {name: [keys / f"{part}" for part in ("authority.pem", f"{name}.pem", f"{name}.key")] for name in NAMES}

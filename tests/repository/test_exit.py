@@ -14,12 +14,12 @@ pytest_unconfigure = tests.conftest.pytest_unconfigure
 TEST = """
 import threading
 
-from abs_service.bus.session import Role
+from abs_service.bus.session import SessionMode
 from abs_service.bus.zenoh_bus import ZenohBus
 
 
 def test_fails():
-    bus = ZenohBus.open("demo", "ENDPOINT", Role.ROUTER, shared_memory=False)
+    bus = ZenohBus.open("demo", "ENDPOINT", SessionMode.ROUTER, shared_memory=False)
     bus.subscribe("config", lambda sample: threading.Event().wait())
     threading.Thread(target=threading.Event().wait).start()
     raise AssertionError

@@ -14,7 +14,7 @@ from types import FrameType
 from abs_service import config
 from abs_service.bus.security import roles
 from abs_service.bus.security.mutual_tls import TlsError
-from abs_service.bus.session import Role
+from abs_service.bus.session import SessionMode
 from abs_service.bus.zenoh_bus import ZenohBus
 from abs_service.commands.parts.log import library_output, logs
 from abs_service.supervision.process_setup import process_tuning
@@ -83,23 +83,23 @@ def open_bus(rig: config.ServiceConfig, arguments: argparse.Namespace, *names: s
         SecurityError: a file of `[bus.tls]` cannot be used.
     """
     process_tuning.keep_freed_memory()
-    role = Role.ROUTER if arguments.listen else Role.CLIENT
+    mode = SessionMode.ROUTER if arguments.listen else SessionMode.CLIENT
     endpoint = arguments.listen or arguments.connect or rig.bus.endpoint
-    with logs.in_background(), open_bus_at(endpoint, role, rig, arguments, *names) as bus:
+    with logs.in_background(), open_bus_at(endpoint, mode, rig, arguments, *names) as bus:
         yield bus
 
 
 @contextmanager
 def open_bus_at(
-    endpoint: str, role: Role, rig: config.ServiceConfig, arguments: argparse.Namespace, *names: str
+    endpoint: str, mode: SessionMode, rig: config.ServiceConfig, arguments: argparse.Namespace, *names: str
 ) -> Iterator[CheckedBus]:
-    """`open_bus` at a given endpoint, in a given role."""
+    """`open_bus` at a given endpoint, in a given mode."""
     process_tuning.shorten_switch_interval()
     # Zenoh says on standard output which clients it refuses.
-    with library_output.logged() if role is Role.ROUTER and rig.bus.tls else nullcontext():
+    with library_output.logged() if mode is SessionMode.ROUTER and rig.bus.tls else nullcontext():
         try:
             security = rig.bus.security(*names, roles.RIG)
-            bus = ZenohBus.open(rig.name, endpoint, role, rig.bus.shared_memory, security, rig.bus.routers)
+            bus = ZenohBus.open(rig.name, endpoint, mode, rig.bus.shared_memory, security, rig.bus.routers)
         except TlsError as error:
             raise SecurityError(f"{arguments.config or 'demo.toml'}: {error}") from None
         with CheckedBus(bus, time.monotonic_ns) as checked:

@@ -23,7 +23,7 @@ from abs_service.bus.security.mutual_tls import NO_SECURITY, MutualTls, NoSecuri
 from abs_service.bus.session import DEFAULT_ENDPOINT, BusError, check_endpoint
 from abs_service.commands.parts import rig_process
 from abs_service.display.terminal.health_words import words
-from abs_service.supervision.children.child import PROCESS, State
+from abs_service.supervision.children.child import PROCESS, ChildState
 from abs_service.supervision.exit_codes import Exit
 from drivers.contract.text import printable
 
@@ -99,7 +99,7 @@ def _absent(components: Mapping[str, Health | None]) -> list[dict[str, Any]]:
     return [
         {
             "component": name,
-            "level": "error" if text.startswith(State.FAILED) else "warning",
+            "level": "error" if text.startswith(ChildState.FAILED) else "warning",
             "state": "",
             "reason": text,
         }

@@ -13,7 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from abs_service.display.terminal.output import Output
-from abs_service.supervision.children.child import State
+from abs_service.supervision.children.child import ChildState
 from abs_service.supervision.health.rig_view import RigView, size
 from abs_service.tracking.log.tracker_log import EstimateReport, TrackerLog
 
@@ -22,7 +22,12 @@ PERIOD_NS = 160_000_000
 
 #: Colour of each status of an estimate.
 STATUS_COLORS = {"TRACKING": "green", "DEGRADED": "yellow", "LOST": "red", "INITIALIZING": "cyan"}
-_STATE = {State.RUNNING: "green", State.FAILED: "red", State.STALLED: "red", State.BACKOFF: "yellow"}
+_STATE = {
+    ChildState.RUNNING: "green",
+    ChildState.FAILED: "red",
+    ChildState.STALLED: "red",
+    ChildState.BACKOFF: "yellow",
+}
 
 
 class TableDisplay:
@@ -181,7 +186,7 @@ def _recording(view: RigView) -> RenderableType:
 def _processes(view: RigView) -> Text:
     text = Text(" processes")
     for child in view.children:
-        number = str(child.process.pid) if child.state is State.RUNNING else child.state.value
+        number = str(child.process.pid) if child.state is ChildState.RUNNING else child.state.value
         text.append(f"  {escape(child.component)} ")
         text.append(number, style=_STATE.get(child.state, "dim"))
         if child.restarts:

@@ -19,7 +19,7 @@ FIRST_BACKOFF_NS = 200_000_000
 FIRST_LOOK_NS, LOOK_NS = 1_000_000_000, 800_000_000
 
 
-class State(StrEnum):
+class ChildState(StrEnum):
     """State of a child process."""
 
     RUNNING = "running"
@@ -55,7 +55,7 @@ class Child:
     component: str
     arguments: tuple[str, ...]
     stage: int
-    state: State = State.BACKOFF
+    state: ChildState = ChildState.BACKOFF
     reason: str = ""
     restarts: int = 0
     starts: int = 0

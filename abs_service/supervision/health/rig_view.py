@@ -8,7 +8,7 @@ from typing import Protocol, Self
 from absmsg.v1.health_pb2 import Health
 
 from abs_service.bus import keys
-from abs_service.supervision.children.child import Child, State
+from abs_service.supervision.children.child import Child, ChildState
 from abs_service.supervision.health.rig_state import Received, RigState
 from abs_service.tracking.log.tracker_log import EstimateReport
 
@@ -126,7 +126,7 @@ class RigView:
         ]
         found += [("run", Health.LEVEL_WARNING, self.refused)] if self.refused else []
         found += [("run", Health.LEVEL_ERROR, self.rivals)] if self.rivals else []
-        failed = [child for child in self.children if child.state is State.FAILED]
+        failed = [child for child in self.children if child.state is ChildState.FAILED]
         return found + [(child.component, Health.LEVEL_ERROR, f"given up: {child.reason}") for child in failed]
 
     @property

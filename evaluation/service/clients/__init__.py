@@ -22,7 +22,7 @@ from pathlib import Path
 
 import numpy as np
 
-from abs_service.bus.session import Role
+from abs_service.bus.session import SessionMode
 from abs_service.bus.zenoh_bus import ZenohBus
 from abs_service.report.content import Cell, Column, Section, Table
 from evaluation.experiment import Context, Findings, at_most
@@ -62,7 +62,7 @@ def run(settings: Settings, context: Context) -> Findings:
     """Lets one program after the other receive."""
     rig, web, ros = (f"127.0.0.1:{port}" for port in _free_ports(3))
     measured: dict[Program, np.ndarray] = {}
-    with ZenohBus.open("demo", f"tcp/{rig}", Role.ROUTER) as bus, publishing(bus), _bridges(rig, web, ros):
+    with ZenohBus.open("demo", f"tcp/{rig}", SessionMode.ROUTER) as bus, publishing(bus), _bridges(rig, web, ros):
         for program in _programs(rig, web, ros):
             context.progress(program.name)
             measured[program] = ages_ms(program, settings.duration_s)
@@ -102,7 +102,7 @@ def _programs(rig: str, web: str, ros: str) -> Iterator[Program]:
 def _bridges(rig: str, web: str, ros: str) -> Iterator[None]:
     with (
         tempfile.TemporaryDirectory() as folder,
-        ZenohBus.open("ros", f"tcp/{ros}", Role.ROUTER),
+        ZenohBus.open("ros", f"tcp/{ros}", SessionMode.ROUTER),
         started(_module("web", rig, "--port", web.partition(":")[2]), Path(folder)),
         started(_module("ros2", rig, "--router", f"tcp/{ros}"), Path(folder)),
     ):

@@ -9,7 +9,7 @@ from absmsg.v1.health_pb2 import Health
 
 from abs_service.bus import keys
 from abs_service.bus.contract import Sample
-from abs_service.bus.session import BusError, Role
+from abs_service.bus.session import BusError, SessionMode
 from abs_service.bus.zenoh_bus import ZenohBus
 
 #: Attempts to connect to the router, each with the timeout of the bus.
@@ -113,7 +113,7 @@ def connect(endpoint: str, rig: str) -> ZenohBus:
     """
     for _ in range(ATTEMPTS - 1):
         try:
-            return ZenohBus.open(rig, endpoint, Role.CLIENT)
+            return ZenohBus.open(rig, endpoint, SessionMode.CLIENT)
         except BusError:
             continue
-    return ZenohBus.open(rig, endpoint, Role.CLIENT)
+    return ZenohBus.open(rig, endpoint, SessionMode.CLIENT)

@@ -10,7 +10,7 @@ import time
 import pytest
 
 from abs_service.bus.contract import EVENTS, IMAGES, STATE, Sample
-from abs_service.bus.session import Role
+from abs_service.bus.session import SessionMode
 from abs_service.bus.zenoh_bus import ZenohBus
 
 
@@ -119,9 +119,9 @@ def test_a_stopped_subscriber_does_not_block_the_publisher(buses, endpoint):
     _, sender, receiver = buses
     program = f"""
 import time
-from abs_service.bus.session import Role
+from abs_service.bus.session import SessionMode
 from abs_service.bus.zenoh_bus import ZenohBus
-with ZenohBus.open("demo", "{endpoint}", Role.CLIENT) as bus:
+with ZenohBus.open("demo", "{endpoint}", SessionMode.CLIENT) as bus:
     bus.subscribe("**", lambda sample: None)
     bus.declare_liveliness("stopped")
     print("ready", flush=True)
@@ -158,7 +158,7 @@ def test_everything_resumes_when_the_router_comes_back(buses, endpoint):
     publish_until_received(publisher, arrived, b"before")
     router.close()
     publisher.put(b"nobody hears this, and nothing blocks")
-    with ZenohBus.open("demo", endpoint, Role.ROUTER):
+    with ZenohBus.open("demo", endpoint, SessionMode.ROUTER):
         while publish_until_received(publisher, arrived, b"after").payload != b"after":
             pass
         while not (answers := receiver.query("config", 1)):

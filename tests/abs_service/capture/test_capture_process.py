@@ -10,7 +10,7 @@ from absmsg.v1.health_pb2 import Health
 from abs_service.bus import keys
 from abs_service.bus.frames import FrameSubscriber
 from abs_service.bus.health import Level
-from abs_service.bus.session import Role
+from abs_service.bus.session import SessionMode
 from abs_service.bus.zenoh_bus import ZenohBus
 from drivers.contract.host_clock import host_clock
 
@@ -34,7 +34,7 @@ sensors.color.device = "sim"
 
 
 def test_it_publishes_frames_and_answers_queries_until_sigterm(rig, endpoint, launch):
-    with ZenohBus.open("demo", endpoint, Role.ROUTER) as bus:
+    with ZenohBus.open("demo", endpoint, SessionMode.ROUTER) as bus:
         changes, health = queue.SimpleQueue(), queue.SimpleQueue()
         bus.watch_liveliness(lambda *change: changes.put(change))
         bus.subscribe("health/capture", lambda sample: health.put(Health.FromString(sample.payload)))

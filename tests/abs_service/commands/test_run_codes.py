@@ -10,7 +10,7 @@ from absmsg.v1.health_pb2 import Health
 from abs_service.bus import keys
 from abs_service.bus.contract import Sample
 from abs_service.commands.running import outcome
-from abs_service.supervision.children.child import Child, State
+from abs_service.supervision.children.child import Child, ChildState
 from abs_service.supervision.exit_codes import Exit
 from abs_service.supervision.health.rig_state import RigState
 from abs_service.supervision.health.rig_view import RigView
@@ -23,7 +23,7 @@ def view(code, *failures):
     for boot, number in enumerate(failures):
         said = Health(component="record", header=Header(boot_id=str(boot)), counters={"failures": number})
         live.take(Sample(keys.health("record"), Health.DESCRIPTOR.full_name, said.SerializeToString()))
-    ended = Child("record", (), 0, State.STOPPED, worst_code=code)
+    ended = Child("record", (), 0, ChildState.STOPPED, worst_code=code)
     return RigView("bench", "", Path(), live, [ended], 0.0, 0, "")
 
 

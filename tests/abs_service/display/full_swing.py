@@ -5,7 +5,7 @@ from pathlib import Path
 from absmsg.v1.health_pb2 import Health
 
 from abs_service.bus.contract import Sample
-from abs_service.supervision.children.child import Child, State
+from abs_service.supervision.children.child import Child, ChildState
 from abs_service.supervision.health.rig_view import RigView
 from abs_service.tracking.log.tracker_log import EstimateReport
 from tests.abs_service.supervision.children.idle_process import Idle
@@ -69,7 +69,10 @@ def recorder(file_bytes):
 
 
 def view(live, **changes):
-    children = [Child("capture", (), 0, State.RUNNING), Child("record", (), 1, State.BACKOFF, "ended", restarts=2)]
+    children = [
+        Child("capture", (), 0, ChildState.RUNNING),
+        Child("record", (), 1, ChildState.BACKOFF, "ended", restarts=2),
+    ]
     children[0].process = Idle()
     fields = {
         "rig": "demo",

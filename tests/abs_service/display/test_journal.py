@@ -11,7 +11,7 @@ from absmsg.v1.health_pb2 import Health
 
 from abs_service.bus.contract import Sample
 from abs_service.display.terminal import choice, journal
-from abs_service.supervision.children.child import Child, State
+from abs_service.supervision.children.child import Child, ChildState
 from abs_service.supervision.health.rig_state import RigState
 from abs_service.supervision.health.rig_view import RigView
 from abs_service.supervision.process_setup import log_lines
@@ -41,7 +41,7 @@ class Journal:
         self._socket.bind(str(folder / "socket"))
         self.display = journal.JournalDisplay(partial(journal.send, address=str(folder / "socket")))
         self.live = RigState(["sheet"], lambda: 0)
-        self.child = Child("track/sheet", (), 1, State.RUNNING)
+        self.child = Child("track/sheet", (), 1, ChildState.RUNNING)
 
     def health(self, component, level, message=""):
         health = Health(component=component, level=level, message=message)
@@ -88,7 +88,7 @@ def test_changes_are_written_once_with_fields_to_search_by(written):
     assert written.entries(1.0) == []
     written.health("capture", Health.LEVEL_ERROR, "sim: is unplugged; plug it in")
     written.status("LOST", "no frame", "nothing seen")
-    written.child.state, written.child.reason = State.BACKOFF, "ended by signal 9"
+    written.child.state, written.child.reason = ChildState.BACKOFF, "ended by signal 9"
     fields = [tuple(entry.items()) for entry in written.entries(2.0)]
     assert [entry[0][1] for entry in fields] == [
         "capture: error: sim: is unplugged; plug it in",

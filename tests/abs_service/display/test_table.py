@@ -12,7 +12,7 @@ from rich.spinner import Spinner
 from abs_service.display.terminal.lines import line
 from abs_service.display.terminal.output import Output
 from abs_service.display.terminal.table import STATUS_COLORS, TableDisplay, draw
-from abs_service.supervision.children.child import Child, State
+from abs_service.supervision.children.child import Child, ChildState
 from abs_service.supervision.health.rig_state import RigState
 from abs_service.tracking.log.sensor_shares import SensorShares
 from tests.abs_service.display.full_swing import Clock, recorder, report, take_health, view
@@ -98,7 +98,7 @@ def test_troubles_of_components_and_children_that_were_given_up_are_shown(live):
     take_health(
         live, Health(component="capture", level=Health.LEVEL_ERROR, message="sim: unplugged; trying again in 1 s")
     )
-    failed = Child("track/sheet", (), 1, State.FAILED, "needed more than 5 restarts")
+    failed = Child("track/sheet", (), 1, ChildState.FAILED, "needed more than 5 restarts")
     text = drawn(view(live, children=[failed]), width=120)
     assert "capture: sim: unplugged; trying again in 1 s" in text
     assert "track/sheet: given up: needed more than 5 restarts" in text

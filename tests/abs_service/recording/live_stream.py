@@ -11,7 +11,7 @@ from mcap.reader import make_reader
 
 from abs_service.bus import keys
 from abs_service.bus.contract import IMAGES, STATE
-from abs_service.bus.session import Role
+from abs_service.bus.session import SessionMode
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.bus.zenoh_bus import ZenohBus
 from drivers.contract.frame import Frame, Geometry, Kind
@@ -28,7 +28,7 @@ class Stream:
         self._headers = HeaderFactory("demo", self._clock)
         self._pixels = np.random.default_rng(1).integers(0, 65535, shape, np.uint16)
         self._stop = threading.Event()
-        self._bus = ZenohBus.open("demo", endpoint, Role.ROUTER)
+        self._bus = ZenohBus.open("demo", endpoint, SessionMode.ROUTER)
         self.health = queue.SimpleQueue()
         self._heard, self._ended = "", ""  # boot identities of the recorder that was heard last, and of one that ended
         self._bus.subscribe("health/record", lambda sample: self.health.put(Health.FromString(sample.payload)))

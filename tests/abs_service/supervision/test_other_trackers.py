@@ -12,7 +12,7 @@ from abs_service.bus.contract import EVENTS
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.display.terminal.lines import PlainDisplay
 from abs_service.display.terminal.output import Output
-from abs_service.supervision.children.child import Child, State
+from abs_service.supervision.children.child import Child, ChildState
 from abs_service.supervision.run_session import Renewal
 from abs_service.tracking.monitors import silence_monitor
 from abs_service.wire import commands, estimate_messages
@@ -67,4 +67,4 @@ def test_one_is_added_and_another_one_removed_with_all_that_was_said_of_it(bench
     view, now = bench.session.view(), bench.supervisor.children
     assert sorted(bench.killed) == ["record", "track/old"]
     assert (list(view.live.trackers), list(view.live.received)) == (["kept", "new"], ["run"])
-    assert (now["track/kept"].process, now["track/new"].state) == (process, State.RUNNING)
+    assert (now["track/kept"].process, now["track/new"].state) == (process, ChildState.RUNNING)

@@ -2,7 +2,7 @@ import errno
 
 import pytest
 
-from abs_service.supervision.children.child import State
+from abs_service.supervision.children.child import ChildState
 from abs_service.supervision.children.child_process import ThreadTimes
 from abs_service.supervision.exit_codes import Exit
 from tests.abs_service.supervision.fake_processes import S, World, ends, passes
@@ -16,7 +16,7 @@ def world():
 def test_all_children_are_started_at_once(world):
     supervisor = world.supervisor("capture", "track/sheet", "record")
     assert [process.component for process in world.started] == ["capture", "track/sheet", "record"]
-    assert all(child.state is State.RUNNING for child in supervisor.children.values())
+    assert all(child.state is ChildState.RUNNING for child in supervisor.children.values())
 
 
 def test_a_crashed_child_is_started_again_after_a_pause_that_doubles(world):
@@ -41,7 +41,7 @@ def test_a_child_that_had_worked_is_started_again_at_the_next_look_and_says_why_
         world.latest("record").code = -9
         supervisor.poll()
         started, child = len(world.started), supervisor.children["record"]
-        assert (child.state, "ended by signal 9" in child.reason) == (State.BACKOFF, True)
+        assert (child.state, "ended by signal 9" in child.reason) == (ChildState.BACKOFF, True)
         world.now_ns += S // 20
         supervisor.poll()
         assert len(world.started) == started + 1
@@ -54,10 +54,10 @@ def test_a_child_that_crashes_too_often_is_given_up_and_the_others_go_on(world):
     for _ in range(6):
         ends(world, supervisor, "track/a", 1)
     failed = supervisor.children["track/a"]
-    assert (failed.state, failed.restarts) == (State.FAILED, 5)
+    assert (failed.state, failed.restarts) == (ChildState.FAILED, 5)
     assert "more than 5 restarts in 60 s" in failed.reason
     assert supervisor.exit_code() is None
-    assert supervisor.children["track/b"].state is State.RUNNING
+    assert supervisor.children["track/b"].state is ChildState.RUNNING
 
 
 def test_a_child_that_was_given_up_is_tried_again_when_the_window_is_over(world):
@@ -65,13 +65,13 @@ def test_a_child_that_was_given_up_is_tried_again_when_the_window_is_over(world)
     for _ in range(6):
         ends(world, supervisor, "record", -9)
     record = supervisor.children["record"]
-    assert record.state is State.FAILED
+    assert record.state is ChildState.FAILED
     passes(world, supervisor, 55)
-    assert record.state is State.FAILED
+    assert record.state is ChildState.FAILED
     passes(world, supervisor, 2)
-    assert (record.state, record.restarts, record.reason) == (State.RUNNING, 6, "")
+    assert (record.state, record.restarts, record.reason) == (ChildState.RUNNING, 6, "")
     ends(world, supervisor, "record", -9)
-    assert (record.state, record.restarts) == (State.RUNNING, 7), "with as many tries as before"
+    assert (record.state, record.restarts) == (ChildState.RUNNING, 7), "with as many tries as before"
 
 
 @pytest.mark.parametrize("component", ["track/a", "record"])
@@ -82,11 +82,11 @@ def test_a_file_that_is_wrong_when_a_child_starts_again_does_not_end_a_rig_that_
     for _ in range(6):
         ends(world, supervisor, component, Exit.USER)
     child = supervisor.children[component]
-    assert (child.state, supervisor.exit_code(), supervisor.misconfigured()) == (State.FAILED, None, None)
+    assert (child.state, supervisor.exit_code(), supervisor.misconfigured()) == (ChildState.FAILED, None, None)
     assert "ended with code 2" in child.reason
     assert "No such file" in child.reason
     passes(world, supervisor, 60)
-    assert child.state is State.RUNNING
+    assert child.state is ChildState.RUNNING
 
 
 def test_crashes_that_are_long_ago_are_forgiven(world):
@@ -94,7 +94,7 @@ def test_crashes_that_are_long_ago_are_forgiven(world):
     for _ in range(20):
         world.now_ns += 15 * S
         ends(world, supervisor, "capture", 1)
-    assert supervisor.children["capture"].state is State.RUNNING
+    assert supervisor.children["capture"].state is ChildState.RUNNING
 
 
 @pytest.mark.parametrize("lost", [["capture"], ["track/a", "track/b"]])
@@ -109,7 +109,7 @@ def test_without_images_or_any_tracker_there_is_nothing_left_to_do(world, lost):
 def test_a_failed_recorder_stops_nothing(world):
     supervisor = world.supervisor("capture", "track/a", "record", restarts=0)
     ends(world, supervisor, "record", 1)
-    assert supervisor.children["record"].state is State.FAILED
+    assert supervisor.children["record"].state is ChildState.FAILED
     assert supervisor.exit_code() is None
 
 
@@ -119,7 +119,7 @@ def test_exit_code_2_of_anyone_stops_everything_and_keeps_the_message(world):
     ends(world, supervisor, "record", Exit.USER)
     refused = supervisor.misconfigured()
     assert refused is not None
-    assert (refused.state, refused.restarts, refused.reason) == (State.FAILED, 0, world.words)
+    assert (refused.state, refused.restarts, refused.reason) == (ChildState.FAILED, 0, world.words)
     assert supervisor.exit_code() is Exit.USER
 
 
@@ -128,7 +128,7 @@ def test_a_child_that_cannot_connect_at_first_since_this_process_stood_still_is_
     for component in ("capture", "track/a", "record"):
         ends(world, supervisor, component, Exit.NOTHING)
     assert (supervisor.misconfigured(), supervisor.exit_code()) == (None, None)
-    assert all(child.state is State.RUNNING for child in supervisor.children.values())
+    assert all(child.state is ChildState.RUNNING for child in supervisor.children.values())
 
 
 def test_when_the_devices_have_no_more_images_the_run_is_over(world):
@@ -143,7 +143,7 @@ def test_a_process_that_ends_in_order_though_nobody_here_told_it_is_started_agai
     supervisor = world.supervisor("capture", "track/a", "record")
     ends(world, supervisor, component, Exit.OK)
     child = supervisor.children[component]
-    assert (child.state, child.restarts, supervisor.exit_code()) == (State.RUNNING, 1, None)
+    assert (child.state, child.restarts, supervisor.exit_code()) == (ChildState.RUNNING, 1, None)
 
 
 def test_a_silent_child_is_killed_and_started_again(world):
@@ -152,12 +152,12 @@ def test_a_silent_child_is_killed_and_started_again(world):
     passes(world, supervisor, 9)
     supervisor.heartbeat("capture")
     passes(world, supervisor, 9)
-    assert supervisor.children["capture"].state is State.RUNNING
+    assert supervisor.children["capture"].state is ChildState.RUNNING
     passes(world, supervisor, 1)
     assert ("kill", "capture") in world.events
-    assert supervisor.children["capture"].state is State.STALLED
+    assert supervisor.children["capture"].state is ChildState.STALLED
     passes(world, supervisor, 1)
-    assert supervisor.children["capture"].state is State.RUNNING
+    assert supervisor.children["capture"].state is ChildState.RUNNING
     assert supervisor.children["capture"].restarts == 1
 
 
@@ -168,7 +168,7 @@ def test_silence_is_said_within_two_seconds_long_before_the_child_is_killed(worl
     passes(world, supervisor, 1)
     assert child.reason == ""
     passes(world, supervisor, 1)
-    assert (child.state, child.reason) == (State.RUNNING, "no health for 2 s")
+    assert (child.state, child.reason) == (ChildState.RUNNING, "no health for 2 s")
     supervisor.heartbeat("record")
     assert child.reason == ""
 
@@ -224,11 +224,11 @@ def test_a_child_for_which_the_host_lacks_something_is_started_when_it_can_be(wo
     for _ in range(20):
         ends(world, supervisor, "capture", 1)
     capture = supervisor.children["capture"]
-    assert (capture.state, capture.restarts) == (State.BACKOFF, 1)
+    assert (capture.state, capture.restarts) == (ChildState.BACKOFF, 1)
     assert "cannot be started: [Errno 11]" in capture.reason
     world.lack = None
     passes(world, supervisor, 4)
-    assert capture.state is State.RUNNING
+    assert capture.state is ChildState.RUNNING
 
 
 def test_health_of_unknown_components_is_ignored(world):

@@ -2,7 +2,7 @@
 
 import pytest
 
-from abs_service.supervision.children.child import State
+from abs_service.supervision.children.child import ChildState
 from abs_service.supervision.exit_codes import Exit
 from tests.abs_service.supervision.fake_processes import S, World, ends, passes
 
@@ -16,7 +16,7 @@ def test_the_recorder_is_stopped_last(world):
     supervisor = world.supervisor("capture", "track/a", "record")
     supervisor.stop(world.wait)
     assert world.events == [("terminate", "capture"), ("terminate", "track/a"), ("terminate", "record")]
-    assert {child.state for child in supervisor.children.values()} == {State.STOPPED}
+    assert {child.state for child in supervisor.children.values()} == {ChildState.STOPPED}
     assert world.now_ns == 0
 
 
@@ -41,7 +41,7 @@ def test_a_renewed_process_ends_in_order_and_starts_again_which_counts_as_no_fai
         assert supervisor.exit_code() is None
         supervisor.poll()
     track = supervisor.children["track/a"]
-    assert (track.state, track.restarts, track.reason) == (State.RUNNING, 0, "")
+    assert (track.state, track.restarts, track.reason) == (ChildState.RUNNING, 0, "")
     assert world.events == 3 * [("terminate", "track/a")]
     assert [process.component for process in world.started] == ["capture", *4 * ["track/a"]]
 
@@ -64,21 +64,21 @@ def test_a_renewed_process_that_does_not_end_is_killed_and_one_that_was_given_up
     assert supervisor.exit_code() == Exit.USER
     supervisor.renew("record")
     supervisor.poll()
-    assert (supervisor.children["record"].state, supervisor.exit_code()) == (State.RUNNING, None)
+    assert (supervisor.children["record"].state, supervisor.exit_code()) == (ChildState.RUNNING, None)
     world.stubborn = {"record"}
     supervisor.renew("record")
     passes(world, supervisor, 3)
-    assert supervisor.children["record"].state == State.RENEWED
+    assert supervisor.children["record"].state == ChildState.RENEWED
     passes(world, supervisor, 1)
     assert world.events[-1] == ("kill", "record")
-    assert supervisor.children["record"].state == State.RUNNING
+    assert supervisor.children["record"].state == ChildState.RUNNING
 
 
 def test_a_rig_that_is_stopped_does_not_start_what_was_to_be_renewed(world):
     supervisor = world.supervisor("capture")
     supervisor.renew("capture")
     supervisor.stop(world.wait)
-    assert (supervisor.children["capture"].state, len(world.started)) == (State.STOPPED, 1)
+    assert (supervisor.children["capture"].state, len(world.started)) == (ChildState.STOPPED, 1)
 
 
 def test_a_process_that_finalises_its_file_is_not_told_twice_to_end(world):
@@ -100,7 +100,7 @@ def test_a_second_reload_gives_a_process_no_more_time(world):
         supervisor.renew("record")
         passes(world, supervisor, 1)
     assert world.events[-1] == ("kill", "record")
-    assert supervisor.children["record"].state is State.RUNNING
+    assert supervisor.children["record"].state is ChildState.RUNNING
 
 
 def renews(world, supervisor, component, code):
@@ -110,7 +110,7 @@ def renews(world, supervisor, component, code):
     world.latest(component).code = code
     passes(world, supervisor, 5)
     world.stubborn = set()
-    assert supervisor.children[component].state is State.RUNNING
+    assert supervisor.children[component].state is ChildState.RUNNING
 
 
 @pytest.mark.parametrize(("code", "worst"), [(0, 0), (1, 1), (143, 143), (-11, 139), (None, 137)])

@@ -9,7 +9,7 @@ import pytest
 from abs_service import cli
 from abs_service.bus import session
 from abs_service.bus.security.mutual_tls import MutualTls, TlsError
-from abs_service.bus.session import BusError, Role, check_endpoint, open_session
+from abs_service.bus.session import BusError, SessionMode, check_endpoint, open_session
 from tests.conftest import encrypted
 
 
@@ -97,10 +97,10 @@ def test_a_name_that_is_no_role_is_refused(lab):
 
 
 def test_a_certificate_that_ends_soon_is_warned_of(keys, endpoint, caplog, monkeypatch):
-    open_session(encrypted(endpoint), Role.ROUTER, security=tls(keys, "rig")).close()
+    open_session(encrypted(endpoint), SessionMode.ROUTER, security=tls(keys, "rig")).close()
     assert caplog.text == ""
     monkeypatch.setattr(session, "CERTIFICATE_ENDS", timedelta(days=400))
-    open_session(encrypted(endpoint), Role.ROUTER, security=tls(keys, "rig")).close()
+    open_session(encrypted(endpoint), SessionMode.ROUTER, security=tls(keys, "rig")).close()
     assert 'the certificate "rig" ends on 20' in caplog.text
 
 
@@ -111,16 +111,16 @@ def test_tls_wants_an_endpoint_of_tls(keys):
 
 def test_a_client_that_does_not_trust_the_router_says_so(tmp_path, secured, endpoint, monkeypatch):
     monkeypatch.setattr(session, "CONNECT_TIMEOUT_MS", 500)
-    secured("rig", Role.ROUTER)
+    secured("rig", SessionMode.ROUTER)
     assert cli.main(["keys", str(tmp_path / "new"), "--only", "viewer"]) == 0
     message = f'bus.endpoint = "{encrypted(endpoint)}": its certificate is refused here: '
     with pytest.raises(BusError, match=message):
-        open_session(encrypted(endpoint), Role.CLIENT, security=tls(tmp_path / "new"))
+        open_session(encrypted(endpoint), SessionMode.CLIENT, security=tls(tmp_path / "new"))
 
 
 def test_a_router_that_refuses_a_client_says_why(keys, lab, secured, endpoint):
     """A client that trusts the router, but is of another authority."""
-    secured("rig", Role.ROUTER)
+    secured("rig", SessionMode.ROUTER)
     assert cli.main(["keys", str(lab / "new"), "--only", "viewer"]) == 0
     mixed = MutualTls(keys / "authority.pem", lab / "new" / "viewer.pem", lab / "new" / "viewer.key")
     assert mixed.refusal(encrypted(endpoint)).startswith("it refuses this certificate: tls")
@@ -129,6 +129,6 @@ def test_a_router_that_refuses_a_client_says_why(keys, lab, secured, endpoint):
 
 def test_a_client_without_tls_is_refused(secured, endpoint, monkeypatch):
     monkeypatch.setattr(session, "CONNECT_TIMEOUT_MS", 500)
-    secured("rig", Role.ROUTER)
+    secured("rig", SessionMode.ROUTER)
     with pytest.raises(BusError, match="nothing answers there"):
-        open_session(endpoint.replace("127.0.0.1", "localhost"), Role.CLIENT)
+        open_session(endpoint.replace("127.0.0.1", "localhost"), SessionMode.CLIENT)

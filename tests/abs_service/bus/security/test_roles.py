@@ -12,7 +12,7 @@ from abs_service.bus import keys as topics
 from abs_service.bus.contract import EVENTS, STATE
 from abs_service.bus.health import Health
 from abs_service.bus.security import roles
-from abs_service.bus.session import Role, open_session
+from abs_service.bus.session import SessionMode, open_session
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.wire import commands, control_commands
 from tests.abs_service.bus.loopback import LoopbackBus
@@ -48,7 +48,7 @@ PUBLISHERS = {
 
 @pytest.fixture
 def rig(secured):
-    return secured("rig", Role.ROUTER)
+    return secured("rig", SessionMode.ROUTER)
 
 
 def received(bus, pattern="**"):
@@ -122,7 +122,7 @@ def test_late_joiners_get_the_history_of_estimates(rig, secured, keys, endpoint)
     publisher = secured("tracker").publisher("sheet/state", "m", STATE)
     publisher.put(b"before")
     arrived = []
-    session = open_session(encrypted(endpoint), Role.CLIENT, security=mutual_tls(keys, "viewer"))
+    session = open_session(encrypted(endpoint), SessionMode.CLIENT, security=mutual_tls(keys, "viewer"))
     subscriber = ext.declare_advanced_subscriber(
         session,
         "abs/demo/sheet/state",

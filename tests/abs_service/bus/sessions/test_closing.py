@@ -9,16 +9,16 @@ import pytest
 import zenoh
 
 from abs_service.bus import zenoh_bus
-from abs_service.bus.session import Role
+from abs_service.bus.session import SessionMode
 from abs_service.bus.zenoh_bus import ZenohBus
 
 
 def test_a_process_with_everything_declared_ends_at_once(endpoint):
     program = f"""
 from abs_service.bus.contract import STATE
-from abs_service.bus.session import Role
+from abs_service.bus.session import SessionMode
 from abs_service.bus.zenoh_bus import ZenohBus
-with ZenohBus.open("demo", "{endpoint}", Role.ROUTER) as bus:
+with ZenohBus.open("demo", "{endpoint}", SessionMode.ROUTER) as bus:
     bus.subscribe("**", print)
     bus.watch_liveliness(print)
     bus.latched_publisher("config", "absmsg.v1.Config").put(b"x")
@@ -29,10 +29,10 @@ with ZenohBus.open("demo", "{endpoint}", Role.ROUTER) as bus:
 
 
 def test_closing_twice_is_fine(endpoint):
-    bus = ZenohBus.open("demo", endpoint, Role.ROUTER, shared_memory=False)
+    bus = ZenohBus.open("demo", endpoint, SessionMode.ROUTER, shared_memory=False)
     bus.close()
     bus.close()
-    with ZenohBus.open("demo", endpoint, Role.ROUTER) as again:  # which it can only once the endpoint is free
+    with ZenohBus.open("demo", endpoint, SessionMode.ROUTER) as again:  # which it can only once the endpoint is free
         assert list(again.query("**", 0.1)) == []
 
 
@@ -73,7 +73,7 @@ def test_a_process_ends_though_a_callback_waits_for_ever(endpoint):
 import threading
 from abs_service import cli
 from abs_service.bus.contract import EVENTS
-from abs_service.bus.session import Role
+from abs_service.bus.session import SessionMode
 from abs_service.bus.zenoh_bus import ZenohBus
 
 def main():
@@ -81,7 +81,7 @@ def main():
     def wait_for_ever(sample):
         entered.set()
         threading.Event().wait()
-    with ZenohBus.open("demo", "{endpoint}", Role.ROUTER) as bus:
+    with ZenohBus.open("demo", "{endpoint}", SessionMode.ROUTER) as bus:
         bus.subscribe("x", wait_for_ever)
         publisher = bus.publisher("x", "m", EVENTS)
         while not entered.wait(0.02):

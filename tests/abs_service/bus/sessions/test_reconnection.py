@@ -8,7 +8,7 @@ import pytest
 import zenoh
 from abs_client.connection.link import client_settings
 
-from abs_service.bus.session import Role, open_session
+from abs_service.bus.session import SessionMode, open_session
 from drivers.remote.address import Address
 from drivers.remote.link import open_link
 
@@ -16,7 +16,7 @@ from drivers.remote.link import open_link
 PATIENCE_S = 5.0
 
 CLIENTS = {
-    "bus": lambda endpoint: open_session(endpoint, Role.CLIENT),
+    "bus": lambda endpoint: open_session(endpoint, SessionMode.CLIENT),
     "remote": lambda endpoint: open_link(Address(port=int(endpoint.rpartition(":")[2]))),
     "client": lambda endpoint: zenoh.open(zenoh.Config.from_json5(json.dumps(client_settings(endpoint)))),
 }
@@ -24,7 +24,7 @@ CLIENTS = {
 
 @pytest.mark.parametrize("client", CLIENTS)
 def test_a_try_that_gets_no_answer_does_not_keep_from_the_next(client, endpoint):
-    router = open_session(endpoint, Role.ROUTER)
+    router = open_session(endpoint, SessionMode.ROUTER)
     with closing(CLIENTS[client](endpoint)):
         router.close()
         # As a network that is cut: the question is accepted and never answered.

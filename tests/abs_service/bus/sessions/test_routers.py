@@ -7,7 +7,7 @@ import pytest
 
 from abs_service.bus.contract import STATE
 from abs_service.bus.security.mutual_tls import MutualTls
-from abs_service.bus.session import BusError, Role
+from abs_service.bus.session import BusError, SessionMode
 from abs_service.bus.zenoh_bus import ZenohBus
 from abs_service.config import ConfigError, load
 from tests.conftest import encrypted
@@ -25,8 +25,8 @@ def lab():
 def rigs(lab):
     """Routers of two rigs that connect to the lab's, which is not there yet."""
     with (
-        ZenohBus.open("left", free_endpoint(), Role.ROUTER, routers=[lab]) as left,
-        ZenohBus.open("right", free_endpoint(), Role.ROUTER, routers=[lab]) as right,
+        ZenohBus.open("left", free_endpoint(), SessionMode.ROUTER, routers=[lab]) as left,
+        ZenohBus.open("right", free_endpoint(), SessionMode.ROUTER, routers=[lab]) as right,
     ):
         yield {"left": left, "right": right}
 
@@ -47,15 +47,18 @@ def arrives(sender, receiver):
 
 def test_a_client_of_the_lab_reads_every_rig_also_after_the_labs_router_began_anew(rigs, lab):
     for _ in range(2):
-        with ZenohBus.open("lab", lab, Role.ROUTER):
+        with ZenohBus.open("lab", lab, SessionMode.ROUTER):
             for name, bus in rigs.items():
-                with ZenohBus.open(name, lab, Role.CLIENT) as reader:
+                with ZenohBus.open(name, lab, SessionMode.CLIENT) as reader:
                     assert arrives(bus, reader), name
 
 
 def test_a_rig_works_without_the_labs_router(lab):
     own = free_endpoint()
-    with ZenohBus.open("left", own, Role.ROUTER, routers=[lab]) as bus, ZenohBus.open("left", own, Role.CLIENT) as near:
+    with (
+        ZenohBus.open("left", own, SessionMode.ROUTER, routers=[lab]) as bus,
+        ZenohBus.open("left", own, SessionMode.CLIENT) as near,
+    ):
         assert arrives(bus, near)
 
 
@@ -65,16 +68,16 @@ def test_a_viewer_of_the_lab_reads_a_rig_over_mutual_tls(keys):
 
     lab, own = encrypted(free_endpoint()), encrypted(free_endpoint())
     with (
-        ZenohBus.open("lab", lab, Role.ROUTER, security=secured("rig")),
-        ZenohBus.open("left", own, Role.ROUTER, security=secured("rig"), routers=[lab]) as bus,
-        ZenohBus.open("left", lab, Role.CLIENT, security=secured("viewer")) as reader,
+        ZenohBus.open("lab", lab, SessionMode.ROUTER, security=secured("rig")),
+        ZenohBus.open("left", own, SessionMode.ROUTER, security=secured("rig"), routers=[lab]) as bus,
+        ZenohBus.open("left", lab, SessionMode.CLIENT, security=secured("viewer")) as reader,
     ):
         assert arrives(bus, reader)
 
 
 def test_a_malformed_router_is_explained():
     with pytest.raises(BusError, match=r'bus\.routers = "lab:7447": not an endpoint'):
-        ZenohBus.open("left", free_endpoint(), Role.ROUTER, routers=["lab:7447"])
+        ZenohBus.open("left", free_endpoint(), SessionMode.ROUTER, routers=["lab:7447"])
 
 
 def test_with_tls_every_router_has_it(tmp_path):

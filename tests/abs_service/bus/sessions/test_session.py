@@ -8,13 +8,13 @@ import threading
 import pytest
 import zenoh
 
-from abs_service.bus.session import BusError, Role, UnansweredError, check_endpoint, open_session
+from abs_service.bus.session import BusError, SessionMode, UnansweredError, check_endpoint, open_session
 
 
 @pytest.mark.parametrize(
     "endpoint", ["", "7447", "tcp/127.0.0.1", "tcp/127.0.0.1:99999", "tcp/127.0.0.1:0", "ftp/127.0.0.1:1", "tcp/a b:1"]
 )
-@pytest.mark.parametrize("role", Role)
+@pytest.mark.parametrize("role", SessionMode)
 def test_a_malformed_endpoint_is_explained(endpoint, role):
     with pytest.raises(BusError, match=r'bus\.endpoint = ".*": not an endpoint; write PROTOCOL/HOST:PORT'):
         open_session(endpoint, role)
@@ -30,23 +30,23 @@ def test_a_port_in_use_is_explained(open_bus, endpoint):
     with pytest.raises(
         BusError, match=rf'bus.endpoint = "{endpoint}": the address is in use; .* set endpoint in the table \[bus\]'
     ):
-        open_session(endpoint, Role.ROUTER)
+        open_session(endpoint, SessionMode.ROUTER)
 
 
 def test_a_router_that_is_not_there_is_explained(endpoint, monkeypatch):
     monkeypatch.setattr("abs_service.bus.session.CONNECT_TIMEOUT_MS", 200)
     with pytest.raises(UnansweredError, match=f'bus.endpoint = "{endpoint}": nothing answers there'):
-        open_session(endpoint, Role.CLIENT)
+        open_session(endpoint, SessionMode.CLIENT)
 
 
 def test_an_unknown_host_is_explained_without_the_source_of_zenoh():
     with pytest.raises(BusError, match="cannot listen there") as error:
-        open_session("tcp/no-such-host.invalid:7447", Role.ROUTER)
+        open_session("tcp/no-such-host.invalid:7447", SessionMode.ROUTER)
     assert ".rs" not in str(error.value)
 
 
 def test_a_sender_whose_wall_clock_is_ahead_fills_no_log(endpoint, capfd):
-    with open_session(endpoint, Role.ROUTER) as router, open_session(endpoint, Role.CLIENT) as client:
+    with open_session(endpoint, SessionMode.ROUTER) as router, open_session(endpoint, SessionMode.CLIENT) as client:
         arrived = threading.Event()
         subscriber = router.declare_subscriber("abs/x/y", lambda _: arrived.set())
         client.put("abs/x/y", b"", timestamp=zenoh.Timestamp.parse_rfc3339("2099-01-01T00:00:00.000000000Z/33"))
@@ -56,7 +56,7 @@ def test_a_sender_whose_wall_clock_is_ahead_fills_no_log(endpoint, capfd):
 
 
 def test_lines_of_zenoh_have_no_escape_sequences_where_no_terminal_is(endpoint):
-    code = f"from abs_service.bus.session import Role, open_session; open_session({endpoint!r}, Role.ROUTER).close()"
+    code = f"import abs_service.bus.session as s; s.open_session({endpoint!r}, s.SessionMode.ROUTER).close()"
     environment = {name: text for name, text in os.environ.items() if name != "NO_COLOR"} | {"RUST_LOG": "info"}
     done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
     said = done.stdout + done.stderr

@@ -6,7 +6,7 @@ from functools import partial
 import pytest
 
 from abs_service import cli
-from abs_service.bus.session import Role
+from abs_service.bus.session import SessionMode
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.bus.zenoh_bus import ZenohBus
 from abs_service.commands.processes import capture
@@ -88,7 +88,7 @@ def test_controls_of_a_device_are_set_while_it_is_captured(captured, endpoint):
 
     def ask():
         try:
-            with ZenohBus.open("demo", endpoint, Role.CLIENT) as bus:
+            with ZenohBus.open("demo", endpoint, SessionMode.CLIENT) as bus:
                 send = partial(set_controls, bus, "cam", HeaderFactory("demo", WallClock()), 1.0)
                 eventually(lambda: (answer := send({})) is not None and answer.accepted)
                 answers.append(send({"exposure_s": 0.02}))

@@ -11,7 +11,7 @@ import numpy as np
 from abs_service.bus import keys
 from abs_service.bus.contract import Subscription
 from abs_service.bus.frames import FramePublisher
-from abs_service.bus.session import Role
+from abs_service.bus.session import SessionMode
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.bus.zenoh_bus import ZenohBus
 from abs_service.capture import sensor_metadata
@@ -32,7 +32,7 @@ LASTS = 20
 class Peer:
     """Publishes the frames of one rig, with fault injection."""
 
-    def __init__(self, rig: str, endpoint: str, role: Role) -> None:
+    def __init__(self, rig: str, endpoint: str, role: SessionMode) -> None:
         self.bus = ZenohBus.open(rig, endpoint, role, shared_memory=False)
         headers = HeaderFactory(rig, WallClock())
         self.publisher = FramePublisher(self.bus, headers, "sim")
@@ -91,8 +91,8 @@ class RemoteBench:
     def __init__(self, port: int) -> None:
         endpoint = f"tcp/127.0.0.1:{port}"
         self.port = port
-        self.first = Peer("bench", endpoint, Role.ROUTER)
-        self.second = Peer("other", endpoint, Role.CLIENT)
+        self.first = Peer("bench", endpoint, SessionMode.ROUTER)
+        self.second = Peer("other", endpoint, SessionMode.CLIENT)
 
     def open(self, fault: Fault = Fault.NONE) -> Device:
         self.first.heal()
