@@ -24,6 +24,18 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 EXTRAS = PROJECT["project"]["optional-dependencies"]
 OPTIONAL = [line for extra in EXTRAS.values() for line in extra]
 
+#: Most entries of a folder, and folders that have one entry of each kind and may have more.
+MAX_ENTRIES = 15
+COLLECTIONS = (
+    "abs_service",
+    "docs/decisions",
+    "docs/how-to",
+    "drivers",
+    "examples/rigs",
+    "proto/absmsg/v1",
+    "tests/drivers",
+)
+
 # Where a path means the same on every Linux machine.
 STANDARD = re.compile(r"/(bin|dev|etc|lib|opt|proc|run|sbin|srv|sys|usr|var)/")
 ABSOLUTE_PATH = re.compile(r"(?<![\w./:~$}-])(?:/[\w.+-]+){2,}")
@@ -104,6 +116,15 @@ def test_files_and_functions_are_short_enough_to_read_at_once() -> None:
             if function.lines > limit:
                 long.append(f"{path}: {function.name} has {function.lines} lines, the limit is {limit}")
     assert long == []
+
+
+def test_a_folder_is_short_enough_to_read_at_once() -> None:
+    entries: dict[str, set[str]] = {}
+    for path in (Path(name) for name, _ in _tracked_texts() if not name.endswith("__init__.py")):
+        for folder in path.parents[:-1]:
+            entries.setdefault(folder.as_posix(), set()).add(path.relative_to(folder).parts[0])
+    long = [f"{folder} has {len(names)} entries" for folder, names in entries.items() if len(names) > MAX_ENTRIES]
+    assert [line for line in long if line.partition(" ")[0] not in COLLECTIONS] == []
 
 
 def test_kernels_copy_no_array_into_another_by_an_assignment() -> None:

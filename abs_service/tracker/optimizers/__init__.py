@@ -1,1 +1,1 @@
-"""Searches behind ask and tell, one per file; a rig file names them with `type`."""
+"""Searches behind ask and tell, one per file; a rig file names them with `type`. `cma.py` is the one to copy."""
