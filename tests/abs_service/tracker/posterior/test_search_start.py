@@ -26,7 +26,7 @@ def observed() -> tuple[FramePosterior, np.ndarray]:
 def predicting(frame: FramePosterior, theta: np.ndarray) -> FramePosterior:
     """The same cost with another prediction, and a narrow prior around it, as after a calm time."""
     return frame.with_motion(
-        replace(frame.motion, theta=theta, speed=frame.motion.settings.least_speed, is_first=False)
+        replace(frame.motion, theta=theta, speed=frame.motion.settings.minimum_speed, is_first=False)
     )
 
 
