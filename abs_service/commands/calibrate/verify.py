@@ -3,6 +3,7 @@
   abs-service calibrate verify rig.toml recordings/board.mcap --target board.toml
   abs-service calibrate verify lab.calibration.toml rig.toml --target board.toml            live, 15 different views
   abs-service calibrate verify lab.toml --images tof='t-*.png' --images color='c-*.png' --target board.toml
+  abs-service calibrate verify lab.toml board.corners.npz --target board.toml               corners that capture saved
   abs-service calibrate verify rig.toml recordings/board.mcap --target board.toml --json
 
 Live, hold the board still for a moment, change its pose, hold it still again; it ends after so many views, or with
@@ -19,7 +20,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from abs_service.calibration.cameras import verification
-from abs_service.calibration.files import target_file
+from abs_service.calibration.files import corner_file, target_file
 from abs_service.calibration.files.rig_file import RigCalibration
 from abs_service.calibration.shots import image_sizes, unseen
 from abs_service.calibration.shots.corner_extraction import BoardObservations, see
@@ -44,7 +45,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the arguments of `abs-service calibrate verify`."""
     parser.add_argument("calibration", metavar="RIG_OR_CALIBRATION", type=Path, help="TOML file of either kind")
     parser.add_argument(
-        "source", metavar="SOURCE", nargs="?", type=Path, help="recording of the board (.mcap), or rig (.toml): live"
+        "source",
+        metavar="SOURCE",
+        nargs="?",
+        type=Path,
+        help="recording of the board (.mcap), corners (.npz), or rig (.toml): live",
     )
     parser.add_argument(
         "--images", metavar="NAME=GLOB", action="append", default=[], help="images of a sensor in a folder; repeatable"
@@ -97,10 +102,24 @@ def _look(arguments: argparse.Namespace, target: Target, known: RigCalibration) 
                 raise VerifyOptionError(f"--images {name}={pattern}: {reason}")
         folders = [*dict.fromkeys(Path(pattern).parent for pattern in patterns.values())]
         return _see_all(arguments, target, FolderShots(patterns), cameras), folders
+    if corner_file.is_corner_file(arguments.source):
+        return _saved(arguments, target, cameras), [arguments.source]
     if live.is_live(arguments.source):
         return _see_live(arguments, target, cameras), [arguments.source]
     shots = RecordingShots(Recording(arguments.source), arguments.every, cameras=cameras)
     return _see_all(arguments, target, shots, cameras), [arguments.source]
+
+
+def _saved(arguments: argparse.Namespace, target: Target, cameras: Mapping[str, Camera]) -> BoardObservations:
+    """Saved detections, in images of the size that the stored cameras are for."""
+    seen = corner_file.read(arguments.source, target)
+    for name, size in seen.sizes.items():
+        if name in cameras and size != (stored := (cameras[name].width, cameras[name].height)):
+            raise VerifyOptionError(
+                f"{arguments.source}: images of {name} have {size[0]} × {size[1]} pixels, but its camera in "
+                f"{arguments.calibration} is for {stored[0]} × {stored[1]}"
+            )
+    return skipping.kept_of(seen, arguments.skip)
 
 
 def _see_all(

@@ -62,10 +62,7 @@ def material(arguments: argparse.Namespace) -> Material:
     known = dict(calibrations.load(arguments.start).sensors) if arguments.start else {}
     source: Path | None = arguments.source
     if source is not None and (corner_file.is_corner_file(source) or mrcal_corners.is_vnl(source)):
-        seen = _saved(arguments, target, known)
-        numbers = sorted({view.shot for view in seen.corners})
-        shots = skipping.kept([Shot(number, {}) for number in numbers], arguments.skip, None)
-        return _checked(seen.of_shots([shot.number for shot in shots]), known, (source,))
+        return _checked(skipping.kept_of(_saved(arguments, target, known), arguments.skip), known, (source,))
     with ExitStack() as stack:
         shots, cameras, data = _shots(arguments, {name: each.camera for name, each in known.items()}, stack)
         known = {name: known.get(name, SensorCalibration(camera, factory=camera)) for name, camera in cameras.items()}

@@ -4,6 +4,7 @@ import argparse
 from collections.abc import Iterable, Iterator, Set
 from pathlib import Path
 
+from abs_service.calibration.shots.corner_extraction import BoardObservations
 from abs_service.calibration.shots.shots import Shot
 from abs_service.commands.calibrate.inputs import live
 
@@ -55,3 +56,13 @@ def kept(shots: Iterable[Shot], skipped: Set[int], source: Path | None) -> Itera
     if unknown := sorted(skipped - {*seen}):
         there = f"they are numbered from {min(seen)} to {max(seen)}" if seen else "there are none"
         raise SkipError(f"--skip {text(skipped)}: there is no shot {unknown[0]}; {there}")
+
+
+def kept_of(seen: BoardObservations, skipped: Set[int]) -> BoardObservations:
+    """Saved detections without those of the shots to leave out.
+
+    Raises:
+        SkipError: one of them does not exist.
+    """
+    numbers = sorted({view.shot for view in (*seen.corners, *seen.planes)})
+    return seen.of_shots([shot.number for shot in kept([Shot(number, {}) for number in numbers], skipped, None)])

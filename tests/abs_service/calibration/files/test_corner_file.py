@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from abs_service import cli
-from abs_service.calibration.files import corner_file, mrcal_corners, target_file
+from abs_service.calibration.files import corner_file, mrcal_corners, rig_file, target_file
 from abs_service.calibration.files.corner_file import CornerFileError
 from abs_service.calibration.shots.corner_extraction import BoardObservations
 from abs_service.commands.calibrate.inputs import calibrations
+from abs_service.report.provenance import Provenance
 from calib.board.target import Chessboard
 from calib.formats import vnl
 from tests.calib.solve import board_views
@@ -145,3 +146,28 @@ def test_corners_of_mrcal_are_solved_without_images(
     assert cli.main(given) in (0, 1)
     truth = board_views.three_heads()["color"].camera
     assert calibrations.load(tmp_path / "x.toml").sensors["color"].camera.fx == pytest.approx(truth.fx, rel=0.01)
+
+
+def test_a_calibration_is_verified_by_saved_detections(
+    seen: BoardObservations, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    heads = board_views.three_heads()
+    cameras = {name: heads[name].camera for name in seen.sizes}
+    zoomed = {**cameras, "color": replace(cameras["color"], fx=930.0, fy=928.5)}
+    smaller = {**cameras, "color": replace(cameras["color"], width=640)}
+    corner_file.write(seen, tmp_path / "new.corners.npz")
+    target_file.write(BOARD, tmp_path / "board.toml")
+    given = [str(tmp_path / "new.corners.npz"), "--target", str(tmp_path / "board.toml")]
+    for name, stored, code, said in (
+        ("lab", cameras, 0, "light and color"),
+        ("zoomed", zoomed, 2, "color"),
+        ("smaller", smaller, 2, "images of color have 1280 × 720 pixels, but its camera in "),
+    ):
+        sensors = {sensor: rig_file.SensorCalibration(camera) for sensor, camera in stored.items()}
+        rig_file.write(
+            rig_file.RigCalibration("lab", sensors, Provenance("x", "2026-11-21")), tmp_path / f"{name}.toml"
+        )
+        assert cli.main(["calibrate", "verify", str(tmp_path / f"{name}.toml"), *given]) == code, name
+        assert said in "".join(capsys.readouterr())
+    assert cli.main(["calibrate", "verify", str(tmp_path / "lab.toml"), *given, "--skip", "99"]) == 2
+    assert "there is no shot 99" in capsys.readouterr().err
