@@ -122,6 +122,9 @@ def _rows(
 ) -> list[tuple[tuple[str, int, float], list[NDArray[np.float64]]]]:
     """Sensor, shot and time of every view, with its parts."""
     ends = np.cumsum(arrays[f"{kind}_count"])[:-1]
+    for part in parts:
+        if not np.isfinite(arrays[f"{kind}_{part}"]).all():
+            raise ValueError(f"{kind}_{part} holds values that are no numbers")
     split = [np.split(arrays[f"{kind}_{part}"], ends) for part in parts]
     places = zip(arrays[f"{kind}_sensor"], arrays[f"{kind}_shot"], arrays[f"{kind}_t_s"], strict=True)
     return [

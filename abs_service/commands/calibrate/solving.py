@@ -59,6 +59,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     skipping.add_argument(parser)
     parser.add_argument(
+        "--half", metavar="SHOTS", type=skipping.numbers, default=frozenset(),
+        help="shots of one half of the cross-validation, such as 0-9 (default: every other pose)",
+    )  # fmt: skip
+    parser.add_argument(
         "--shots", metavar="N", type=int, default=30, help="different views to wait for, live (%(default)d)"
     )
     parser.add_argument(
@@ -145,9 +149,13 @@ def _fixed(name: str, options: Iterable[str], kind: LensKind, sensors: Collectio
 
 def finish(title: str, task: Task, arguments: argparse.Namespace, found: Material) -> int:
     """Solves, cross-validates, writes calibration and report, and prints the verdict."""
+    if unknown := sorted(arguments.half - {*task.shots}):
+        raise SolveOptionError(f"--half {skipping.text(arguments.half)}: no shot {unknown[0]} shows the board")
     solution = calibrate(task, say)
     distance = arguments.distance or _middle_distance(solution.task.reference, solution)
-    assessment = with_kept(assess(solution, distance, arguments.needed, say), solution, arguments.needed)
+    assessment = with_kept(
+        assess(solution, distance, arguments.needed, say, arguments.half), solution, arguments.needed
+    )
     data = [path for path in (*found.data, arguments.target) if path.exists()]
     origin = provenance.trace(sys.argv[1:], data)
     name = re.sub(r"[^A-Za-z0-9_-]+", "_", arguments.out.name.partition(".")[0]) or "rig"

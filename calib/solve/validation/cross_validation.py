@@ -6,7 +6,7 @@ board stay in one half, as they share its errors. Each sensor's projection is co
 camera, and each pair of sensors from image to image.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import dataclass
 from itertools import permutations
 
@@ -52,13 +52,22 @@ class Agreement:
         return self.difference_px / max(self.predicted_px, 1e-12)
 
 
-def cross_validate(solution: Solution, distance: float, note: Callable[[str], None]) -> list[Agreement]:
+def cross_validate(
+    solution: Solution, distance: float, note: Callable[[str], None], half: Set[int] = frozenset()
+) -> list[Agreement]:
     """Calibrates halves of the shots separately and compares their projections at a distance [m].
 
+    Args:
+        solution: from all shots.
+        distance: at which projections are compared [m].
+        note: called with progress messages.
+        half: shots of the one half; every other pose if empty.
+
     Raises:
-        TooFewToSplitError: a half cannot be calibrated.
+        TooFewToSplitError: a half cannot be calibrated, or is not independent of the other one.
     """
-    first, second = (_half(solution, shots, note) for shots in _split(solution.task))
+    split = _chosen(solution.task, half) if half else _split(solution.task)
+    first, second = (_half(solution, shots, note) for shots in split)
     found = [
         _image(solution, first, second, name, distance)
         for name in solution.task.sensors
@@ -88,6 +97,20 @@ def _split(task: Task) -> tuple[Sequence[int], Sequence[int]]:
         [shot for shot in task.shots if of_shots[shot] in first],
         [shot for shot in task.shots if of_shots[shot] not in first],
     )
+
+
+def _chosen(task: Task, half: Set[int]) -> tuple[Sequence[int], Sequence[int]]:
+    """Shots of a half, and the others. A pose in both would have them agree about its errors."""
+    halves = [shot for shot in task.shots if shot in half], [shot for shot in task.shots if shot not in half]
+    first, second = ({task.poses[shot]: shot for shot in shots} for shots in halves)
+    if both := first.keys() & second.keys():
+        one = min(both)
+        raise TooFewToSplitError(
+            f"shots {first[one]} and {second[one]} show one pose of the board, which has to be in one half"
+        )
+    if min(len(first), len(second)) < MIN_POSES:
+        raise TooFewToSplitError(f"{len(first)} and {len(second)} distinct poses; each half needs {MIN_POSES} or more")
+    return halves
 
 
 def _runs(task: Task) -> Mapping[int, int]:

@@ -1,6 +1,6 @@
 """Verdict on a calibration, in words."""
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence, Set
 from dataclasses import dataclass
 
 import numpy as np
@@ -60,7 +60,11 @@ class Assessment:
 
 
 def assess(
-    solution: Solution, distance: float, needed_px: float, note: Callable[[str], None] = lambda _: None
+    solution: Solution,
+    distance: float,
+    needed_px: float,
+    note: Callable[[str], None] = lambda _: None,
+    half: Set[int] = frozenset(),
 ) -> Assessment:
     """Cross-validates and judges a solution.
 
@@ -69,6 +73,7 @@ def assess(
         distance: of the scene [m].
         needed_px: required accuracy of projections, 95 % of the time [px].
         note: called with progress messages.
+        half: shots of one half of the cross-validation; every other pose if empty.
     """
     images = {
         name: projection_uncertainty.image_uncertainty(solution, name, distance) for name in solution.task.sensors
@@ -85,7 +90,7 @@ def assess(
     reasons += weak_directions(solution, distance)
     reasons += outliers(solution, {one.shot for one in contradicting})
     try:
-        agreements = cross_validate(solution, distance, note)
+        agreements = cross_validate(solution, distance, note, half)
         reasons += _disagreeing(agreements, needed_px)
     except TooFewToSplitError as error:
         agreements = []

@@ -84,6 +84,7 @@ def test_options_that_do_not_fit_are_answered_with_what_would(
     [
         (["--lens", "colour=fisheye"], '--lens colour=fisheye: no sensor that saw the board, did you mean "color"?'),
         (["--sensor", "left"], "--sensor left: no sensor that saw the board, allowed: color"),
+        (["--half", "2-9"], "--half 2,3,4,5,6,7,8,9: no shot 6 shows the board"),
     ],
 )
 def test_options_that_would_be_ignored_are_refused(

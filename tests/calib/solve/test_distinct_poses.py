@@ -85,3 +85,14 @@ def test_four_poses_twice_are_four() -> None:
         solved(repeated(views()[:4], 2))
     with pytest.raises(TooFewToSplitError, match="6 distinct poses"):
         cross_validate(solved(repeated(views()[:6], 2)), 1.0, lambda _: None)
+
+
+def test_halves_that_are_chosen_share_no_pose_of_the_board() -> None:
+    solution = solved(repeated(views(10), 2))
+    (found,) = cross_validate(solution, 1.0, lambda _: None, {*range(10)})
+    (other,) = cross_validate(solution, 1.0, lambda _: None)
+    assert 0 < found.difference_px != other.difference_px
+    with pytest.raises(TooFewToSplitError, match="shots 10 and 11 show one pose"):
+        cross_validate(solution, 1.0, lambda _: None, {*range(11)})
+    with pytest.raises(TooFewToSplitError, match="3 and 7 distinct poses"):
+        cross_validate(solution, 1.0, lambda _: None, {*range(6)})

@@ -52,7 +52,15 @@ def test_what_is_not_of_this_board_or_damaged_is_refused(seen: BoardObservations
     np.savez(tmp_path / "b.corners.npz", version=np.array(1), sensors=np.array(["a"]))
     for name, content in (("c", b"no archive"), ("d", path.read_bytes()[:500])):
         (tmp_path / f"{name}.corners.npz").write_bytes(content)
-    for name, why in (("b", "damaged"), ("c", "no file of detections"), ("d", "no file"), ("e", "cannot be read")):
+    lost = [replace(view, pixels=np.full_like(view.pixels, np.nan)) for view in seen.corners]
+    corner_file.write(replace(seen, corners=tuple(lost)), tmp_path / "f.corners.npz")
+    for name, why in (
+        ("b", "damaged"),
+        ("f", "is damaged: corner_pixels holds values that are no numbers"),
+        ("c", "no file of detections"),
+        ("d", "no file"),
+        ("e", "cannot be read"),
+    ):
         with pytest.raises(CornerFileError, match=rf"{name}\.corners\.npz: .*{why}"):
             corner_file.read(tmp_path / f"{name}.corners.npz", BOARD)
 
