@@ -37,12 +37,14 @@ class OpticsChange:
         values, sigmas: relative change of the focal length, and that of cx and cy [px] (3,).
         shift_px: resulting shift of the corners [px], root mean square.
         squared: squared Mahalanobis distance; chi-squared with 3 degrees of freedom without a change.
+        unseen: largest relative change of the focal length alone that these views would not show.
     """
 
     values: Array
     sigmas: Array
     shift_px: float
     squared: float
+    unseen: float
 
     @property
     def is_significant(self) -> bool:
@@ -84,7 +86,9 @@ def optics_change(stored: Stored, views: Views, sensor: str) -> OpticsChange | N
     covariance += by_stored @ stored.covariance[np.ix_(rows, rows)] @ by_stored.T
     pixels = np.concatenate([view.pixels for view in own.corners]) - (camera.cx, camera.cy)
     shift = float(np.sqrt(np.mean(np.sum((step[0] * pixels + step[1:]) ** 2, axis=1))))
-    return OpticsChange(step, np.sqrt(np.diag(covariance)), shift, float(step @ np.linalg.solve(covariance, step)))
+    precision = np.linalg.inv(covariance)
+    unseen = float(np.sqrt(QUANTILE / precision[0, 0]))
+    return OpticsChange(step, np.sqrt(np.diag(covariance)), shift, float(step @ precision @ step), unseen)
 
 
 def _noise(poses: PoseInformation, directions: Array, step: Array, residuals: Array) -> Array:

@@ -5,9 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from abs_service.calibration.cameras import causes, new_views
+from abs_service.calibration.cameras import causes, fit_verdict, new_views
 from abs_service.calibration.cameras import verification_tables as tables
 from abs_service.calibration.cameras.causes import UNNOTICED_M, WRONG_M, Reach
+from abs_service.calibration.cameras.fit_verdict import SPOILT_PX, UNNOTICED_PX
 from abs_service.calibration.files.rig_file import RigCalibration
 from abs_service.calibration.shots.corner_extraction import BoardObservations
 from abs_service.report.content import Level, Report, Verdict
@@ -25,12 +26,6 @@ from calib.solve.validation.distance_errors import Displaced, Misread
 
 #: Expected reprojection error if the calibration does not contain its own [px].
 BASELINE_PX = 0.5
-
-#: Ratios to the expected reprojection error that are doubtful and bad.
-DOUBTFUL_RATIO, BAD_RATIO = 1.5, 3.0
-
-#: Image shifts that are negligible, and that are unacceptable [px].
-UNNOTICED_PX, SPOILT_PX = 0.3, 1.0
 
 #: Insignificant shift that is too large for a verdict: too few views [px].
 BLIND_PX = 2.0
@@ -107,7 +102,10 @@ def verify(known: RigCalibration, seen: BoardObservations, provenance: Provenanc
 def verdicts(found: Verification) -> list[Verdict]:
     """Verdicts, the worst first."""
     motion = max((_level(change) for change in found.changes if change.is_significant), default=Level.GOOD)
-    fits = [_of_fit(found, name) for name in found.fits]
+    fits = [
+        fit_verdict.of_fit(name, fit, found.expected_px[name], found.optics.get(name), found.likelier[name])
+        for name, fit in found.fits.items()
+    ]
     scatter = _of_scatter(found, max(one.level for one in fits))
     # Shots that do not agree with each other say nothing of a change that lasts.
     disagree = any(one.level == Level.BAD for one in scatter)
@@ -161,26 +159,6 @@ def _compared(stored: Stored, views: Views, changes: Sequence[PairChange]) -> Co
     wrong = {one.shot for one in contradicting(changes)}
     shots = [number for name in together for number in views.shots[name] if number not in wrong]
     return compare(stored, views.of(together, shots)) if together else NOT_COMPARED
-
-
-def _of_fit(found: Verification, name: str) -> Verdict:
-    rms, baseline, optics = found.fits[name].rms, found.expected_px[name], found.optics.get(name)
-    said = f"corners miss by {rms:.2f} px; {baseline:.2f} px are usual for it."
-    level = Level.GOOD
-    if rms > DOUBTFUL_RATIO * baseline and rms >= UNNOTICED_PX:
-        level = Level.BAD if rms > BAD_RATIO * baseline else Level.DOUBTFUL
-    if optics is not None and optics.is_significant and optics.shift_px > UNNOTICED_PX:
-        level = max(level, Level.BAD if optics.shift_px > SPOILT_PX else Level.DOUBTFUL)
-        said = f"{optics}; {said}"
-    if level == Level.GOOD:
-        return Verdict(level, f"still projects as it was calibrated: {said}", about=name)
-    advice = (
-        "Was it refocused, zoomed or set to another mode, is another board bent, or are these images of another "
-        "camera, cropped or resized? If it changed, calibrate its intrinsics again."
-    )
-    if likelier := found.likelier[name]:
-        advice = f"The camera of {likelier} fits these corners by far better: are they its images?"
-    return Verdict(level, f"no longer projects as it was calibrated: {said}", advice, name)
 
 
 def _of_bias(name: str, bias: DistanceBias) -> Verdict:

@@ -61,3 +61,18 @@ def test_nothing_is_said_of_optics_without_stored_deviations() -> None:
     known = replace(calibrated(), covariance=Covariance())
     found = verification.verify(known, seen(replace(CAMERA, fx=1.02 * CAMERA.fx, fy=1.02 * CAMERA.fy), 2), ORIGIN)
     assert found.level == Level.GOOD
+    assert "A changed focal length would not show" in found.verdicts[0].text
+
+
+def test_a_change_that_these_views_cannot_show_is_said_and_a_large_one_is_doubted() -> None:
+    (good,) = verified(CAMERA).verdicts
+    assert "A focal length changed by less than 1.1% would not show" in good.text
+    random = np.random.default_rng(2)
+    flat = random_boards(12, random)
+    for T_rb in flat.values():
+        T_rb[:3, :3] = np.eye(3)
+    views = look({"color": Head(CAMERA, 0.1)}, flat, random).corners
+    (blind,) = verification.verify(calibrated(), BoardObservations(tuple(views)), ORIGIN).verdicts
+    assert (blind.level, blind.about) == (Level.DOUBTFUL, "color")
+    assert "could not be compared well enough" in blind.text
+    assert blind.advice.startswith("Take more shots, the board tilted")
