@@ -27,8 +27,11 @@ _MOST = 80
 #: Markers stand as on a board if they are off by less than this share of a square, and three times less than otherwise.
 _OFF, _CLEARLY = 0.3, 3.0
 
-#: Tags are off by more than this share of their size if columns or rows are wrong; gaps, if these are.
+#: Tags are off by more than this share of their size if columns, rows or numbers are wrong; gaps, if these are.
 _OTHER_LAYOUT, _OTHER_GAP = 0.8, 0.15
+
+#: Share of the neighbours that may be misread. Of a grid that begins with another number, only one column is displaced.
+_MISREAD = 0.05
 
 #: Kalibr's tags have a wider frame than markers.
 _APRIL_GRID = "apriltag_36h11"
@@ -105,9 +108,10 @@ def require_grid(target: AprilGrid, points: NDArray[np.float64]) -> None:
         off.append(np.sqrt(np.sum((gap - target.gap / target.tag * tags) ** 2, axis=-1) / sizes).ravel())
     known = [each[np.isfinite(each)] for each in off]
     ratios = np.concatenate(gaps)
-    if any(len(each) and np.median(each) > _OTHER_LAYOUT for each in known):
+    if any(len(each) and np.mean(each > _OTHER_LAYOUT) > _MISREAD for each in known):
         raise OtherBoardError(
-            f"the tags do not stand as on a board of {target.columns} × {target.rows} tags. Are columns and rows right?"
+            f"the tags do not stand as on a board of {target.columns} × {target.rows} tags with number 0 in the lower "
+            "left corner. Are columns and rows right?"
         )
     ratio, said = float(np.nanmedian(ratios)) if np.isfinite(ratios).any() else np.nan, target.gap / target.tag
     if abs(ratio / said - 1) > _OTHER_GAP:

@@ -79,3 +79,15 @@ def test_a_whole_board_of_another_size_near_the_border_is_not_said_to_be_cut_off
     T_sb[0, 3] -= 0.27
     with pytest.raises(NothingFoundError):
         detect(Chessboard(8, 5, 0.03), as_bytes(photograph(board, VGA, T_sb)))
+
+
+def test_a_grid_that_begins_with_another_number_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    printed = cv2.aruco.generateImageMarker
+    monkeypatch.setattr(
+        cv2.aruco,
+        "generateImageMarker",
+        lambda tags, number, *size, **border: printed(tags, number + 1, *size, **border),
+    )
+    image = as_bytes(photograph(GRID, VGA, centered(GRID, (0.2, 0.1, 0.3), 0.42)))
+    with pytest.raises(OtherBoardError, match="with number 0 in the lower left corner"):
+        detect(GRID, image)
