@@ -105,6 +105,8 @@ def _columns(
 
 
 def _observations(arrays: Mapping[str, NDArray[Any]]) -> BoardObservations:
+    if not all((arrays[name] > 0).all() for name in ("corner_sigma_px", "plane_sigmas")):
+        raise ValueError("a deviation is not above 0")
     names = [str(name) for name in arrays["sensors"]]
     corners = [
         CornerView(*place, points_b, pixels, float(sigma_px))

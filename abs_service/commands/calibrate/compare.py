@@ -6,12 +6,13 @@
 Prints, for every camera that both have, how far their projections differ: a map over the image, and where the largest
 difference is. The small motion of the camera that best makes one of the other is subtracted, since a shifted principal
 point is nearly a rotation. With the corners from which one was solved, that is done where boards were seen, and the
-differences there and elsewhere are given apart: elsewhere a lens is extrapolated. Poses are not compared.
+differences there and elsewhere are given apart: elsewhere a lens is extrapolated. Where ONE or OTHER is a calibration
+file with covariances, it says how far two calibrations differ by chance, 95 % of the time. Poses are not compared.
 """
 
 import argparse
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -19,13 +20,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.calibration.files import corner_file
-from abs_service.commands.calibrate.inputs import camera_files
+from abs_service.calibration.files.rig_file import Covariance
+from abs_service.commands.calibrate.inputs import calibrations, camera_files
 from abs_service.config.problems import allowed_instead
 from abs_service.supervision.exit_codes import Exit
 from calib.camera import Camera
 from calib.formats import opencv
 from calib.formats.content import Hints
-from calib.solve.validation.projection_difference import DifferenceError, DifferenceMap, projection_difference
+from calib.solve.validation.projection_difference import DifferenceError, DifferenceMap, chance, projection_difference
 
 #: Every so many rows and columns of the map are printed.
 STEP = 2
@@ -64,7 +66,9 @@ def run(arguments: argparse.Namespace) -> int:
             difference = projection_difference(one[name], other[its_name], arguments.distance, corners.get(name))
         except DifferenceError as error:
             raise CompareError(f"{name}: {error}") from error
-        found[name] = _described(difference, arguments.corners is not None)
+        stated = [(arguments.one, name, one[name]), (arguments.other, its_name, other[its_name])]
+        by_chance = _chance(stated, arguments.distance, corners.get(name))
+        found[name] = _described(difference, by_chance, arguments.corners is not None)
         if not arguments.json:
             _print(f"{name} and {its_name}" if its_name != name else name, found[name], difference)
     if arguments.json:
@@ -98,7 +102,20 @@ def _corners(path: Path | None) -> Mapping[str, NDArray[np.float64]]:
     return {name: np.concatenate(pixels) for name, pixels in found.items()}
 
 
-def _described(difference: DifferenceMap, seen: bool) -> dict[str, Any]:
+def _chance(
+    stated: Iterable[tuple[Path, str, Camera]], distance: float, corners: NDArray[np.float64] | None
+) -> NDArray[np.float64]:
+    """Differences by chance, as the calibration files state them (rows, columns) [px]; (1, 1) zeros without."""
+    total = np.zeros((1, 1))
+    for path, name, camera in stated:
+        covariance = calibrations.load(path).covariance if path.suffix == ".toml" else Covariance()
+        if own := [k for k, each in enumerate(covariance.names) if each.startswith(f"{name}.")]:
+            names = [covariance.names[k].partition(".")[2] for k in own]
+            total = np.hypot(total, chance(camera, names, covariance.matrix[np.ix_(own, own)], distance, corners))
+    return total
+
+
+def _described(difference: DifferenceMap, by_chance: NDArray[np.float64], seen: bool) -> dict[str, Any]:
     """The differences of one camera, as JSON."""
     where = {"inside": difference.inside, "outside": ~difference.inside} if seen else {"image": difference.inside}
     parts = {name: difference.summary(mask) for name, mask in where.items()}
@@ -107,10 +124,24 @@ def _described(difference: DifferenceMap, seen: bool) -> dict[str, Any]:
         name: part and {"median_px": part[0], "largest_px": part[1], "at": list(part[2])}
         for name, part in parts.items()
     }
+    if by_chance.any():
+        known = np.isfinite(difference.differences)
+        for name, mask in where.items():
+            if described[name]:
+                place = np.all(difference.pixels == described[name]["at"], axis=2)
+                beyond = (difference.differences > by_chance)[mask & known]
+                described[name] |= {"chance_px": float(by_chance[place][0]), "beyond": float(beyond.mean())}
     return {**described, "map_px": [[value if np.isfinite(value) else None for value in row] for row in rows]}
 
 
 _WORDS = {"inside": "where boards were seen", "outside": "elsewhere", "image": "in the whole image"}
+
+
+def _beyond(part: Mapping[str, Any]) -> str:
+    """Clause on chance; "" if nothing is known of it."""
+    if "chance_px" not in part:
+        return ""
+    return f", by chance {part['chance_px']:.2g} px there (95 %); more than by chance in {part['beyond']:.0%} of it"
 
 
 def _print(name: str, found: Mapping[str, Any], difference: DifferenceMap) -> None:
@@ -120,7 +151,7 @@ def _print(name: str, found: Mapping[str, Any], difference: DifferenceMap) -> No
             column, row = one["at"]
             print(
                 f"  {words}: median {one['median_px']:.3g} px, "
-                f"largest {one['largest_px']:.3g} px at column {column:.0f}, row {row:.0f}"
+                f"largest {one['largest_px']:.3g} px at column {column:.0f}, row {row:.0f}{_beyond(one)}"
             )
     pixels, values = difference.pixels[::STEP, ::STEP], difference.differences[::STEP, ::STEP]
     print("  row\\column" + "".join(f"{column:8.0f}" for column in pixels[0, :, 0]))

@@ -5,6 +5,7 @@ the small rigid motion of the camera that best makes one calibration of the othe
 (the implied transformation of J. Chen's mrcal).
 """
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,11 +13,15 @@ from numpy.typing import NDArray
 
 from calib import pose
 from calib.camera import Camera
+from calib.solve.bundle.parameters.lens_parameters import MATRIX, kind_of
 from calib.solve.validation.projection_uncertainty import MotionCompensation, grid, viewing_directions
 from calib.solve.validation.support import in_hull
 
 #: Distances at which the motion is determined, in parts of the one that is asked for.
 VOLUME = (0.6, 1.0, 1.4)
+
+#: Number of cameras that are drawn from a covariance, and share of them that differ by less than chance.
+_DRAWS, _CHANCE = 100, 0.95
 
 
 class DifferenceError(ValueError):
@@ -91,3 +96,40 @@ def _changes(
     with np.errstate(invalid="ignore"):
         found[~(np.linalg.norm(found, axis=1) < max(one.width, one.height) / 2)] = np.nan
     return found
+
+
+def chance(
+    camera: Camera,
+    names: Sequence[str],
+    covariance: NDArray[np.float64],
+    distance: float,
+    corners: NDArray[np.floating] | None = None,
+) -> NDArray[np.float64]:
+    """Differences (rows, columns) [px] that 95 % of the calibrations stay below that are as uncertain as this one.
+
+    Args:
+        camera: the calibration.
+        names, covariance: of its estimated parameters (n,), (n, n); others than intrinsics are ignored.
+        distance, corners: as of `projection_difference`.
+    """
+    own = [k for k, name in enumerate(names) if name in kind_of(camera.lens).fixable]
+    values, vectors = np.linalg.eigh(covariance[np.ix_(own, own)])
+    names = [names[k] for k in own]
+    root, generator = vectors * np.sqrt(np.maximum(values, 0)), np.random.default_rng(0)
+    drawn = [
+        projection_difference(
+            camera, _moved(camera, dict(zip(names, root @ generator.standard_normal(len(names))))), distance, corners
+        ).differences
+        for _ in range(_DRAWS)
+    ]
+    return np.quantile(np.nan_to_num(drawn, nan=np.inf), _CHANCE, axis=0)
+
+
+def _moved(camera: Camera, steps: Mapping[str, float]) -> Camera:
+    """Camera with other intrinsics; a focal length fy that was not estimated stays in its ratio to fx."""
+    kind = kind_of(camera.lens)
+    lens = kind.make(np.array([value + steps.get(k, 0.0) for k, value in zip(kind.every, camera.lens.coefficients)]))
+    matrix = {name: getattr(camera, name) + steps.get(name, 0.0) for name in MATRIX}
+    if "fy" not in steps:
+        matrix["fy"] = camera.fy * matrix["fx"] / camera.fx
+    return replace(camera, lens=lens, **matrix)

@@ -51,6 +51,19 @@ def test_a_map_and_the_largest_difference_are_printed(compare, tmp_path: Path):
     assert found["image"]["largest_px"] == pytest.approx(np.nanmax(np.array(found["map_px"], float)), abs=1e-4)
 
 
+def test_differences_are_said_beside_those_of_chance(compare, tmp_path: Path):
+    covariance = rig_file.Covariance(("color.fx", "color.fy", "color.x"), np.diag([4.0, 4.0, 1e-6]))
+    sensors = {"color": rig_file.SensorCalibration(CAMERA)}
+    one = tmp_path / "one.toml"
+    rig_file.write(rig_file.RigCalibration("lab", sensors, Provenance("x", "2026-11-28"), covariance=covariance), one)
+    for other, beyond in ((replace(CAMERA, fx=501.0, fy=502.0), False), (OTHER, True)):
+        path = written(tmp_path / f"{beyond}.toml", color=other)
+        image = json.loads(compare(one, path, "--json")[1])["color"]["image"]
+        assert (image["largest_px"] > image["chance_px"]) == beyond
+        assert (image["beyond"] > 0.05) == beyond
+        assert " px there (95 %); more than by chance in " in compare(one, path)[1]
+
+
 def test_cameras_are_matched_by_name_or_as_told(compare, tmp_path: Path):
     one = written(tmp_path / "one.toml", a=CAMERA, b=CAMERA)
     same, none = (

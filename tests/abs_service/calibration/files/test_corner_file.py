@@ -54,8 +54,11 @@ def test_what_is_not_of_this_board_or_damaged_is_refused(seen: BoardObservations
         (tmp_path / f"{name}.corners.npz").write_bytes(content)
     lost = [replace(view, pixels=np.full_like(view.pixels, np.nan)) for view in seen.corners]
     corner_file.write(replace(seen, corners=tuple(lost)), tmp_path / "f.corners.npz")
+    exact = [replace(view, sigmas=np.zeros_like(view.sigmas)) for view in seen.planes]
+    corner_file.write(replace(seen, planes=tuple(exact)), tmp_path / "g.corners.npz")
     for name, why in (
         ("b", "damaged"),
+        ("g", "is damaged: a deviation is not above 0"),
         ("f", "is damaged: corner_pixels holds values that are no numbers"),
         ("c", "no file of detections"),
         ("d", "no file"),

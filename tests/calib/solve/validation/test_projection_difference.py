@@ -8,7 +8,7 @@ import pytest
 from calib import pose
 from calib.camera import Camera
 from calib.lenses.lens import Lens
-from calib.solve.validation.projection_difference import DifferenceError, projection_difference
+from calib.solve.validation.projection_difference import DifferenceError, chance, projection_difference
 
 CAMERA = Camera(640, 480, 500.0, 501.0, 322.0, 238.0, Lens(np.array([-0.2, 0.03])))
 
@@ -44,3 +44,14 @@ def test_what_cannot_be_compared_is_refused():
         projection_difference(CAMERA, replace(CAMERA, width=320, height=240), 1.0)
     with pytest.raises(DifferenceError, match="hardly a point"):
         projection_difference(CAMERA, CAMERA, 1.0, np.array([[10.0, 10], [12, 10], [12, 12]]))
+
+
+def test_chance_is_how_far_calibrations_of_a_covariance_differ():
+    names, sigmas = ("fx", "fy", "x", "k1"), np.array([2.0, 2.0, 0.1, 0.0])
+    correlated = np.outer(sigmas, sigmas) * [[1, 1, 0, 0], [1, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
+    found = chance(CAMERA, names, correlated, 1.0)
+    zoomed = replace(CAMERA, fx=CAMERA.fx + 1.96 * 2, fy=CAMERA.fy + 1.96 * 2)
+    expected = projection_difference(CAMERA, zoomed, 1.0).differences
+    assert found[0, 0] == pytest.approx(expected[0, 0], rel=0.2)
+    assert chance(CAMERA, ("x",), np.ones((1, 1)), 1.0).max() < 1e-6
+    assert chance(CAMERA, ("fx",), correlated[:1, :1], 1.0)[0, 0] == pytest.approx(expected[0, 0], rel=0.2)
