@@ -1,6 +1,7 @@
 """Shots from recordings, folders and devices, and what they show of a board, against the simulator's truth."""
 
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -15,6 +16,7 @@ from calib import pose
 from calib.board.corners import errors
 from calib.camera import Camera
 from calib.pose import Pose
+from drivers.contract.frame import Reference
 from drivers.opening import open_device
 from drivers.replay.recording import Recording
 from tests.abs_service.calibration.simulated import Filmed, record, scene
@@ -60,6 +62,26 @@ def test_a_recording_shows_corners_and_planes_where_they_truly_are(
         )
         assert abs(error.mean()) < 0.003
         assert 0.6 < np.sqrt(np.mean(np.square(error / view.sigmas))) < 1.6
+
+
+class Stamped(Filmed):
+    """Exposures of 4 ms, of which those of colour are stamped at the end and the others at the start."""
+
+    def frames(self):
+        for frame in super().frames():
+            at = Reference.END if frame.sensor == "color" else Reference.START
+            yield replace(frame, t_reference=at, exposure_s=0.004)
+
+
+def test_times_of_shots_are_those_of_the_middle_of_their_exposures(tmp_path: Path) -> None:
+    small = scene("chessboard", "sensors=tof,color", "rate=6", "color=160x120", "hold=1").simulation
+    given, stamped = (
+        next(iter(RecordingShots(Recording(record(films, tmp_path / f"{films.__class__.__name__}.mcap")))))
+        for films in (Filmed(small, 3), Stamped(small, 3))
+    )
+    for sensor, after_s in (("tof", 0.002), ("color", -0.002)):
+        apart = stamped.sensor_shots[sensor].t_ns - given.sensor_shots[sensor].t_ns
+        assert apart == pytest.approx(after_s * 1e9, abs=1e3)
 
 
 @pytest.mark.slow
