@@ -82,9 +82,11 @@ def _measured(found: NoiseCalibration) -> list[Verdict]:
     said = []
     for name, row in found.rows:
         sigma = typical_sigma(found.model, row.distance, row.amplitude)
-        scatter = float(np.hypot(row.temporal, np.nan_to_num(row.fixed)))
-        measured = max(scatter, row.step / math.sqrt(12))
-        if not measured / _MISS < sigma < measured * _MISS:
+        steps = row.step / math.sqrt(12)
+        measured = max(float(np.hypot(row.temporal, np.nan_to_num(row.fixed))), steps)
+        # What pixels differ by for good is no scatter about a mean offset of each pixel.
+        least = max(row.temporal, steps) if found.chosen.candidate.level == "pixel" else measured
+        if not least / _MISS < sigma < measured * _MISS:
             text = f"σ is {sigma * 1e3:.2g} mm at {row.distance:.2f} m, where {measured * 1e3:.2g} mm were measured."
             said.append(Verdict(Level.BAD, text, "Do not use the model there: look at its plot.", name))
     return said

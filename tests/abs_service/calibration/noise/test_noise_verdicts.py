@@ -58,3 +58,11 @@ def test_noise_much_smaller_than_the_steps_does_not_hide_them() -> None:
         of_steps = 2.85e-3 * distance**2 / np.sqrt(12)
         assert 0.6 < result.model.deviation(x, x, (rows, columns)).min() / of_steps < 1.5
     assert worst(result)[0] < Level.BAD
+
+
+def test_a_pattern_of_the_pixels_that_a_map_holds_is_no_noise_that_is_missed() -> None:
+    result = learnt("tof&tof=32x24&reflectivity=0.9&pattern=0.008", (0.8, 1.2, 1.6), 1e-3)
+    assert result.chosen.candidate.level == "pixel"
+    assert max(row.fixed / row.temporal for _, row in result.rows) > 2
+    assert worst(result)[0] < Level.BAD
+    assert worst(replace(result, model=Constant(2e-4)))[0] is Level.BAD
