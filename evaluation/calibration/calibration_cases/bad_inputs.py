@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from abs_service.commands.calibrate import calibrations
+from abs_service.commands.calibrate.inputs import calibrations
 from calib.board.views import CornerView
 from evaluation.calibration.calibration_cases.case import Bench, Case, Outcome
 from evaluation.experiment import at_least, at_most

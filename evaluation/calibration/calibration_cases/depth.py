@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from abs_service.commands.calibrate import calibrations
+from abs_service.commands.calibrate.inputs import calibrations
 from calib import pose
 from calib.board.target import Chessboard
 from calib.camera import Camera

@@ -109,9 +109,9 @@ def map_of_pixels(bench: Bench) -> Outcome:
     }
     said = _noise_of(bench, images, 1.0)
     model = _model(bench)
-    where = tuple(part.ravel() for part in np.indices((36, 48)))
+    rows, columns = (part.ravel() for part in np.indices((36, 48)))
     x = np.full(offsets.size, 1.2)
-    found = model.deviation(x, x, where) / (0.001 / np.sqrt(12))
+    found = model.deviation(x, x, (rows, columns)) / (0.001 / np.sqrt(12))
     kind = "map of pixels" if isinstance(model, PerPixel) else "no map"
     return Outcome(
         f"{found.min():.2f} ({kind}), exit code {said.code}",
