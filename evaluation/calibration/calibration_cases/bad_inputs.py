@@ -22,7 +22,7 @@ _TRACEBACK = 99
 def cases() -> tuple[Case, ...]:
     """Exit codes of ten bad inputs, of a doubtful set and of a good one."""
     return (
-        Case("Exit codes: ten inputs that no calibration can come from", "–", refused),
+        Case("Exit codes: ten inputs that no calibration can come from", "–", refused, brief=False),
         Case("Exit codes: 16 tilted views; 16 views without tilt", "–", judged, brief=False),
     )
 

@@ -45,8 +45,8 @@ def long_distances(bench: Bench) -> Outcome:
 def long_at_one_distance(bench: Bench) -> Outcome:
     """Boards at one distance, where a scale looks like an offset."""
     found = _verified(bench, 0.95, 1.05)
-    told = "cannot tell" in (bench.folder / "said.txt").read_text(encoding="utf-8")
-    return replace(found, goals=(*found.goals, at_least("says what cannot be told apart", told, 1)))
+    reported = "cannot tell" in (bench.folder / "said.txt").read_text(encoding="utf-8")
+    return replace(found, goals=(*found.goals, at_least("says what cannot be told apart", reported, 1)))
 
 
 def _verified(bench: Bench, near: float, far: float) -> Outcome:

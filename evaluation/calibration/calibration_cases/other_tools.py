@@ -41,11 +41,12 @@ def cases() -> tuple[Case, ...]:
                 f"Other tools: {name}, 12 rendered images, error of fx",
                 missing,
                 lambda bench, b=board: rendered(bench, b),
+                brief=False,
             )
             for name, board in _BOARDS.items()
         ),
         Case("Other tools: --fix k3,aspect", missing, fixed),
-        Case("Other tools: saved corners, ours and mrcal's, solved without images", missing, saved),
+        Case("Other tools: saved corners, ours and mrcal's, solved without images", missing, saved, brief=False),
         Case(
             f"Other tools: fisheye lenses of {_WIDE}°, stereographic and equisolid",
             "no more than four coefficients",
