@@ -23,7 +23,7 @@ from calib.noise.tof_amplitude import TofAmplitude
 from calib.rig import Rig
 from drivers.simulated.sensors.time_of_flight import TimeOfFlightNoise
 from evaluation.experiment import Context, Findings, Goal, at_least, at_most
-from evaluation.method.ablations import plain_cma, report
+from evaluation.method.ablations import plain_cma, report, unmatched
 from evaluation.method.ablations.cold_start import Cold, Forgetful
 from evaluation.scenes.exposure import LabeledExposure
 from evaluation.sequences import (
@@ -131,15 +131,16 @@ def questions(settings: Settings) -> list[Question]:
 
 def _of_searches(settings: Settings, rig: Rig) -> list[Question]:
     """Questions on the budget, the cost and the start of a search."""
-    search = cma_es.Settings()
     populations = {f"{count}": {"optimizer": cma_es.Settings(count, 30)} for count in settings.populations}
     generations = {f"{count}": {"optimizer": cma_es.Settings(16, count)} for count in settings.generations}
     widened = {count: {**changes, "objective": REGISTRATION} for count, changes in generations.items()}
-    additions = {name: {"optimizer": one} for name, one in plain_cma.additions(*settings.paper_budget).items()}
+    alone = {"objective": unmatched.Settings()}
+    additions = {name: {"optimizer": one, **alone} for name, one in plain_cma.additions(*settings.paper_budget).items()}
     starts = {
-        "prediction, step size and covariance": {"optimizer": search},
-        "prediction alone": {"optimizer": Forgetful(search)},
-        "none: every frame begins at rest": {"optimizer": Cold(search)},
+        "where images show the print, step size and covariance": {"optimizer": cma_es.Settings()},
+        "prediction, step size and covariance": {"optimizer": cma_es.Settings(), **alone},
+        "prediction alone": {"optimizer": Forgetful(cma_es.Settings()), **alone},
+        "none: every frame begins at rest": {"optimizer": Cold(cma_es.Settings())},
     }
     return [
         _question("Population of CMA-ES, 30 generations", rig, populations),
@@ -147,7 +148,11 @@ def _of_searches(settings: Settings, rig: Rig) -> list[Question]:
         _question("Generations of CMA-ES, texture registration noise of 0.2 px", rig, widened),
         _question(ADDITIONS, rig, additions),
         _question("Warm start of CMA-ES, 20 generations", rig, starts),
-        _question("Warm start of hybrid", rig, {"prediction": {}, "none": {"optimizer": Cold(hybrid.Settings())}}),
+        _question(
+            "Warm start of hybrid",
+            rig,
+            {"where images show the print": {}, "prediction": alone, "none": {"optimizer": Cold(hybrid.Settings())}},
+        ),
     ]
 
 

@@ -137,6 +137,12 @@ PAPER, HYBRID = "plain, from the last solution, the paper's budget", "a descent 
 TENTH = "plain, from the last solution, a tenth of the paper's generations"
 PAPER_WIDE = f"{PAPER}, steps of {WIDE * SCALE_M * 1e3:.0f} mm at first"
 
+#: Searches that begin where images show the print, if that is beside the prediction.
+MATCHED: Mapping[str, OptimizerSettings] = {
+    "cma, begun where images show the print": cma.Settings(),
+    "hybrid, begun where images show the print: the default": hybrid.Settings(),
+}
+
 
 def additions(generations: int, population: int) -> Mapping[str, OptimizerSettings]:
     """CMA-ES as in the paper, then with each addition, by name; 20 generations of 15 candidates if nothing is said.
