@@ -157,14 +157,15 @@ class ChannelTerm:
         """See `Term`."""
         seen = self._illumination.shine(self._view.synthesize(surface), surface, self._view)
 
-        def costs(pixel: NDArray[np.int32], samples: NDArray[np.intp]) -> NDArray[np.float64]:
+        def costs(
+            pixel: NDArray[np.int32], attributes: NDArray[np.float32], samples: NDArray[np.intp]
+        ) -> NDArray[np.float64]:
             out, own = np.empty(len(pixel)), samples if len(self._widening.factor) > 1 else np.zeros(1, np.intp)
             texture, factor, log_factor, outlier, uniform = self._measured
-            attributes = np.ascontiguousarray(seen.attributes[:, :, samples])
             channel_cost(pixel, attributes, texture, factor[own], log_factor[own], outlier, uniform, out)
             return out
 
-        return matched(self._view, surface, sparse_jacobian, seen.pixel[0], patches, self._image.shape, costs)
+        return matched(self._view, surface, sparse_jacobian, seen, patches, self._image.shape, costs)
 
     def misfit(self, surface: Surface) -> NDArray[np.float64]:
         """Zero: brightness carries no distance."""

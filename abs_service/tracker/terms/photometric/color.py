@@ -147,14 +147,15 @@ class ColorTerm:
         """See `Term`."""
         seen = self._synthesize(surface)
 
-        def costs(pixel: NDArray[np.int32], samples: NDArray[np.intp]) -> NDArray[np.float64]:
+        def costs(
+            pixel: NDArray[np.int32], attributes: NDArray[np.float32], samples: NDArray[np.intp]
+        ) -> NDArray[np.float64]:
             out, own = np.empty(len(pixel)), samples if len(self._inverse) > 1 else np.zeros(1, np.intp)
             texture, inverse, normalizer, outlier, uniform = self._measured
-            attributes = np.ascontiguousarray(seen.attributes[:, :, samples])
             _color_cost(pixel, attributes, texture, inverse[own], normalizer[own], outlier, uniform, out)
             return out
 
-        return matched(self._view, surface, sparse_jacobian, seen.pixel[0], patches, self._image.shape, costs)
+        return matched(self._view, surface, sparse_jacobian, seen, patches, self._image.shape, costs)
 
     def misfit(self, surface: Surface) -> NDArray[np.float64]:
         """Zero: colours carry no distance."""

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.models.base import SparseJacobian, Surface
-from abs_service.tracker.synthesis.base import View
+from abs_service.tracker.synthesis.base import Synthesis, View
 from abs_service.tracker.synthesis.perspective import project_with_jacobian
 from abs_service.tracker.terms.linearization import PointLinearization
 from abs_service.tracker.terms.patches import Patches
@@ -29,8 +29,9 @@ NEAR_PX = 2
 #: Standard deviation of the place of a patch in the image [px].
 SIGMA_PX = 0.5
 
-#: Cost (s,) [nats] of some samples (k,), given by their indices, at pixels (s, k) of the texture with a border.
-Costs = Callable[[NDArray[np.int32], NDArray[np.intp]], NDArray[np.float64]]
+#: Cost (s,) [nats] of samples at pixels (s, k) of the texture with a border, with attributes (s or 1, channels, k), and
+#: which samples these are (k,). An infinite attribute costs as much as an inlier on average.
+Costs = Callable[[NDArray[np.int32], NDArray[np.float32], NDArray[np.intp]], NDArray[np.float64]]
 
 _STEPS = np.arange(-REACH_PX, REACH_PX + 1, dtype=np.int32)
 #: All shifts (s, 2), right and down [px], and the index of the one by nothing.
@@ -42,14 +43,14 @@ def matched(
     view: View,
     surface: Surface,
     sparse_jacobian: SparseJacobian,
-    pixel: NDArray[np.int32],
+    seen: Synthesis,
     patches: Patches,
     shape: tuple[int, ...],
     costs: Costs,
 ) -> PointLinearization:
     """Residuals of the places in the image, two for each sample, whose patch is found there; see `Term.match`."""
     of_samples = np.argmax(view.spread(surface, np.eye(int(patches.max()) + 1)[patches]), axis=1)
-    shift = _shifts(pixel, (shape[0], shape[1]), of_samples, costs)
+    shift = _shifts(seen, (shape[0], shape[1]), of_samples, costs)
     found = np.flatnonzero(np.isfinite(shift[:, 0]))
     vertices = view.spread(surface, surface.vertices[0].T)
     rows = project_with_jacobian(view.camera, vertices[found])[1].reshape(-1, 3) / SIGMA_PX
@@ -62,23 +63,27 @@ def is_beside(rows: Sequence[PointLinearization]) -> bool:
     return any(len(part.residual) and np.abs(part.residual).max() * SIGMA_PX >= NEAR_PX for part in rows)
 
 
-def _shifts(
-    pixel: NDArray[np.int32], shape: tuple[int, int], of_samples: NDArray[np.intp], costs: Costs
-) -> NDArray[np.float64]:
+def _shifts(seen: Synthesis, shape: tuple[int, int], of_samples: NDArray[np.intp], costs: Costs) -> NDArray[np.float64]:
     """Shift (m, 2) [px] of samples to where the image shows their appearance, right and down; NaN where unknown.
 
+    Patches that noise explains where they are are not looked for.
+
     Args:
-        pixel: of the samples (m,), see `Synthesis`.
+        seen: the samples of a population of one.
         shape: of the image without its border (height, width).
         of_samples: patch (m,) of every sample.
         costs: of samples at other pixels.
     """
-    result = np.full((len(pixel), 2), np.nan)
+    pixel, result = seen.pixel[0], np.full((len(of_samples), 2), np.nan)
     for patch in range(int(of_samples.max()) + 1):
         samples = np.flatnonzero((of_samples == patch) & (pixel > 0))
         if len(samples):
             some = samples[:: -(-len(samples) // MOST)]
-            result[samples] = _best(costs(_shifted(pixel[some], shape), some))
+            attributes, places = np.ascontiguousarray(seen.attributes[:, :, some]), pixel[some]
+            both = np.concatenate([attributes, np.full_like(attributes, np.inf)])
+            still, explained = costs(np.stack([places, places]), both, some)
+            if still - explained > SIGNIFICANT:
+                result[samples] = _best(costs(_shifted(places, shape), attributes, some))
     return result
 
 

@@ -69,6 +69,9 @@ def moved(image: Image, right: int, down: int) -> Image:
 def test_a_print_is_found_where_it_has_moved_to(seen_by, right, down):
     term, image = seen_by(random_print(), MESH)
     found = matched(term, moved(image, right, down))
+    if right == down == 0:  # noise explains it: nobody looks for it
+        assert not len(found.residual)
+        return
     assert len(found.residual) == 2 * len(MESH.vertices)
     np.testing.assert_allclose(
         found.residual.reshape(-1, 2), np.tile([-right, -down], (len(MESH.vertices), 1)) / SIGMA_PX
