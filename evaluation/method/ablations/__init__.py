@@ -134,25 +134,23 @@ def _of_searches(settings: Settings, rig: Rig) -> list[Question]:
     populations = {f"{count}": {"optimizer": cma_es.Settings(count, 30)} for count in settings.populations}
     generations = {f"{count}": {"optimizer": cma_es.Settings(16, count)} for count in settings.generations}
     widened = {count: {**changes, "objective": REGISTRATION} for count, changes in generations.items()}
-    alone = {"objective": unmatched.Settings()}
+    alone: dict[str, Any] = {"objective": unmatched.Settings()}
     additions = {name: {"optimizer": one, **alone} for name, one in plain_cma.additions(*settings.paper_budget).items()}
+    additions |= {name: {"optimizer": one} for name, one in plain_cma.MATCHED.items()}
     starts = {
         "where images show the print, step size and covariance": {"optimizer": cma_es.Settings()},
         "prediction, step size and covariance": {"optimizer": cma_es.Settings(), **alone},
         "prediction alone": {"optimizer": Forgetful(cma_es.Settings()), **alone},
         "none: every frame begins at rest": {"optimizer": Cold(cma_es.Settings())},
     }
+    hybrids = {"where images show the print": {}, "prediction": alone, "none": {"optimizer": Cold(hybrid.Settings())}}
     return [
         _question("Population of CMA-ES, 30 generations", rig, populations),
         _question("Generations of CMA-ES, 16 candidates", rig, generations),
         _question("Generations of CMA-ES, texture registration noise of 0.2 px", rig, widened),
         _question(ADDITIONS, rig, additions),
         _question("Warm start of CMA-ES, 20 generations", rig, starts),
-        _question(
-            "Warm start of hybrid",
-            rig,
-            {"where images show the print": {}, "prediction": alone, "none": {"optimizer": Cold(hybrid.Settings())}},
-        ),
+        _question("Warm start of hybrid", rig, hybrids),
     ]
 
 
