@@ -13,9 +13,9 @@ import signal
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from importlib import import_module
 from multiprocessing import current_process, forkserver, resource_tracker, util
 from multiprocessing.connection import Connection
-from runpy import run_module
 from typing import Any
 
 from setproctitle import setproctitle
@@ -108,6 +108,6 @@ def begin(
 
 
 def abs_service(arguments: Sequence[str]) -> None:
-    """`abs-service ARGUMENTS`, as `python -m abs_service` runs it."""
+    """`abs-service ARGUMENTS`."""
     sys.argv = ["abs-service", *arguments]
-    run_module("abs_service", run_name="__main__")
+    import_module("abs_service.cli").program()
