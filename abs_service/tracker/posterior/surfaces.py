@@ -1,13 +1,13 @@
-"""Surfaces of one frame: cost, derivatives, covariance and agreement of one Θ are asked one after the other."""
+"""Surfaces of one frame and their derivatives: start, cost, covariance and agreement of one Θ ask one after another."""
 
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.models.base import DeformationModel, Surface
+from abs_service.tracker.models.base import DeformationModel, SparseJacobian, Surface
 
 
 class FrameSurfaces:
-    """The meshes that one frame deforms; each Θ by itself has one surface, in whatever order it is asked for.
+    """The meshes that one frame deforms; each Θ by itself has one surface and one Jacobian, in whatever order.
 
     Sensors know a surface that they have seen in this frame again. Nobody asks for a population twice.
 
@@ -18,6 +18,7 @@ class FrameSurfaces:
     def __init__(self, model: DeformationModel):
         self._model = model
         self._known: dict[bytes, Surface] = {}
+        self._jacobians: dict[bytes, SparseJacobian] = {}
 
     def deform(self, thetas: NDArray[np.float64]) -> Surface:
         """The mesh deformed with every row of `thetas` (population, dim)."""
@@ -27,3 +28,10 @@ class FrameSurfaces:
         if key not in self._known:
             self._known[key] = self._model.deform(thetas)
         return self._known[key]
+
+    def sparse_jacobian(self, theta: NDArray[np.float64]) -> SparseJacobian:
+        """Derivatives of the vertices with respect to theta (dim,)."""
+        key = theta.tobytes()
+        if key not in self._jacobians:
+            self._jacobians[key] = self._model.sparse_jacobian(theta)
+        return self._jacobians[key]

@@ -110,10 +110,14 @@ class ChannelTerm:
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
         """−Σ_v log of the density of the measured values (population,)."""
-        seen = self._illumination.shine(self._view.synthesize(surface), surface, self._view)
+        seen = self._synthesize(surface)
         out = np.empty(len(seen.pixel))
         channel_cost(seen.pixel, seen.attributes, *self._measured, out)
         return self._view.balance(out, surface, self._bounds.inlier + self._bounds.uniform)
+
+    def _synthesize(self, surface: Surface) -> Synthesis:
+        """The values of a population as they look in this light."""
+        return self._illumination.shine(self._view.synthesize(surface), surface, self._view)
 
     @property
     def _measured(self) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], float, float]:
@@ -155,13 +159,13 @@ class ChannelTerm:
 
     def match(self, surface: Surface, sparse_jacobian: SparseJacobian, patches: Patches) -> PointLinearization:
         """See `Term`."""
-        seen = self._illumination.shine(self._view.synthesize(surface), surface, self._view)
+        seen = self._synthesize(surface)
 
         def costs(
             pixel: NDArray[np.int32], attributes: NDArray[np.float32], samples: NDArray[np.intp]
         ) -> NDArray[np.float64]:
-            out, own = np.empty(len(pixel)), samples if len(self._widening.factor) > 1 else np.zeros(1, np.intp)
             texture, factor, log_factor, outlier, uniform = self._measured
+            out, own = np.empty(len(pixel)), samples % len(factor)  # one may stand for all
             channel_cost(pixel, attributes, texture, factor[own], log_factor[own], outlier, uniform, out)
             return out
 

@@ -150,8 +150,8 @@ class ColorTerm:
         def costs(
             pixel: NDArray[np.int32], attributes: NDArray[np.float32], samples: NDArray[np.intp]
         ) -> NDArray[np.float64]:
-            out, own = np.empty(len(pixel)), samples if len(self._inverse) > 1 else np.zeros(1, np.intp)
             texture, inverse, normalizer, outlier, uniform = self._measured
+            out, own = np.empty(len(pixel)), samples % len(inverse)  # one may stand for all
             _color_cost(pixel, attributes, texture, inverse[own], normalizer[own], outlier, uniform, out)
             return out
 
