@@ -27,6 +27,23 @@ def test_every_page_that_a_file_names_exists():
     assert [f"{path}: {page}" for path, page in sorted(named) if not (ROOT / page).exists()] == []
 
 
+def test_every_file_that_a_page_names_exists():
+    """`x.py` stands for a file of the reader's own; decisions and the list of changes tell of files that were."""
+    past = re.compile(r"docs/decisions/|CHANGELOG")
+    named = {
+        (path, file)
+        for path in _tracked("*.md")
+        if not past.match(path)
+        for file in re.findall(
+            r"\b(?:abs_service|calib|drivers|evaluation|examples|tests)/[\w/]+\.(?:py|toml)\b",
+            (ROOT / path).read_text(encoding="utf-8"),
+        )
+        if not file.endswith("/x.py")
+    }
+    assert len(named) > 50
+    assert [f"{path}: {file}" for path, file in sorted(named) if not (ROOT / file).exists()] == []
+
+
 def test_every_page_of_the_four_parts_is_in_the_navigation():
     text = re.sub(r"!!python\S*", "", (ROOT / "mkdocs.yml").read_text(encoding="utf-8"))
     parts = [part for part in yaml.safe_load(text)["nav"] if isinstance(part, dict)]
