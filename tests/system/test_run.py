@@ -3,7 +3,10 @@
 import json
 import os
 import signal
+import subprocess
+import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -120,6 +123,14 @@ def test_all_processes_log_where_run_was_told_to(rig_file, tmp_path):
     records = [json.loads(line) for line in log.read_text().splitlines()]
     assert {one["process"] for one in records} == {"run", "capture", "track/sheet"}
     assert any(one["fields"].get("device") == "sim" for one in records if one["process"] == "capture")
+
+
+def test_the_installed_command_complains_of_nothing(rig_file):
+    """Warnings of the interpreter, such as of a module that runs twice, come of the console script alone."""
+    command = [Path(sys.executable).with_name("abs-service"), "run", rig_file, "--no-record", "--duration", "5"]
+    done = subprocess.run(command, capture_output=True, timeout=120, check=False)
+    assert b"0 dropped" in done.stdout
+    assert done.stderr == b""
 
 
 def test_a_run_that_ends_by_itself_before_it_has_tracked_anything_fails(rig_file):
