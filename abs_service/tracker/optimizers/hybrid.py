@@ -28,6 +28,9 @@ MIN_STEP = 0.5
 #: Weight of a new frame in the running mean of the outlier share.
 MEMORY = 0.03
 
+#: So many tries of CMA-ES in a row that find nothing better than the descent begin a pause; most frames of a pause.
+PATIENCE, LONGEST_PAUSE = 4, 7
+
 
 @dataclass(frozen=True)
 class Settings:
@@ -77,12 +80,16 @@ class Hybrid:
         self._schedule = Schedule("cma_es", settings.generations, SIGNIFICANT)
         self._mean_outliers = 1.0
         self._in_fallback = False
+        self._pauses = Pauses(settings.fallback_above)
 
     def follow(self, problem: Problem, start: NDArray[np.float64], budget: Budget) -> Search:
         """Descends; with too many outliers, samples the priors and descends from the result."""
         found = (yield from self._descend(problem, start, budget)).compared(problem)
         limit = self._settings.fallback_until if self._in_fallback else self._settings.fallback_above
-        if outlier_share(found.fits) > self._mean_outliers + limit:
+        share = outlier_share(found.fits)
+        if share <= self._mean_outliers + limit:
+            self._pauses = Pauses(self._settings.fallback_above)
+        elif self._pauses.end_at(share):
             found = (yield from self._fall_back(problem, start, found, budget)).compared(problem)
         self._update_mean(outlier_share(found.fits))
         return found
@@ -106,7 +113,9 @@ class Hybrid:
         metric = search_metric(problem.prior(start))
         sampled = yield from sample(start, np.inf, metric, self._sampler, self._schedule, budget)
         polished = yield from self._descend(problem, sampled.theta, budget)
-        if polished.cost < descended.cost - SIGNIFICANT:
+        is_better = polished.cost < descended.cost - SIGNIFICANT
+        self._pauses.tried(is_better, outlier_share(descended.fits))
+        if is_better:
             return replace(sampled, theta=polished.theta, cost=polished.cost, linearized=polished.linearized)
         return replace(descended, linearized=polished.linearized)
 
@@ -114,3 +123,31 @@ class Hybrid:
         """Updates the running mean; a higher share that lasts becomes the mean, which ends a fallback in vain."""
         self._in_fallback = outliers > self._mean_outliers + self._settings.fallback_until
         self._mean_outliers += MEMORY * (outliers - self._mean_outliers)
+
+
+class Pauses:
+    """Frames without CMA-ES after it has found nothing better `PATIENCE` times: one, three, `LONGEST_PAUSE`.
+
+    Something may hide measurements for seconds, such as a hand that takes hold of the object: the descent explains all
+    others, and samples cost several times as much as it does.
+
+    Args:
+        surprise: an outlier share that is larger by this than at the last try ends a pause.
+    """
+
+    def __init__(self, surprise: float):
+        self._surprise = surprise
+        self._in_vain, self._left, self._share = 0, 0, 0.0
+
+    def end_at(self, share: float) -> bool:
+        """True if CMA-ES is to be tried in a frame with this outlier share; else a frame of the pause has passed."""
+        if self._left and share <= self._share + self._surprise:
+            self._left -= 1
+            return False
+        return True
+
+    def tried(self, is_better: bool, share: float) -> None:
+        """CMA-ES was tried in a frame with this outlier share after the descent."""
+        self._in_vain = 0 if is_better else self._in_vain + 1
+        length = 2 ** (self._in_vain - PATIENCE + 1) - 1 if self._in_vain >= PATIENCE else 0
+        self._left, self._share = min(length, LONGEST_PAUSE), share

@@ -65,6 +65,18 @@ def test_a_search_in_vain_ends_and_a_new_change_begins_another():
     assert follow(optimizer, worst)[1].evaluations > 20
 
 
+def test_tries_in_vain_pause_until_the_share_rises_again():
+    """A hand that takes hold of the object hides a part of it for seconds; samples find nothing in its place."""
+    optimizer = search()
+    explore(optimizer, NEAR)
+    held, turned = (Known(4, NEAR.residuals, lambda theta, share=share: share) for share in (0.5, 0.6))
+    sampled = [follow(optimizer, held)[1].evaluations > 20 for _ in range(24)]
+    assert np.flatnonzero(sampled).tolist() == [0, 1, 2, 3, 5, 9, 17]
+    assert follow(optimizer, turned)[1].evaluations > 20
+    assert follow(optimizer, NEAR)[1].evaluations <= 4
+    assert follow(optimizer, held)[1].evaluations > 20
+
+
 def test_the_budget_bounds_both():
     optimizer = search(population=8)
     explore(optimizer, NEAR)
