@@ -127,21 +127,21 @@ def _ragged(z: NDArray[np.float64], generator: np.random.Generator) -> NDArray[n
 
 
 def _held(z: NDArray[np.float64], generator: np.random.Generator) -> NDArray[np.float64]:
-    """Two hands over the sides, their arms, a body 0.3 m behind, a wall at 1.6 m, and 1.5 mm of noise."""
-    seen = z > 0
-    row = int(np.median(np.flatnonzero(seen.any(axis=1)))) - 20
-    columns, body_m = np.flatnonzero(seen[row]), float(np.median(z[seen])) + 0.3
+    """Two hands on the sides, their arms, a body 0.3 m behind, a wall at 1.6 m, and 1.5 mm of noise."""
+    y, x = np.nonzero(z)
+    body_m = float(np.median(z[y, x])) + 0.3
     behind, before = np.full(z.shape, 1.6), np.full(z.shape, np.inf)
     behind[:, 200:520] = body_m - 0.03 * np.cos((np.arange(200, 520) - 360) / 110)
-    for column, outwards in ((columns[0], -1), (columns[-1], 1)):
-        hand_m = float(z[row, column - 3 * outwards])
+    for upper, lower, outwards in ((np.argmin(x + y), np.argmax(y - x), -1), (np.argmax(x - y), np.argmax(x + y), 1)):
+        column, row = (int(0.6 * along[upper] + 0.4 * along[lower]) for along in (x, y))  # there a hand holds the paper
+        hand_m = float(np.median(z[row - 3 : row + 4, column - 6 * outwards]))
         for along in np.linspace(1, 0, 60):
-            x, y = column + outwards * (25 + 35 * along), row + 5 - 155 * along
-            arm = cv2.circle(np.zeros(z.shape, np.uint8), (int(x), int(y)), 22, 1, -1) > 0
+            place = int(column + outwards * (25 + 35 * along)), int(row + 5 - 155 * along)
+            arm = cv2.circle(np.zeros(z.shape, np.uint8), place, 22, 1, -1) > 0
             behind[arm] = np.minimum(behind[arm], hand_m + 0.01 + along * (body_m - hand_m))
-        hand = cv2.ellipse(np.zeros(z.shape, np.uint8), (int(column + 10 * outwards), row), (38, 26), 0, 0, 360, 1, -1)
+        hand = cv2.ellipse(np.zeros(z.shape, np.uint8), (column + 10 * outwards, row), (38, 26), 0, 0, 360, 1, -1)
         before[hand > 0] = hand_m - 0.015
-    return np.minimum(np.where(seen, z, behind), before) + generator.normal(0, 0.0015, z.shape)
+    return np.minimum(np.where(z > 0, z, behind), before) + generator.normal(0, 0.0015, z.shape)
 
 
 def _darker(image: Colors, part: float) -> Colors:
