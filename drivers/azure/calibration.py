@@ -35,14 +35,15 @@ class Mode:
     size: tuple[int, int]
 
 
-_DEPTH: Mapping[str, Mode] = {
+#: Modes of the depth sensor and of colours, in the order of the SDK's numbers, which begin with 1.
+DEPTH_MODES: Mapping[str, Mode] = {
     "NFOV_2X2BINNED": Mode((512, 512), (96, 90), (320, 288)),
     "NFOV_UNBINNED": Mode((1024, 1024), (192, 180), (640, 576)),
     "WFOV_2X2BINNED": Mode((512, 512), (0, 0), (512, 512)),
     "WFOV_UNBINNED": Mode((1024, 1024), (0, 0), (1024, 1024)),
     "PASSIVE_IR": Mode((1024, 1024), (0, 0), (1024, 1024)),
 }
-_COLOR: Mapping[str, Mode] = {
+COLOR_MODES: Mapping[str, Mode] = {
     "720P": Mode((1280, 960), (0, 120), (1280, 720)),
     "1080P": Mode((1920, 1440), (0, 180), (1920, 1080)),
     "1440P": Mode((2560, 1920), (0, 240), (2560, 1440)),
@@ -51,7 +52,7 @@ _COLOR: Mapping[str, Mode] = {
     "3072P": Mode((4096, 3072), (0, 0), (4096, 3072)),
 }
 
-_MODES = {"depth": _DEPTH, "color": _COLOR}
+_MODES = {"depth": DEPTH_MODES, "color": COLOR_MODES}
 _LOCATIONS = {"depth": "D0", "color": "PV0"}
 
 #: The only lens model in factory calibrations: OpenCV's rational model. Rational6KT has half of its p1 and p2.

@@ -1,29 +1,26 @@
-"""MKV files of the Azure Kinect: depth, infra-red and colour. PyAV demuxes only."""
+"""MKV files of the Azure Kinect: depth, amplitudes or infra-red, and colours. PyAV demuxes only."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from calib.camera import Camera
 from drivers.azure import calibration
 from drivers.azure.calibration import CalibrationError
+from drivers.azure.colors import color
+from drivers.azure.picture import AMPLITUDE, COLOR, DEPTH, ENCODINGS, PASSIVE, Role
 from drivers.contract.frame import Frame, Geometry, Kind
-from drivers.encoding import image_size
 from drivers.encoding.foreign_recording import ForeignRecordingError
 
-#: Sensor, stream and kind by the title of a track.
-_TRACKS: Mapping[str, tuple[str, str, Kind]] = {
-    "DEPTH": ("depth", "depth", Kind.DEPTH),
-    "IR": ("depth", "ir", Kind.IR),
-    "COLOR": ("color", "color", Kind.COLOR),
-}
+#: Streams by the title of a track; infra-red without the camera's own light is no amplitude.
+_TRACKS: Mapping[str, Role] = {"DEPTH": DEPTH, "IR": AMPLITUDE, "COLOR": COLOR}
+_PASSIVE: Mapping[str, Role] = {**_TRACKS, "IR": PASSIVE}
 
 
 class AzureRecording:
@@ -50,6 +47,7 @@ class AzureRecording:
             attached = {s.metadata.get("filename"): s.data for s in file.streams if s.type == "attachment"}
             self._start_ns = _wall_ns(tags.get("creation_time", ""))
             self._offset_us = int(tags.get("K4A_START_OFFSET_NS", "0")) // 1000
+            self._tracks = _PASSIVE if tags.get("K4A_IR_MODE") == "PASSIVE" else _TRACKS
             self._serial = tags.get("K4A_DEVICE_SERIAL_NUMBER", "")
         if not titles or name not in attached:
             raise ForeignRecordingError(
@@ -67,28 +65,27 @@ class AzureRecording:
         """All images, with sequence numbers from their times: images of one capture share a number, losses are gaps."""
         with _container(self._path) as file:
             for packet in file.demux():
-                track = _TRACKS.get(packet.stream.metadata.get("title", ""))
-                if track is None or packet.pts is None or not packet.size:
+                role = self._tracks.get(packet.stream.metadata.get("title", ""))
+                if role is None or packet.pts is None or not packet.size:
                     continue
                 time_s = packet.pts * packet.time_base
                 number = round(time_s * (packet.stream.average_rate or 0))
-                yield self._frame(track, bytes(packet), round(time_s * 1_000_000), number)
+                yield self._frame(role, bytes(packet), round(time_s * 1_000_000), number)
 
-    def _frame(self, track: tuple[str, str, Kind], content: bytes, time_us: int, seq: int) -> Frame:
-        sensor, stream, kind = track
-        camera = self.cameras[sensor]
+    def _frame(self, role: Role, content: bytes, time_us: int, seq: int) -> Frame:
+        camera, kind = self.cameras[role.sensor], role.kind
         t_ns = max(self._start_ns + time_us * 1000, 0)
         try:
             data = color(self._color, content, camera) if kind == Kind.COLOR else words(content, camera)
         except ValueError as error:
-            raise ForeignRecordingError(f"{self._path}: {stream} at {time_us} µs: {error}") from error
+            raise ForeignRecordingError(f"{self._path}: {role.stream} at {time_us} µs: {error}") from error
         is_depth = kind == Kind.DEPTH
         return Frame(
-            sensor=sensor,
-            stream=stream,
+            sensor=role.sensor,
+            stream=role.stream,
             kind=kind,
             data=data,
-            encoding={Kind.COLOR: "bgr8", Kind.DEPTH: "16UC1"}.get(kind, "mono16"),
+            encoding=ENCODINGS[kind],
             t_host_ns=t_ns,
             t_arrival_ns=t_ns,
             seq=seq,
@@ -111,39 +108,6 @@ def words(content: bytes, camera: Camera) -> NDArray[np.generic]:
     if len(content) != 2 * camera.width * camera.height:
         raise ValueError(f"{camera.width} × {camera.height} pixels need two bytes each, there are {len(content)}")
     return np.frombuffer(content, ">u2").astype("<u2").reshape(camera.height, camera.width)
-
-
-def color(encoding: str, content: bytes, camera: Camera) -> NDArray[np.generic]:
-    """Colour image (height, width, 3), BGR.
-
-    Raises:
-        ValueError: another encoding, or another size than the camera's.
-    """
-    decoders: Mapping[str, Callable[[bytes, Camera], Any]] = {"MJPG": _jpeg, "NV12": _nv12, "YUY2": _yuy2}
-    if encoding not in decoders:
-        raise ValueError(f"encoding {encoding!r} is none of {sorted(decoders)}")
-    try:
-        image = decoders[encoding](content, camera)
-    except cv2.error as error:
-        raise ValueError(f"no {encoding} image: {error}") from error
-    if image is None or image.shape != (camera.height, camera.width, 3):
-        raise ValueError(f"this is no {encoding} image of {camera.width} × {camera.height} pixels")
-    return image
-
-
-def _jpeg(content: bytes, camera: Camera) -> Any:
-    image_size.check(content)
-    return cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_COLOR)
-
-
-def _nv12(content: bytes, camera: Camera) -> Any:
-    planes = np.frombuffer(content, np.uint8).reshape(camera.height * 3 // 2, camera.width)
-    return cv2.cvtColor(planes, cv2.COLOR_YUV2BGR_NV12)
-
-
-def _yuy2(content: bytes, camera: Camera) -> Any:
-    pairs = np.frombuffer(content, np.uint8).reshape(camera.height, camera.width, 2)
-    return cv2.cvtColor(pairs, cv2.COLOR_YUV2BGR_YUY2)
 
 
 def _wall_ns(text: str) -> int:

@@ -22,7 +22,7 @@ EXAMPLES = Path(__file__).parents[2] / "examples" / "rigs"
 WITH_FILES = {"replay", "image_folder"}
 WITHOUT_TRACKER = {"record_only"}
 #: Those that need cameras; `test_kinects.py` has a rig of emulated ones.
-WITH_CAMERAS = {"genicam", "kinect", "o3r", "oak_stereo", "oak_tof", "orbbec", "realsense"}
+WITH_CAMERAS = {"azure", "genicam", "kinect", "o3r", "oak_stereo", "oak_tof", "orbbec", "realsense"}
 LIVE = sorted(
     path.stem for path in EXAMPLES.glob("*.toml") if path.stem not in WITH_FILES | WITHOUT_TRACKER | WITH_CAMERAS
 )

@@ -84,6 +84,7 @@ TIME_OF_FLIGHT = """\
 noise = { type = "constant", sigma = 0.01 }
 """
 
+_AZURE = '"color.exposure_s" = 0.0166\n"color.auto_white_balance" = false\n'
 DEVICES: Mapping[str, Device] = {
     "simulated": Device(
         "the simulated camera, nothing to connect",
@@ -109,6 +110,7 @@ DEVICES: Mapping[str, Device] = {
     "oak-tof": Device("OAK with a time-of-flight camera", "oak://?mode=tof", "tof", TIME_OF_FLIGHT),
     "orbbec-stereo": Device("Orbbec Gemini", "orbbec://", "depth", STEREO),
     "orbbec-tof": Device("Orbbec Femto", "orbbec://", "depth", TIME_OF_FLIGHT),
+    "azure": Device("Azure Kinect", "azure://", "depth", TIME_OF_FLIGHT, controls=_AZURE),
 }
 
 OBJECTS: Mapping[str, str] = {

@@ -46,8 +46,8 @@ class AzureExposure:
 
     @property
     def amplitude(self) -> NDArray[np.float32]:
-        """Its infra-red image (height, width)."""
-        return self.frames[Kind.IR].si()
+        """Its amplitudes (height, width): infra-red with its own light."""
+        return self.frames[Kind.AMPLITUDE].si()
 
     @property
     def rgb(self) -> NDArray[np.uint8]:

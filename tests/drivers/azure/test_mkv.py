@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from calib.camera import Camera
-from drivers.azure import calibration, mkv
+from drivers.azure import calibration, colors, mkv
 from drivers.azure.calibration import CalibrationError
 from drivers.azure.mkv import AzureRecording
 from drivers.contract.frame import Geometry, Kind
@@ -75,7 +75,7 @@ def test_depth_infra_red_and_colour_of_a_capture_share_its_number(recording: Pat
     read = AzureRecording(recording)
     frames = {(frame.kind, frame.seq): frame for frame in read.frames()}
     # Every second image is missing in the file, and the numbers say so.
-    assert sorted(frames) == sorted((kind, k) for kind in (Kind.DEPTH, Kind.IR, Kind.COLOR) for k in (0, 2))
+    assert sorted(frames) == sorted((kind, k) for kind in (Kind.DEPTH, Kind.AMPLITUDE, Kind.COLOR) for k in (0, 2))
     depth = frames[Kind.DEPTH, 2]
     np.testing.assert_array_equal(depth.data, DEPTH + 1)
     assert (depth.scale, depth.geometry, depth.invalid) == (0.001, Geometry.Z, 0.0)
@@ -161,7 +161,7 @@ def test_a_corrupt_calibration_is_read_or_rejected(changes: list[tuple[int, int]
 def test_arbitrary_bytes_are_an_image_or_rejected(content: bytes, encoding: str, begins: bool) -> None:
     jpeg = cv2.imencode(".jpg", np.zeros((6, 8, 3), np.uint8))[1].tobytes()
     camera = Camera(8, 6, 8, 8, 4, 3)
-    for read in (lambda data: mkv.color(encoding, data, camera), lambda data: mkv.words(data, camera)):
+    for read in (lambda data: colors.color(encoding, data, camera), lambda data: mkv.words(data, camera)):
         with contextlib.suppress(ValueError):
             assert read(jpeg[:300] + content if begins else content).shape[:2] == (6, 8)
 
