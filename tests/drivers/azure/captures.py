@@ -1,13 +1,13 @@
 """Makes captures of Microsoft's library: images, references and stamps are its own objects."""
 
 import ctypes
-from collections import deque
 from ctypes import POINTER, c_float, c_int, c_size_t, c_uint64, c_void_p
 from typing import Any
 
 import numpy as np
 
 _HANDLE = POINTER(c_void_p)
+_RELEASED = ctypes.CFUNCTYPE(None, c_void_p, c_void_p)
 _FUNCTIONS: dict[str, tuple[Any, ...]] = {
     "k4a_capture_create": (c_int, _HANDLE),
     "k4a_capture_set_color_image": (None, c_void_p, c_void_p),
@@ -16,7 +16,7 @@ _FUNCTIONS: dict[str, tuple[Any, ...]] = {
     "k4a_capture_set_temperature_c": (None, c_void_p, c_float),
     "k4a_image_create_from_buffer": (
         *(c_int, c_int, c_int, c_int, c_int),
-        *(c_void_p, c_size_t, c_void_p, c_void_p, _HANDLE),
+        *(c_void_p, c_size_t, _RELEASED, c_void_p, _HANDLE),
     ),
     "k4a_image_set_device_timestamp_usec": (None, c_void_p, c_uint64),
     "k4a_image_set_exposure_usec": (None, c_void_p, c_uint64),
@@ -32,11 +32,12 @@ def declare(sdk: Any) -> Any:
 
 
 class Maker:
-    """Makes captures of the library."""
+    """Makes captures of the library, and knows which images it still holds."""
 
     def __init__(self, sdk: Any) -> None:
         self.sdk = declare(sdk)
-        self._kept: deque[Any] = deque(maxlen=100)  # buffers of the images
+        self.held: dict[int, Any] = {}  # buffers of images that somebody has not released, by address
+        self._on_release = _RELEASED(lambda buffer, context: self.held.pop(buffer, None) and None)
 
     def capture(self, temperature_c: float = 31.5) -> c_void_p:
         capture = c_void_p()
@@ -50,9 +51,9 @@ class Maker:
     ) -> None:  # fmt: skip
         """Adds the image `depth`, `ir` or `color`."""
         image, buffer = c_void_p(), ctypes.create_string_buffer(content, len(content))
-        self._kept.append(buffer)
+        self.held[ctypes.addressof(buffer)] = buffer
         stride = 0 if form == 0 else len(content) // size[1] if form != 1 else size[0]
-        arguments = form, *size, stride, buffer, len(content), None, None, ctypes.byref(image)
+        arguments = form, *size, stride, buffer, len(content), self._on_release, None, ctypes.byref(image)
         assert self.sdk.k4a_image_create_from_buffer(*arguments) == 0
         self.sdk.k4a_image_set_device_timestamp_usec(image, time_us)
         self.sdk.k4a_image_set_exposure_usec(image, exposure_us)

@@ -14,6 +14,7 @@ from drivers.azure.address import FORMATS, RATES_HZ
 from drivers.azure.calibration import COLOR_MODES, DEPTH_MODES
 from tests.drivers.azure.captures import Maker, noisy
 from tests.drivers.conformance.bench import BEFORE, Fault
+from tests.waiting import eventually
 
 FAILED, TIMEOUT = 1, 2
 #: The device's time of the first exposure [µs].
@@ -129,6 +130,8 @@ class EmulatedSdk:
         with camera.changed:
             camera.streams = False
             camera.changed.notify_all()
+        # The SDK waits, for ever, until all images are released.
+        assert eventually(lambda: not self.maker.held or any(one.streams for one in self.cameras))
 
     def k4a_device_get_capture(self, handle: c_void_p, capture: Any, timeout_ms: int) -> int:
         camera, end_s = self._of(handle), time.monotonic() + timeout_ms / 1000

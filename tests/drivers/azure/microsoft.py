@@ -21,6 +21,11 @@ _FUNCTIONS: dict[str, tuple[Any, ...]] = {
     "k4a_calibration_get_from_raw": (c_int, c_char_p, c_size_t, c_int, c_int, c_void_p),
     "k4a_calibration_3d_to_2d": (c_int, c_void_p, c_void_p, c_int, c_int, c_void_p, POINTER(c_int)),
     "k4a_calibration_2d_to_3d": (c_int, c_void_p, c_void_p, c_float, c_int, c_int, c_void_p, POINTER(c_int)),
+    "k4a_transformation_create": (c_void_p, c_void_p),
+    "k4a_transformation_destroy": (None, c_void_p),
+    "k4a_transformation_depth_image_to_point_cloud": (c_int, c_void_p, c_void_p, c_int, c_void_p),
+    "k4a_transformation_depth_image_to_color_camera": (c_int, c_void_p, c_void_p, c_void_p),
+    "k4a_image_create": (c_int, c_int, c_int, c_int, c_int, _HANDLE),
     "k4a_playback_open": (c_int, c_char_p, _HANDLE),
     "k4a_playback_close": (None, c_void_p),
     "k4a_playback_get_raw_calibration": (c_int, c_void_p, c_char_p, POINTER(c_size_t)),
@@ -80,6 +85,38 @@ class Microsoft:
             if valid.value:
                 points_d[number] = np.array(point_mm) * 1e-3
         return points_d
+
+    @contextmanager
+    def engine(self, calibration: Any) -> Iterator[Any]:
+        """Its engine that transforms whole images, in OpenGL; None where it does not start, as without an X session."""
+        transformation = self.transformation_create(calibration)
+        try:
+            yield transformation
+        finally:
+            if transformation:
+                self.transformation_destroy(transformation)
+
+    def cloud(self, engine: Any, depth_image: Any, size: tuple[int, int]) -> NDArray[np.int16]:
+        """Points (height, width, 3) of a depth image [mm], 0 without return."""
+        cloud, (width, height) = self._image(8, size, 6), size
+        assert self.transformation_depth_image_to_point_cloud(engine, depth_image, 0, cloud) == 0
+        return np.frombuffer(self._taken(cloud), "<i2").reshape(height, width, 3)
+
+    def in_color(self, engine: Any, depth_image: Any, size: tuple[int, int]) -> NDArray[np.uint16]:
+        """A depth image as the colour camera sees it, (height, width) [mm], 0 where nothing is known."""
+        warped = self._image(4, size, 2)
+        assert self.transformation_depth_image_to_color_camera(engine, depth_image, warped) == 0
+        return np.frombuffer(self._taken(warped), "<u2").reshape(size[::-1])
+
+    def _image(self, form: int, size: tuple[int, int], pixel_bytes: int) -> c_void_p:
+        image = c_void_p()
+        assert self.image_create(form, *size, pixel_bytes * size[0], ctypes.byref(image)) == 0
+        return image
+
+    def _taken(self, image: c_void_p) -> bytes:
+        content = ctypes.string_at(self.sdk.k4a_image_get_buffer(image), self.sdk.k4a_image_get_size(image))
+        self.sdk.k4a_image_release(image)
+        return content
 
     @contextmanager
     def player(self, path: Path) -> Iterator[tuple[bytes, list[c_void_p]]]:

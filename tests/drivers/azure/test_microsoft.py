@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivers.azure import calibration, picture
+from calib import pose
+from drivers.azure import calibration, library, picture
 from drivers.azure.address import FORMATS, parse
 from drivers.azure.calibration import COLOR_MODES, DEPTH_MODES
 from drivers.azure.controls import Start
@@ -59,6 +60,38 @@ def test_depth_is_along_z_and_points_are_those_of_the_sdk(data_set: Callable[[st
     rays = camera.directions(pixels)
     points = rays / rays[:, 2:] * made.si()[v, u, None]
     np.testing.assert_allclose(points[inside], expected[inside], atol=2e-5)
+
+
+def test_whole_images_are_transformed_as_by_the_sdks_engine(data_set: Callable[[str], Path]) -> None:
+    """Run it with `xvfb-run -a .venv/bin/pytest tests/drivers/azure/test_microsoft.py` where no X session is."""
+    with MICROSOFT.player(data_set(RECORDING)) as (raw, captures):
+        theirs = MICROSOFT.calibration(raw, "NFOV_UNBINNED", "720P")
+        cameras = calibration.cameras(raw, {"depth": "NFOV_UNBINNED", "color": "720P"})
+        (shot,) = picture.pictures(MICROSOFT.sdk, captures[0], (DEPTH,))
+        image = MICROSOFT.sdk.k4a_capture_get_depth_image(captures[0])
+        try:
+            with MICROSOFT.engine(theirs) as engine:
+                if not engine:
+                    pytest.skip(library.reason())
+                cloud_mm = MICROSOFT.cloud(engine, image, (640, 576))
+                warped_mm = MICROSOFT.in_color(engine, image, (1280, 720))
+        finally:
+            MICROSOFT.sdk.k4a_image_release(image)
+    z_m = picture.frame(shot, cameras["depth"], 0, "").si()
+    v, u = np.nonzero(np.isfinite(z_m))
+    rays = cameras["depth"].directions(np.stack([u, v], axis=-1))
+    points_d = rays / rays[:, 2:] * z_m[v, u, None]
+    assert np.abs(1e3 * points_d - cloud_mm[v, u]).max() < 0.51  # whole millimetres
+
+    pixels = np.floor(cameras["color"].project(points_d) + 0.5).astype(int)
+    inside = np.all((pixels >= 0) & (pixels < [1280, 720]), axis=1)
+    seen_mm = warped_mm[pixels[inside, 1], pixels[inside, 0]].astype(float)
+    T_cd = pose.inverse(cameras["color"].T_rs)
+    expected_mm = 1e3 * pose.transform(T_cd, points_d[inside])[:, 2]
+    assert (seen_mm > 0).mean() > 0.95  # the rest lies behind something nearer, or at the rim
+    errors_mm = np.abs(seen_mm - expected_mm)[seen_mm > 0]
+    assert np.median(errors_mm) < 1
+    assert (errors_mm < 5).mean() > 0.95
 
 
 def test_captures_of_the_sdks_player_are_the_images_that_import_reads(data_set: Callable[[str], Path]) -> None:
