@@ -118,14 +118,19 @@ def test_captures_of_the_sdks_player_are_the_images_that_import_reads(data_set: 
             assert getattr(made, name) == getattr(other, name), name
 
 
-@pytest.mark.parametrize("form", FORMATS)
-def test_what_the_sdks_recorder_writes_is_imported(tmp_path: Path, form: str) -> None:
-    start = Start(parse(f"azure://?depth=nfov_2x2binned&format={form.lower()}"))
+def recorded(folder: Path, uri: str, numbers: list[int]) -> Path:
+    """A recording by Microsoft's recorder of exposures with some numbers."""
+    start, path = Start(parse(uri)), folder / "recorded.mkv"
     camera = EmulatedKinect("0042", CALIBRATION, started=[start.configuration()])
     emulated = EmulatedSdk(MICROSOFT.sdk, camera)
-    captures = [emulated.exposure(camera, number, 30) for number in (0, 1, 4)]
-    path = tmp_path / "recorded.mkv"
+    captures = [emulated.exposure(camera, number, 30) for number in numbers]
     MICROSOFT.record(path, start.configuration(), CALIBRATION, captures)
+    return path
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_what_the_sdks_recorder_writes_is_imported(tmp_path: Path, form: str) -> None:
+    path = recorded(tmp_path, f"azure://?depth=nfov_2x2binned&format={form.lower()}", [0, 1, 4])
     frames = [*AzureRecording(path).frames()]
     assert sorted((frame.kind, frame.seq) for frame in frames) == sorted(
         (kind, seq) for kind in (Kind.DEPTH, Kind.AMPLITUDE, Kind.COLOR) for seq in (0, 1, 4)
@@ -133,3 +138,8 @@ def test_what_the_sdks_recorder_writes_is_imported(tmp_path: Path, form: str) ->
     depth = next(frame for frame in frames if frame.kind == Kind.DEPTH)
     assert depth.t_device_ticks == BEGIN_US
     assert 0.9 < np.nanmin(depth.si()) < np.nanmax(depth.si()) < 1.1
+
+
+def test_infra_red_without_the_cameras_light_is_no_amplitude(tmp_path: Path) -> None:
+    (frame,) = AzureRecording(recorded(tmp_path, "azure://?depth=passive_ir&color=0", [0])).frames()
+    assert (frame.kind, frame.stream, frame.data.shape) == (Kind.IR, "ir", (1024, 1024))

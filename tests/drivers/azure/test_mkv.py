@@ -166,6 +166,11 @@ def test_arbitrary_bytes_are_an_image_or_rejected(content: bytes, encoding: str,
             assert read(jpeg[:300] + content if begins else content).shape[:2] == (6, 8)
 
 
+def test_bgra_loses_its_transparency_alone() -> None:
+    content = bytes([200, 100, 50, 255]) * 48
+    assert np.all(colors.color("BGRA", content, Camera(8, 6, 8, 8, 4, 3)) == [200, 100, 50])
+
+
 def test_depth_and_colour_of_a_real_recording_are_registered(data_set: Callable[[str], Path]) -> None:
     pytest.importorskip("av", reason="needs PyAV: make all")
     path = data_set("tof_azure_kinect_pyk4a/recording.mkv")
