@@ -12,9 +12,8 @@ from drivers.contract.device import DeviceError
 
 #: Results of the SDK's functions, and a buffer that is too small, which tells its size.
 _SUCCEEDED, _TIMEOUT, _TOO_SMALL = 0, 2, 2
-#: The depth engine computes with OpenGL: what its errors are about in most cases.
-_ENGINE = "depth engine"
-_ENGINE_REMEDY = "it needs OpenGL 4.4 in an X session: is DISPLAY set, and may this user draw there?"
+#: The depth engine computes with OpenGL, which most of its errors are about.
+_ENGINE, _ENGINE_REMEDY = "engine create and initialize failed", "it needs OpenGL 4.4 in an X session: is DISPLAY set?"
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,7 +122,7 @@ class Kinect:
             library.forget()
             if function(self._open(), *arguments) != _SUCCEEDED:
                 said = library.reason()
-                remedy = f"; {_ENGINE_REMEDY}" if _ENGINE in said.lower() else ""
+                remedy = f"; {_ENGINE_REMEDY}" if _ENGINE in said else ""
                 raise DeviceError(f"{self.uri}: {said}{remedy}")
 
     def _buffer(self, function: Callable[..., int]) -> bytes:

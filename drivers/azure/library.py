@@ -6,6 +6,7 @@ Of `pyk4a-bundle` only the library is used: its Python modules are compiled for 
 import ctypes
 import importlib.metadata
 import os
+import re
 from collections import deque
 from collections.abc import Iterator
 from ctypes import POINTER, c_bool, c_char_p, c_float, c_int, c_int32, c_size_t, c_uint32, c_uint64, c_void_p
@@ -20,6 +21,8 @@ _INSTALL = ".venv/bin/pip install --no-deps pyk4a-bundle"
 _SYSTEM = "libk4a.so.1.4"
 _ERROR = 1
 _CALLBACK = ctypes.CFUNCTYPE(None, c_void_p, c_int, c_char_p, c_int, c_char_p)
+#: The place in the SDK's source at the beginning of what it reports.
+_PLACE = re.compile(r"^\w+\(\)\. (?:/\S+ \(\d+\): )?")
 _said: deque[str] = deque(maxlen=30)
 
 
@@ -124,4 +127,4 @@ def _names() -> Iterator[str]:
 
 @_CALLBACK
 def _listen(context: Any, level: int, file: bytes, line: int, message: bytes) -> None:
-    _said.append(message.decode(errors="replace").strip())
+    _said.append(_PLACE.sub("", message.decode(errors="replace").strip()))

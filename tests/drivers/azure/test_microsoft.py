@@ -1,5 +1,6 @@
 """The driver beside Microsoft's own SDK: geometry, player and recorder."""
 
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -7,17 +8,19 @@ import numpy as np
 import pytest
 
 from calib import pose
-from drivers.azure import calibration, library, picture
+from drivers.azure import calibration, library, open_device, picture
 from drivers.azure.address import FORMATS, parse
 from drivers.azure.calibration import COLOR_MODES, DEPTH_MODES
 from drivers.azure.controls import Start
 from drivers.azure.mkv import AzureRecording
 from drivers.azure.picture import AMPLITUDE, COLOR, DEPTH
-from drivers.contract.device import SdkMissingError
+from drivers.contract.device import DeviceError, DeviceState, SdkMissingError
 from drivers.contract.frame import Kind
-from tests.drivers.azure.emulation import BEGIN_US, EmulatedKinect, EmulatedSdk
+from tests.drivers.azure.attachment import attached
+from tests.drivers.azure.emulation import BEGIN_US, FAILED, EmulatedKinect, EmulatedSdk
 from tests.drivers.azure.microsoft import Microsoft
 from tests.drivers.azure.test_mkv import CALIBRATION
+from tests.drivers.recording_sink import RecordingSink
 
 try:
     MICROSOFT = Microsoft()
@@ -92,6 +95,27 @@ def test_whole_images_are_transformed_as_by_the_sdks_engine(data_set: Callable[[
     errors_mm = np.abs(seen_mm - expected_mm)[seen_mm > 0]
     assert np.median(errors_mm) < 1
     assert (errors_mm < 5).mean() > 0.95
+
+
+def test_an_engine_that_cannot_draw_says_what_it_needs(
+    tmp_path: Path, data_set: Callable[[str], Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with MICROSOFT.player(data_set(RECORDING)) as (raw, _):
+        theirs, camera = MICROSOFT.calibration(raw, "NFOV_UNBINNED", "720P"), EmulatedKinect("0001", raw)
+
+    def start(*_: object) -> int:
+        with MICROSOFT.engine(theirs) as engine:  # the engine for images, from the same library as that for depth
+            return 0 if engine else FAILED
+
+    monkeypatch.setattr(EmulatedSdk, "k4a_device_start_cameras", start)
+    monkeypatch.setenv("DISPLAY", "")
+    with attached(tmp_path, camera):
+        device, sink = open_device("azure://", time.monotonic_ns), RecordingSink()
+        with pytest.raises(DeviceError, match=r"error code: 204.*; it needs OpenGL 4\.4 in an X session"):
+            device.start(sink)
+        assert sink.wait_for(DeviceState.FAILED)
+        device.close()
+    assert not camera.open
 
 
 def test_captures_of_the_sdks_player_are_the_images_that_import_reads(data_set: Callable[[str], Path]) -> None:
