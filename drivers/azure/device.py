@@ -21,8 +21,6 @@ from drivers.contract.frame_queue import FrameQueue
 
 #: Polling interval of the stop event [ms].
 _LOOK_MS = 100
-#: Images of colours that may wait.
-_WAITING = 2
 
 
 @dataclass(slots=True)
@@ -56,7 +54,7 @@ class _Run:
     stop: threading.Event
     clocks: Mapping[str, DeviceClock]
     counters: Mapping[str, _Counter]
-    colors: FrameQueue[tuple[Picture, int]] = field(default_factory=lambda: FrameQueue(_WAITING))
+    colors: FrameQueue[tuple[Picture, int]] = field(default_factory=FrameQueue)
     threads: tuple[threading.Thread, ...] = ()
 
 

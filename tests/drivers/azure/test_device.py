@@ -79,7 +79,7 @@ def test_an_address_chooses_streams(camera: EmulatedKinect, query: str, streams:
     assert {f"{one.sensor}/{one.stream}" for one in device.capabilities.streams} == streams
     with streaming(device) as sink:
         assert eventually(lambda: {"/".join(frame.key) for frame in list(sink.frames)} == streams)
-    assert {cause: n for cause, n in device.counters.items() if n and cause not in {"frames", "after_stop"}} == {}
+    assert {cause for cause, number in device.counters.items() if number} <= {"frames", "after_stop", "overrun"}
 
 
 def test_an_exposure_that_is_lost_is_counted_for_its_head_alone(camera: EmulatedKinect) -> None:
