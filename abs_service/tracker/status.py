@@ -25,7 +25,7 @@ class Settings:
 
     Attributes:
         degraded_below: inlier share below which an estimate is DEGRADED.
-        lost_below: inlier share below which the object is LOST.
+        lost_below: inlier share, of all sensors or of those of distances alone, below which the object is LOST.
         degraded_agreeing: share that agrees with a measurement, of the vertices that should be in sight, below which an
             estimate is DEGRADED, in the sensor in which most do. Vertices without return, behind an occluder or outside
             the image count against it. As large a share has to be inside the image of a depth sensor.
@@ -69,7 +69,7 @@ def judge(
         innovation: see `RecentMotion`.
         limits: thresholds.
     """
-    lost = inlier_share(fits) < limits.lost_below
+    lost = min(inlier_share(fits), distances_share(fits)) < limits.lost_below
     reasons = [f"no frame from {name}" for name in missing]
     reasons += _seen(fits, lost, limits) if fits else [_UNMEASURED]
     reasons += _placed(fits, shape, innovation, limits)
@@ -83,15 +83,17 @@ def _seen(fits: Sequence[SensorFit], lost: bool, limits: Settings) -> Iterator[s
     """Reasons by what the sensors show of the vertices."""
     inliers, occluded = inlier_share(fits), occluded_share(fits)
     disagree, hidden = inliers < limits.degraded_below, occluded > limits.degraded_occluded
-    if disagree:
-        yield f"only {inliers:.0%} of the visible vertices agree with a measurement – " + (_FIND if lost else _FOLLOW)
+    advice = _FIND if lost else _FOLLOW
+    outvoted = lost and inliers >= limits.lost_below
+    if disagree and not outvoted:
+        yield f"only {inliers:.0%} of the visible vertices agree with a measurement – {advice}"
     if hidden:
         yield (
             f"{occluded:.0%} of the vertices are occluded in the sensor that sees most of them – "
             "take away what hides the object, or add a camera on another side"
         )
-    if not disagree:
-        yield from _contradicted(fits)
+    if outvoted or not disagree:
+        yield from _contradicted(fits, advice)
     counts = most_agreeing(fits)
     if not (disagree or hidden) and counts.agreeing < limits.degraded_agreeing * counts.expected:
         cause = max(_ABSENT, key=counts.share)
@@ -106,12 +108,12 @@ def _seen(fits: Sequence[SensorFit], lost: bool, limits: Settings) -> Iterator[s
         )
 
 
-def _contradicted(fits: Sequence[SensorFit]) -> Iterator[str]:
+def _contradicted(fits: Sequence[SensorFit], advice: str) -> Iterator[str]:
     """Reasons by sensors of distances most of which contradict the others: colours that agree do not outvote them."""
     for fit in _of_distances(fits):
         judged = fit.counts.agreeing + fit.counts.disagreeing
         if judged >= MIN_JUDGED and fit.counts.agreeing < judged / 2:
-            yield f"only {fit.counts.agreeing / judged:.0%} of the distances of {fit.sensor} agree – {_FOLLOW}"
+            yield f"only {fit.counts.agreeing / judged:.0%} of the distances of {fit.sensor} agree – {advice}"
 
 
 #: What to do if the mesh does not agree.
@@ -198,6 +200,13 @@ def outside_share(fits: Sequence[SensorFit]) -> float:
     """
     counts = (fit.counts for fit in _of_distances(fits) if fit.counts.expected >= MIN_JUDGED)
     return min((one.outside / one.expected for one in counts), default=0.0)
+
+
+def distances_share(fits: Sequence[SensorFit]) -> float:
+    """Share of the distances that agree; the largest of the sensors that measure half of what faces them, 1 without."""
+    counts = [fit.counts for fit in _of_distances(fits)]
+    seen = [(one.agreeing, one.agreeing + one.disagreeing, one.facing - one.behind_itself) for one in counts]
+    return max((good / known for good, known, facing in seen if known >= max(MIN_JUDGED, facing / 2)), default=1.0)
 
 
 def _of_distances(fits: Sequence[SensorFit]) -> list[SensorFit]:

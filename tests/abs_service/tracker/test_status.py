@@ -206,6 +206,16 @@ def test_colors_that_agree_do_not_outvote_distances_that_do_not():
     assert judge([depth("tof", 300, 0), dark], (), SHAPE, 0.0, SETTINGS)[0] == Status.TRACKING, "a lamp went out"
 
 
+def test_a_mesh_whose_colors_agree_while_hardly_a_distance_does_is_lost():
+    colors = replace(fit(0.95), counts=VertexCounts(facing=300, agreeing=285, disagreeing=15))
+    status, reasons = judge([depth("tof", 40, 160), colors], (), SHAPE, 0.0, SETTINGS)
+    assert (status, facts(reasons)) == (Status.LOST, ("only 20% of the distances of tof agree",))
+    assert "bring the object back into sight" in reasons[0]
+    assert judge([depth("tof", 60, 140), colors], (), SHAPE, 0.0, SETTINGS)[0] == Status.DEGRADED
+    both = [depth("tof", 40, 160), depth("stereo", 200, 0), colors]
+    assert judge(both, (), SHAPE, 0.0, SETTINGS)[0] == Status.DEGRADED, "another sensor's distances agree"
+
+
 def test_an_object_that_was_not_where_it_was_expected_is_not_said_to_be_tracked():
     surprised = depth("a", 300, 0, float("nan"), surprised=True)
     status, reasons = judge([surprised], (), SHAPE, 0.0, SETTINGS)
