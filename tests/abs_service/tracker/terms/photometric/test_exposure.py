@@ -52,6 +52,13 @@ def test_a_channel_with_too_few_samples_has_the_gain_of_all():
     assert gains(expected * 0.6, expected) == pytest.approx([0.6] * 3)
 
 
+def test_gains_beyond_a_white_balance_are_another_thing_and_do_not_make_it_look_like_the_object():
+    ball, hand = np.full((300, 3), (60.0, 120.0, 55.0)), np.full((300, 3), (180.0, 140.0, 120.0))
+    found = gains(hand, ball)
+    assert np.ptp(found) == 0, "exposure at most, which all channels have in common"
+    assert np.abs(ball * found - hand).max(axis=1).min() > 60
+
+
 @pytest.mark.parametrize(("light", "remains"), [(Exposed(), False), (Passive(), True)])
 @pytest.mark.parametrize("pattern", [ONE_CHANNEL, BAYER_ORDERS["grbg"]], ids=["grey", "bayer"])
 def test_a_darker_image_of_one_value_per_pixel_costs_no_more_where_exposure_adapts(pattern, light, remains):
