@@ -20,11 +20,12 @@ MIN_COVER = 0.75
 #: Least radius around a grid point: within it are three pixels at least, wherever the point lies [px].
 MIN_RADIUS_PX = 1.5
 
-#: Distances around a grid point that deviate by more from their median belong to another surface [m].
-LARGEST_RELIEF_M = 0.03
+#: Distances around a grid point that deviate by more from their median belong to another surface [m]; or, where noise
+#: is more than this, by so many standard deviations of a distance.
+LARGEST_RELIEF_M, NOISY_RELIEF = 0.03, 3.0
 
-#: Or by more from a plane through all of them, if that is too steep for it: it shows no jump that it does not [m].
-LARGEST_BEND_M = 0.01
+#: Or by more from a plane through all of them, if that is too steep for it: it shows no jump that it does not.
+LARGEST_BEND_M, NOISY_BEND = 0.01, 2.0
 
 #: A triangle with a side longer than this multiple of the typical side spans a jump between two surfaces. A vertex at a
 #: jump takes a mean of both surfaces, so one side shows only a part of it (decision 0007); a plane's sides are no
@@ -57,7 +58,8 @@ def grid_mesh(detection: InitialDetection) -> Mesh:
     grid = _grid(np.argwhere(valid)[:, ::-1].astype(np.float32), spacing)
     rows, columns = grid.shape[:2]
     pixels = grid.reshape(-1, 2)
-    at_grid, deviation = _local_planes(pixels, distance, gaps, max(0.75 * spacing, MIN_RADIUS_PX))
+    reach = max(0.75 * spacing, MIN_RADIUS_PX)
+    at_grid, deviation = _local_planes(pixels, distance, gaps, reach, detection.deviation)
     place = np.where(np.isfinite(at_grid), np.arange(rows * columns), -1).reshape(rows, columns)
     positions = pose.transform(camera.T_rs, camera.directions(pixels) * at_grid[:, None])
     faces = _without_islands(_without_jumps(positions, triangles(place)))
@@ -95,7 +97,7 @@ def _cell_centers(length: float, spacing: float) -> NDArray[np.float64]:
 
 
 def _local_planes(
-    pixels: NDArray[np.float64], distance: NDArray[np.float32], gaps: NDArray[np.bool_], radius: float
+    pixels: NDArray[np.float64], distance: NDArray[np.float32], gaps: NDArray[np.bool_], radius: float, noise: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Distance [m] at pixel coordinates (g, 2) from a plane fitted around each, and its standard deviation [m].
 
@@ -111,13 +113,14 @@ def _local_planes(
     inside = np.all((around >= 0) & (around < distance.shape[::-1]), axis=2)
     column, row = np.moveaxis(np.where(inside[..., None], around, 0), -1, 0)
     values = np.where(within & inside, distance[row, column], np.nan).astype(np.float64)
-    near = np.abs(values - _row_medians(values)) < LARGEST_RELIEF_M
+    near = np.abs(values - _row_medians(values)) < max(LARGEST_RELIEF_M, NOISY_RELIEF * noise)
     known = np.isfinite(values)
     area, seen = np.count_nonzero(within, axis=1), np.count_nonzero(known, axis=1)
     bridged = np.count_nonzero(within & inside & gaps[row, column], axis=1)
     minimum = np.max([MIN_COVER * area - bridged, MIN_COVER * seen, np.full(len(area), 3)], axis=0)
     steep = np.flatnonzero((np.count_nonzero(near, axis=1) < minimum) & (seen >= minimum))
-    near[steep] = np.abs(values[steep] - _planes(values[steep], offset[steep], known[steep])[0]) < LARGEST_BEND_M
+    bend = max(LARGEST_BEND_M, NOISY_BEND * noise)
+    near[steep] = np.abs(values[steep] - _planes(values[steep], offset[steep], known[steep])[0]) < bend
     count = np.count_nonzero(near, axis=1)
     usable = np.flatnonzero(count >= minimum)
     near, values = near[usable], np.where(near[usable], values[usable], 0.0)

@@ -1,5 +1,7 @@
 """Segmentation of the object in a depth image by a region."""
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,7 +13,7 @@ from abs_service.tracker.detection.dropouts import fill_gaps
 from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection
 from abs_service.tracker.detection.plausibility import LARGEST_M, LARGEST_SCENE_M, MAX_POINTS, check_extent
 from abs_service.tracker.detection.regions.base import Region
-from calib.noise.base import DepthNoise, subtract_mean_offset
+from calib.noise.base import DepthNoise, pixels_where, subtract_mean_offset
 from calib.noise.fit.scatter import scatter
 from calib.rig import Rig
 
@@ -36,6 +38,7 @@ def detect_object(
     distance = subtract_mean_offset(sensor.noise, image.distance, image.amplitude)
     pictures = [(rig.sensors[n].camera, i.rgb) for n, i in observation.images.items() if isinstance(i, ColorImage)]
     view = DepthView.of(fill_gaps(distance), sensor.camera, pictures, observation.t_host_ns)
+    view = replace(view, deviation=_deviations(sensor.noise, image))
     check_extent(view.points_r[view.measured], "everything in sight", LARGEST_SCENE_M, sensor.head)
     inside = region.select(view)
     check_extent(view.points_r[inside], "the object", LARGEST_M, sensor.head)
@@ -69,6 +72,15 @@ def _noise_scale(
         return 1.0
     factor = scatter(np.where(as_far, distance, np.nan)) * middle**2 / deviation
     return factor if factor > TOO_MUCH_SCATTER else 1.0
+
+
+def _deviations(noise: DepthNoise, image: DepthImage) -> NDArray[np.float32]:
+    """Standard deviation (height, width) [m] of every distance by the noise model, NaN without return."""
+    places = pixels_where(np.isfinite(image.distance))
+    distance, amplitude = (values[places].astype(np.float64) for values in (image.distance, image.amplitude))
+    deviations = np.full(image.distance.shape, np.nan, np.float32)
+    deviations[places] = noise.deviation(distance, amplitude, places)
+    return deviations
 
 
 def _median_deviation(noise: DepthNoise, image: DepthImage, inside: NDArray[np.bool_]) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 from annotated_types import Ge, Gt
 from numpy.typing import NDArray
 
-from abs_service.tracker.detection.depth_view import DepthView, limited
+from abs_service.tracker.detection.depth_view import DepthView, Step, limited
 from abs_service.tracker.detection.initial_detection import DetectionError
 from abs_service.tracker.detection.plausibility import lining
 from abs_service.tracker.detection.segments.depth_segments import deepest_pixel, large_surfaces, surface_at
@@ -28,7 +28,8 @@ class Settings:
             distances there.
         seed: column and row of a pixel of the object [px]; without it, the object is the largest connected surface,
             unless that may be a wall or a floor.
-        largest_step_m: largest difference in distance between neighbouring pixels of one surface [m].
+        largest_step_m: largest difference in distance between neighbouring pixels of one surface [m]; "auto": 0.04, or
+            five standard deviations of the distance by the noise model where that is more.
         minimum_pixels: minimum number of pixels of a surface; smaller ones are ignored as noise.
         within: mask image as of the region `mask`; pixels outside are ignored, except for finding the plane.
         polygon: corners (column, row) of a polygon around the object [px], three or more; pixels outside are ignored,
@@ -37,7 +38,7 @@ class Settings:
 
     clearance_m: Annotated[float, Gt(0)] = CLEARANCE_M
     seed: tuple[Annotated[int, Ge(0)], Annotated[int, Ge(0)]] | None = None
-    largest_step_m: Annotated[float, Gt(0)] = 0.04
+    largest_step_m: Step = "auto"
     minimum_pixels: Annotated[int, Ge(16)] = 200
     within: Path | None = None
     polygon: Polygon | None = None
@@ -83,14 +84,14 @@ class Settings:
             labels, large = self._surfaces(view)
             return labels == large[0]
         try:
-            return surface_at(self.seed, view.distance, self.largest_step_m, self.minimum_pixels)
+            return surface_at(self.seed, view.distance, view.step(self.largest_step_m), self.minimum_pixels)
         except DetectionError as error:
             raise self._nothing(error) from None
 
     def _surfaces(self, view: DepthView) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
         """`large_surfaces` of what is above the plane; DetectionError if there is none."""
         try:
-            return large_surfaces(view.distance, self.largest_step_m, self.minimum_pixels)
+            return large_surfaces(view.distance, view.step(self.largest_step_m), self.minimum_pixels)
         except DetectionError as error:
             raise self._nothing(error) from None
 

@@ -8,7 +8,7 @@ import numpy as np
 from annotated_types import Ge, Gt
 from numpy.typing import NDArray
 
-from abs_service.tracker.detection.depth_view import DepthView, limited
+from abs_service.tracker.detection.depth_view import DepthView, Step, limited
 from abs_service.tracker.detection.initial_detection import DetectionError
 from abs_service.tracker.detection.segments.depth_segments import large_surfaces
 from abs_service.tracker.detection.segments.within import Polygon, Restricted, restricted
@@ -21,7 +21,8 @@ class Settings:
     Attributes:
         farthest_m: largest radial distance of the object [m].
         nearest_m: smallest radial distance of the object [m].
-        largest_step_m: largest difference in distance between neighbouring pixels of one surface [m].
+        largest_step_m: largest difference in distance between neighbouring pixels of one surface [m]; "auto": 0.04, or
+            five standard deviations of the distance by the noise model where that is more.
         minimum_pixels: minimum number of pixels of a surface; smaller ones are ignored as noise.
         within: mask image as of the region `mask`; pixels outside are ignored.
         polygon: corners (column, row) of a polygon around the object [px], three or more; pixels outside are ignored.
@@ -29,7 +30,7 @@ class Settings:
 
     farthest_m: Annotated[float, Gt(0)]
     nearest_m: Annotated[float, Ge(0)] = 0.0
-    largest_step_m: Annotated[float, Gt(0)] = 0.04
+    largest_step_m: Step = "auto"
     minimum_pixels: Annotated[int, Ge(16)] = 200
     within: Path | None = None
     polygon: Polygon | None = None
@@ -47,7 +48,9 @@ class Settings:
         with np.errstate(invalid="ignore"):
             in_range = (view.distance >= self.nearest_m) & (view.distance <= self.farthest_m)
         try:
-            labels, large = large_surfaces(limited(view, in_range).distance, self.largest_step_m, self.minimum_pixels)
+            labels, large = large_surfaces(
+                limited(view, in_range).distance, view.step(self.largest_step_m), self.minimum_pixels
+            )
         except DetectionError as error:
             raise DetectionError(f"from {self.nearest_m:g} to {self.farthest_m:g} m: {error}") from None
         return labels == large[0]

@@ -5,10 +5,10 @@ from pathlib import Path
 from typing import Annotated
 
 import numpy as np
-from annotated_types import Ge, Gt
+from annotated_types import Ge
 from numpy.typing import NDArray
 
-from abs_service.tracker.detection.depth_view import DepthView
+from abs_service.tracker.detection.depth_view import DepthView, Step
 from abs_service.tracker.detection.initial_detection import DetectionError
 from abs_service.tracker.detection.plausibility import is_scene
 from abs_service.tracker.detection.segments.depth_segments import large_surfaces
@@ -20,13 +20,14 @@ class Settings:
     """TOML keys of the region.
 
     Attributes:
-        largest_step_m: largest difference in distance between neighbouring pixels of one surface [m].
+        largest_step_m: largest difference in distance between neighbouring pixels of one surface [m]; "auto": 0.04, or
+            five standard deviations of the distance by the noise model where that is more.
         minimum_pixels: minimum number of pixels of a surface; smaller ones are ignored as noise.
         within: mask image as of the region `mask`; pixels outside are ignored.
         polygon: corners (column, row) of a polygon around the object [px], three or more; pixels outside are ignored.
     """
 
-    largest_step_m: Annotated[float, Gt(0)] = 0.04
+    largest_step_m: Step = "auto"
     minimum_pixels: Annotated[int, Ge(16)] = 200
     within: Path | None = None
     polygon: Polygon | None = None
@@ -41,7 +42,7 @@ class Settings:
         Raises:
             DetectionError: there is none, or it is a scene in which everything is connected.
         """
-        labels, large = large_surfaces(view.distance, self.largest_step_m, self.minimum_pixels)
+        labels, large = large_surfaces(view.distance, view.step(self.largest_step_m), self.minimum_pixels)
         nearest = labels == min(large, key=lambda label: float(np.median(view.distance[labels == label])))
         if is_scene(nearest, view.measured):
             share = np.count_nonzero(nearest) / np.count_nonzero(view.measured)

@@ -8,7 +8,7 @@ import numpy as np
 from annotated_types import Ge, Gt, Le
 from numpy.typing import NDArray
 
-from abs_service.tracker.detection.depth_view import DepthView
+from abs_service.tracker.detection.depth_view import DepthView, Step
 from abs_service.tracker.detection.initial_detection import DetectionError
 from abs_service.tracker.detection.segments.color_growth import grown_by_color
 from abs_service.tracker.detection.segments.seeds import ColorSeed, MotionSeed, PixelSeed, Seed, Surfaces
@@ -28,7 +28,8 @@ class Settings:
         motion_s: time within which the object moves [s]; pixels that moved in it belong to the object.
         grow: edges at which the object ends: steps in distance ("depth"), or edges of its colours, too ("color").
         minimum_motion_m: least change towards the sensor of a surface that has moved [m].
-        largest_step_m: largest difference in distance between neighbouring pixels of one surface [m].
+        largest_step_m: largest difference in distance between neighbouring pixels of one surface [m]; "auto": 0.04, or
+            five standard deviations of the distance by the noise model where that is more.
         minimum_pixels: minimum number of pixels of a surface, and of what moved or has the colour; less is noise.
         within: mask image as of the region `mask`; pixels outside are ignored.
         polygon: corners (column, row) of a polygon around the object [px], three or more; pixels outside are ignored.
@@ -39,7 +40,7 @@ class Settings:
     motion_s: Annotated[float, Ge(0.5)] | None = None
     grow: Literal["depth", "color"] = "depth"
     minimum_motion_m: Annotated[float, Gt(0)] = 0.02
-    largest_step_m: Annotated[float, Gt(0)] = 0.04
+    largest_step_m: Step = "auto"
     minimum_pixels: Annotated[int, Ge(16)] = 16
     within: Path | None = None
     polygon: Polygon | None = None

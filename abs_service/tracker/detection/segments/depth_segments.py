@@ -33,14 +33,14 @@ class Surfaces:
     count: int
 
 
-def connected_surfaces(distance: NDArray[np.float32], largest_step: float) -> Surfaces:
+def connected_surfaces(distance: NDArray[np.float32], largest_step: NDArray[np.float32] | float) -> Surfaces:
     """Surfaces that are separated at jumps in distance.
 
     The image is smoothed first, because a single noisy pixel would otherwise connect or split surfaces.
 
     Args:
         distance: radial distances (height, width) [m], NaN without return.
-        largest_step: largest difference between connected neighbours [m].
+        largest_step: largest difference between connected neighbours [m], of all pixels or of each (height, width).
     """
     known = np.isfinite(distance)
     smooth = cv2.medianBlur(cv2.copyTo(distance, known.view(np.uint8)), 5)  # zero where unknown
@@ -51,13 +51,13 @@ def connected_surfaces(distance: NDArray[np.float32], largest_step: float) -> Su
 
 
 def large_surfaces(
-    distance: NDArray[np.float32], largest_step: float, minimum_pixels: int
+    distance: NDArray[np.float32], largest_step: NDArray[np.float32] | float, minimum_pixels: int
 ) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
     """Label of every pixel's surface, 0 for none, and the labels (k,) of the large surfaces, the largest first.
 
     Args:
         distance: radial distances (height, width) [m], NaN without return.
-        largest_step: largest difference between connected neighbours [m].
+        largest_step: see `connected_surfaces`.
         minimum_pixels: minimum number of pixels of a surface.
 
     Raises:
@@ -78,7 +78,10 @@ def large_surfaces(
 
 
 def surface_at(
-    pixel: tuple[int, int], distance: NDArray[np.float32], largest_step: float, minimum_pixels: int
+    pixel: tuple[int, int],
+    distance: NDArray[np.float32],
+    largest_step: NDArray[np.float32] | float,
+    minimum_pixels: int,
 ) -> NDArray[np.bool_]:
     """Pixels (height, width) of the connected surface at a pixel, or else of the one nearest to it within `REACH_PX`.
 

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.detection.depth_view import DepthView
+from abs_service.tracker.detection.depth_view import DepthView, Step
 from abs_service.tracker.detection.initial_detection import DetectionError, UndecidedError
 from abs_service.tracker.detection.segments.depth_segments import large_surfaces, surface_at
 
@@ -46,7 +46,7 @@ class Seeded:
 class Surfaces:
     """Settings of connected surfaces: see `large_surfaces`."""
 
-    largest_step_m: float
+    largest_step_m: Step
     minimum_pixels: int
 
 
@@ -66,7 +66,7 @@ class PixelSeed:
 
     def __call__(self, view: DepthView, surfaces: Surfaces) -> Seeded:
         """The disc of the surface that is nearest to the pixel; DetectionError if there is no surface near it."""
-        surface = surface_at(self.pixel, view.distance, surfaces.largest_step_m, surfaces.minimum_pixels)
+        surface = surface_at(self.pixel, view.distance, view.step(surfaces.largest_step_m), surfaces.minimum_pixels)
         row, column = np.ogrid[: surface.shape[0], : surface.shape[1]]
         away = np.hypot(column - self.pixel[0], row - self.pixel[1])
         return Seeded(surface & (away <= away[surface].min() + DISC * surface.shape[1]), surface)
@@ -159,7 +159,7 @@ def _largest_patch(view: DepthView, surfaces: Surfaces, pixels: NDArray[np.bool_
     Raises:
         DetectionError: none has `minimum_pixels`.
     """
-    labels, large = large_surfaces(view.distance, surfaces.largest_step_m, surfaces.minimum_pixels)
+    labels, large = large_surfaces(view.distance, view.step(surfaces.largest_step_m), surfaces.minimum_pixels)
     there = (pixels & np.isin(labels, large)).view(np.uint8)
     patches = np.asarray(cv2.connectedComponents(cv2.morphologyEx(there, cv2.MORPH_OPEN, np.ones((3, 3))))[1])
     sizes = np.bincount(patches.ravel())[1:]

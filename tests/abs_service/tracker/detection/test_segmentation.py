@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from abs_service.tracker.detection.depth_view import DepthView
+from abs_service.tracker.detection.grid_mesh import grid_mesh
 from abs_service.tracker.detection.initial_detection import DetectionError
 from abs_service.tracker.detection.regions import box, nearest
 from abs_service.tracker.detection.segmentation import detect_object
@@ -73,3 +74,20 @@ def test_a_sensor_is_as_noisy_as_its_first_image_if_that_scatters_much_more_than
     seen = detect_object(images, rig, "tof", nearest.Settings().build(), 300)
     assert seen.noise_scale == pytest.approx(factor, rel=0.1)
     assert seen.deviation == pytest.approx(seen.noise_scale * 5e-3)
+
+
+@pytest.mark.parametrize(("away_m", "step", "whole"), [(1.0, "auto", True), (3.3, "auto", True), (3.3, 0.04, False)])
+def test_noise_and_steps_of_a_sensor_do_not_tear_a_far_surface(away_m, step, whole):
+    """A cylinder, in the steps of a structured light camera, whose distances err alike in blocks of pixels."""
+    noise, generator = StructuredLight(), np.random.default_rng(1)
+    rows, columns = np.indices((96, 128))
+    inside = (abs(columns - 64) < 20) & (abs(rows - 48) < 40)
+    depth = away_m + 0.1 * away_m * ((columns - 64) / 20) ** 2 / 2
+    shared = np.kron(generator.normal(0, noise.noise, (24, 32)), np.ones((4, 4)))
+    stepped = noise.step * np.round((1 / depth + shared) / noise.step)
+    images = observation(tof=depth_image(np.where(inside, 1 / stepped, np.nan).astype(np.float32)))
+    rig = Rig("r", {"tof": Sensor("tof", FINE, noise)})
+    seen = detect_object(images, rig, "tof", nearest.Settings(largest_step_m=step).build(), 300)
+    covered = np.count_nonzero(np.isfinite(seen.distance)) / np.count_nonzero(inside)
+    vertices = len(grid_mesh(seen).vertices)
+    assert (covered > 0.85 and vertices > 220) == whole, (covered, vertices)
