@@ -2,14 +2,20 @@
 
 import math
 import re
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain, islice
 from pathlib import Path
 
 from calib.files import limited
 
 #: Largest list of images [bytes].
 LARGEST_LIST = 1 << 26
+
+#: Names of images, and how many files are looked at and patterns are named where none matches.
+_SUFFIXES = {".bmp", ".jpeg", ".jpg", ".pgm", ".png", ".ppm", ".tif", ".tiff", ".webp"}
+_LOOKED_AT, _NAMED = 100_000, 4
 
 
 class ImageFolderError(Exception):
@@ -51,10 +57,10 @@ def by_number(folder: Path, pattern: str, rate_hz: float, *, alone: bool = False
         ImageFolderError: missing folder, no match, a name without a number, or duplicate numbers.
     """
     if not folder.is_dir():
-        raise ImageFolderError(f"{folder}: no such folder")
+        raise ImageFolderError(f"{folder}: {'is no folder' if folder.exists() else 'no such folder'}")
     paths = sorted(folder.glob(pattern))
     if not paths:
-        raise ImageFolderError(f"{folder}: no file matches {pattern!r}")
+        raise ImageFolderError(f"{folder}: no file matches {pattern!r}{_instead(folder)}")
     for path in paths:
         if last_number(path.stem) is None:
             raise ImageFolderError(f"{path}: there is no number in its name to tell which exposure it is")
@@ -62,6 +68,18 @@ def by_number(folder: Path, pattern: str, rate_hz: float, *, alone: bool = False
     if len(numbered) < len(paths):
         numbered = dict(enumerate(_by_all_numbers(paths, alone)))
     return [ImageFile(numbered[number], number, round(number * 1e9 / rate_hz)) for number in sorted(numbered)]
+
+
+def _instead(folder: Path) -> str:
+    """End of a message: patterns of the images in a folder and the folders in it; empty without images."""
+    paths = islice(chain(folder.glob("*.*"), folder.glob("*/*.*")), _LOOKED_AT)
+    there = Counter(
+        (path.relative_to(folder).parent / re.sub(r"\d+", "*", path.name)).as_posix()
+        for path in paths
+        if path.suffix.lower() in _SUFFIXES
+    )
+    named = ", ".join(f"{pattern!r} ({count})" for pattern, count in sorted(there.most_common(_NAMED)))
+    return f"; images there match {named}" if named else ""
 
 
 def _by_all_numbers(paths: Sequence[Path], alone: bool) -> list[Path]:

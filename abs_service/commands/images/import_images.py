@@ -189,7 +189,7 @@ def _streams(arguments: argparse.Namespace, cameras: CameraFile) -> Mapping[str,
     numbered = arguments.layout in PATTERNS
     folder, rate = arguments.path, arguments.rate or RATE_HZ
     if not folder.is_dir():
-        raise ImageFolderError(f"{folder}: no such folder")
+        raise ImageFolderError(f"{folder}: {'is no folder' if folder.exists() else 'no such folder'}")
     depth = cameras.depth
     depth_names, color_names = PATTERNS.get(arguments.layout, ("", ""))
     depth_names, color_names = arguments.depth or depth_names, arguments.color or color_names

@@ -98,6 +98,23 @@ def test_errors_in_names_name_the_file(tmp_path: Path, names: list[str], complai
         by_number(tmp_path, "depth_*.png", 30.0)
 
 
+def test_where_no_name_matches_the_patterns_of_the_images_that_are_there_are_named(tmp_path: Path) -> None:
+    for name in ("color/00000.jpg", "color/00001.jpg", "depth/00000.png", "frame-7.depth.png", "readme.txt"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_bytes(b"")
+    with pytest.raises(ImageFolderError) as caught:
+        by_number(tmp_path, "depth_*.png", 30.0)
+    named = "images there match 'color/*.jpg' (2), 'depth/*.png' (1), 'frame-*.depth.png' (1)"
+    assert str(caught.value) == f"{tmp_path}: no file matches 'depth_*.png'; {named}"
+    assert [file.seq for file in by_number(tmp_path, "color/*.jpg", 30.0)] == [0, 1], "what is named matches"
+
+
+def test_a_file_is_no_folder(tmp_path: Path) -> None:
+    (tmp_path / "depth.mat").write_bytes(b"")
+    with pytest.raises(ImageFolderError, match=r"depth\.mat: is no folder"):
+        by_number(tmp_path / "depth.mat", "*.png", 30.0)
+
+
 def test_a_missing_folder_is_named(tmp_path: Path) -> None:
     with pytest.raises(ImageFolderError, match="nowhere: no such folder"):
         by_number(tmp_path / "nowhere", "*.png", 30.0)
