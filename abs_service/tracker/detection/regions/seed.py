@@ -27,7 +27,8 @@ class Settings:
         color: red, green, blue of the object; the largest surface of about this colour is it.
         motion_s: time within which the object moves [s]; pixels that moved in it belong to the object.
         grow: edges at which the object ends: steps in distance ("depth"), or edges of its colours, too ("color").
-        minimum_motion_m: least change towards the sensor of a surface that has moved [m].
+        minimum_motion_m: least change towards the sensor of a surface that has moved [m]; it is four standard
+            deviations of the distances at least.
         largest_step_m: largest difference in distance between neighbouring pixels of one surface [m]; "auto": 0.04, or
             five standard deviations of the distance by the noise model where that is more.
         minimum_pixels: minimum number of pixels of a surface, and of what moved or has the colour; less is noise.

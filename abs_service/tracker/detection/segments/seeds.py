@@ -28,6 +28,9 @@ RIM_PX = 5
 #: Pixels of alike colours are connected over gaps of fewer pixels than this, as a print has them.
 PRINT_PX = 5
 
+#: What moved is nearer than before by so many standard deviations of the distances: far walls change by noise alone.
+MOVING = 4.0
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Seeded:
@@ -114,7 +117,8 @@ class MotionSeed:
             )
         before = np.sort([np.nan_to_num(distance, nan=-np.inf) for _, distance in self._before], axis=0)
         with np.errstate(invalid="ignore"):
-            nearer = before[-min(BEHIND, len(before))] - view.distance > self._minimum_m
+            least = np.fmax(self._minimum_m, MOVING * view.deviation)
+            nearer = before[-min(BEHIND, len(before))] - view.distance > least
         inner = np.asarray(cv2.erode(nearer.view(np.uint8), np.ones((RIM_PX, RIM_PX)))).view(np.bool_)
         limits = f"{self._minimum_m:g} m towards the camera, or in front of something, in {self._seconds:g} s"
         what = f"nothing moved by {limits}"

@@ -1,5 +1,7 @@
 """The region seed by motion: what moves in front of the scene."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -39,6 +41,21 @@ def test_what_moves_is_found_and_what_rests_is_not():
         assert np.count_nonzero(selected & truth) > 0.7 * np.count_nonzero(selected | truth)
         return
     pytest.fail("nothing moved")
+
+
+def test_a_far_wall_that_changes_by_its_noise_has_not_moved():
+    region = seed.Settings(motion_s=1.0).build()
+
+    def wall(k: int) -> DepthView:
+        shared = np.kron(np.random.default_rng(k).normal(0, 0.03, (6, 8)), np.ones((20, 20)))  # as of a stereo camera
+        view = DepthView.of((3.5 + shared).astype(np.float32), DEPTH, t_ns=round(k * 1e9 / 30))
+        return replace(view, deviation=0.03)
+
+    for k in range(31):
+        with pytest.raises(DetectionError):
+            region.select(wall(k))
+    with pytest.raises(DetectionError, match=r"nothing moved by 0\.02 m"):
+        region.select(wall(31))
 
 
 def test_motion_is_compared_anew_after_a_break():
