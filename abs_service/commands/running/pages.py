@@ -12,6 +12,7 @@ from absmsg.v1.command_pb2 import CommandAnswer
 from abs_service.bus.health import Health
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.commands.parts import rig_process
+from abs_service.display.page import style
 from abs_service.display.page.acting.commands import NONE, Commands
 from abs_service.display.page.feed import Feed
 from abs_service.display.page.page import Page
@@ -65,7 +66,7 @@ def _open(arguments: argparse.Namespace, opened: ExitStack) -> tuple[Page, Healt
     references = {name: rig.reference(name)[0] for name in rig.trackers}
     to_rig = Commands(reinitialize, record, control, references, tuple(rig.devices))
     page = Page(feed, silence, arguments.port, arguments.view_only, to_rig, time.monotonic_ns)
-    page.gui.set_panel_label(rig.name)
+    style.show_name(page.gui, rig.name)
     opened.callback(page.close)
     return page, health, Neighbour(rig.name, page.url, feed, silence)
 
@@ -76,7 +77,7 @@ def play(recording: Path, port: int) -> None:
     stop = rig_process.stop_on_signals()
     feed = Feed(playback, playback.now_ns)
     page = Page(feed, f"{recording.name} has no messages of this time.", port, True, NONE, time.monotonic_ns)
-    page.gui.set_panel_label(recording.name)
+    style.show_name(page.gui, recording.name)
     player = Player(page.gui, playback)
     print(f"page of {recording}: {page.url}", flush=True)
     try:

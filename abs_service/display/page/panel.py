@@ -9,6 +9,7 @@ import numpy as np
 import viser
 from viser import uplot
 
+from abs_service.display.page.feed import MINUTE_S
 from abs_service.display.page.pictures import Picture
 from abs_service.display.page.readouts.plots import Curves, complete
 from abs_service.display.page.readouts.words import Words
@@ -98,7 +99,7 @@ class Panel:
         lines = [f"<!-- {self._renewed} -->", GONE]
         for number, one in enumerate(words):
             title = f"<b style='font-size:{1.0 if number else 1.25}em'>{escape(one.title)}</b>"
-            text = f"<div style='margin-top:2px'>{escape(one.text)}</div>" if one.text else ""
+            text = f"<div style='font-size:0.9em;line-height:1.35'>{escape(one.text)}</div>" if one.text else ""
             style = f"background:{one.color};color:white;padding:8px 12px;border-radius:6px;margin:6px 8px"
             lines.append(f"<div class='abs-status' style='{style}'>{title}{text}</div>")
         self._status.content = "".join(lines)
@@ -161,7 +162,10 @@ class Panel:
             series = uplot.Series(label="s"), *_series(curves)
             if known is None:
                 with self._plot_tab:
-                    axes, scales = (uplot.Axis(stroke="#bbb"),) * 2, {"x": uplot.Scale(time=False)}
+                    axes, scales = (
+                        (uplot.Axis(stroke="#bbb"),) * 2,
+                        {"x": uplot.Scale(time=False, range=(-MINUTE_S, 0.0))},
+                    )
                     add = self._server.gui.add_uplot
                     self._plots[title] = add(data, series, title=title, scales=scales, axes=axes, aspect=2.6)
                 continue

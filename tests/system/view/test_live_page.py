@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from tests.system.running import START_S, RigListener, abs_service, wait_until
-from tests.system.view.browsing import PATIENCE_S, chosen_by_a_click, opened, picture_of, says
+from tests.system.view.browsing import PATIENCE_S, chosen_by_a_click, opened, picture_of, place_of, says
 
 #: Name of the rig of `run`.
 RIG = "demo"
@@ -31,9 +31,7 @@ def test_the_page_shows_a_mesh_that_moves_acts_and_connects_again(run, rig_file,
     wait_until(lambda: picture_of(page) != before, PATIENCE_S, "motion of the mesh")
     meshes_are_made_anew(page, listener, rig_file)
 
-    says(page, "Always recording")
-    assert page.get_by_role("button", name="Start recording").is_disabled()
-    assert page.get_by_text(RIG, exact=True).first.is_visible()
+    names_and_buttons_are_where_they_belong(page)
     page.get_by_role("tab", name="Images").click()
     page.get_by_text("Residual", exact=True).wait_for()
     page.locator("input[type=checkbox]:visible").first.click()
@@ -58,6 +56,15 @@ def test_the_page_shows_a_mesh_that_moves_acts_and_connects_again(run, rig_file,
     with RigListener(endpoint) as again:
         wait_until(again.tracks_since(0), START_S, "TRACKING")
     says(page, "Tracking")
+
+
+def names_and_buttons_are_where_they_belong(page):
+    says(page, "Always recording")
+    start, stop = (page.get_by_role("button", name=f"{one} recording") for one in ("Start", "Stop"))
+    assert start.is_disabled()
+    assert place_of(start)["y"] == place_of(stop)["y"]
+    assert page.get_by_text(RIG, exact=True).first.is_visible()
+    assert page.title() == f"{RIG} · abs-service"
 
 
 def meshes_are_made_anew(page, listener, rig_file):

@@ -68,8 +68,8 @@ def binned(times_s: NDArray[np.float64], values: Sequence[float] | NDArray[np.fl
     number = np.ones(len(index)) if values is None else np.asarray(values, float)
     kept = (index >= 0) & (index < STEPS) & np.isfinite(number)
     count = np.bincount(index[kept], minlength=STEPS)
-    if values is None:
-        return count * STEPS / MINUTE_S
+    if values is None:  # how many there were until half a second after the first is unknown
+        return np.where(np.cumsum(count) > count, count * STEPS / MINUTE_S, np.nan)
     total = np.bincount(index[kept], number[kept], minlength=STEPS)
     return np.where(count > 0, total / np.maximum(count, 1), np.nan)
 

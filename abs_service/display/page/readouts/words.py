@@ -37,8 +37,8 @@ def age(seconds: float) -> str:
 def preparing(kernels: str) -> Words:
     """A tracker that compiles its kernels, with the progress of that, or loads them."""
     if not kernels:
-        return Words("Loading kernels", "The first start on a computer compiles them, which takes minutes.", STARTING)
-    text = f"{kernels[:1].upper()}{kernels[1:]}. This takes minutes, once on each computer; tracking begins by itself."
+        return Words("Loading kernels", "The first start on a computer compiles them, once.", STARTING)
+    text = f"{kernels[:1].upper()}{kernels[1:]}. Once on each computer; tracking begins by itself."
     return Words("Compiling kernels for this rig", text, STARTING)
 
 
@@ -77,8 +77,8 @@ def slow(rate_hz: float, camera_hz: float, skipped: int) -> str:
     if not skipped or camera_hz <= 0 or rate_hz >= SLOW_SHARE * camera_hz:
         return ""
     return (
-        f"Only {rate_hz:.0f} estimates a second of {camera_hz:.0f} images, {skipped} skipped in the last minute: "
-        "the tracker is slow, or gets too little processor time. Close other programs, or choose fewer vertices"
+        f"Only {rate_hz:.0f} estimates a second of {camera_hz:.0f} images: the tracker is slow, "
+        "or gets too little processor time. Close other programs, or choose fewer vertices"
     )
 
 

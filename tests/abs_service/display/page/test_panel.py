@@ -89,6 +89,11 @@ def test_a_plot_shows_the_curves_that_it_is_given_last(server, added):
     assert added.count(plot) == 1
 
 
+def test_plots_have_the_same_minute_however_little_of_it_has_values(server, added):
+    Panel(server, {}).show_plots({"rate": {"rate": np.full(STEPS, np.nan)}})
+    assert added[-1].scales["x"]["range"] == (-60.0, 0.0)
+
+
 def test_an_image_is_updated_and_can_be_taken_away_and_shown_again(server, added):
     panel, image = Panel(server, {}), np.zeros((4, 4, 3), np.uint8)
     assert not panel.shows_residual
