@@ -133,6 +133,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             module = import_module(f"{module.__name__}.{MODULES.get(name, chosen)}")
         commands = getattr(module, "COMMANDS", {})
     from abs_service.commands.parts.log import logs  # noqa: PLC0415 - `logging` takes a third of the time of --help
+    from abs_service.supervision.process_setup import process_tuning  # noqa: PLC0415 - likewise `ctypes`
 
     parser = command_parser(name, module)
     logs.add_arguments(parser)
@@ -140,6 +141,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = parser.parse_args(given, context)
     try:
         logs.set_up(arguments, name, given)
+        process_tuning.keep_freed_memory()  # most commands read images, one after the other
         code = module.run(arguments)
         standard_files.flush()  # here, where an error is noticed, and not at the end of the interpreter
         return code

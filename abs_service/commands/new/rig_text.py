@@ -162,7 +162,7 @@ region = {{ type = "nearest" }}
 """,
     "plane": """\
 # The object is what stands out from the largest plane in view by more than clearance_m when tracking begins.
-# What lies flat on it does not; region = {{ type = "seed", pixel = [320, 240], grow = "color" }} finds it by colour.
+# What lies flat on it does not; region = {{ type = "seed", pixel = [column, row], grow = "color" }} finds it by colour.
 region = {{ type = "above_plane", clearance_m = 0.01 }}
 """,
     "things": """\

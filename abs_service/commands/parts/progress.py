@@ -15,11 +15,15 @@ _COMPILATION = "numba:compile"
 def bars(disable: bool = False) -> Iterator[Progress]:
     """Bars with a text, a number of a total, and the time that is left; kernels have one while they are compiled.
 
+    They vanish at the end, as the results say what was done, and are not shown where no terminal is.
+
     Args:
         disable: True to show nothing.
     """
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), disable=disable) as progress:
+    console = Console(stderr=True)
+    shown = console.is_terminal and not disable
+    with Progress(*columns, console=console, disable=not shown, transient=True) as progress:
         # How many will be missing in the cache is known only when they are.
         task = progress.add_task("compiling kernels", total=None, visible=False)
         with event.install_listener(_COMPILATION, _Compilations(progress, task)):

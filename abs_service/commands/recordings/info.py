@@ -57,5 +57,5 @@ def _configuration(path: Path) -> str:
 
 def _summary(path: Path) -> Summary:
     with bars() as progress:
-        task = progress.add_task(path.name, total=None)
+        task = progress.add_task(f"{path.name}, chunks", total=None)
         return summarize(path, lambda done, total: progress.update(task, completed=done, total=total))

@@ -108,20 +108,18 @@ def _topics(topics: dict[str, Any]) -> Table:
 
 
 def _trackers(trackers: dict[str, Any]) -> Table:
-    table = Table("tracker", "status", box=None, pad_edge=False)
-    for name in ("longest without TRACKING", "σ, median (p95)", "search, median (p95)", "skipped", "meshes"):
-        table.add_column(name, justify="right")
-    for name, one in trackers.items():
-        status = ", ".join(f"{share:.1%} {status}" for status, share in one["shares"].items())
-        table.add_row(
-            name,
-            status,
-            f"{one['longest_untracked_s']:.1f} s",
-            _words(one["deviation_m"], 1e3, "mm"),
-            _words(one["solve_s"], 1e3, "ms"),
-            str(one["skipped"]),
-            str(one["meshes"]),
-        )
+    """A column for each tracker, which fits into a narrow window."""
+    table = Table("tracker", *trackers, box=None, pad_edge=False)
+    rows = {
+        "status": lambda one: ", ".join(f"{share:.1%} {status}" for status, share in one["shares"].items()),
+        "longest without TRACKING": lambda one: f"{one['longest_untracked_s']:.1f} s",
+        "σ, median (95 %)": lambda one: _words(one["deviation_m"], 1e3, "mm"),
+        "search, median (95 %)": lambda one: _words(one["solve_s"], 1e3, "ms"),
+        "frame sets skipped": lambda one: str(one["skipped"]),
+        "meshes": lambda one: str(one["meshes"]),
+    }
+    for name, text in rows.items():
+        table.add_row(name, *map(text, trackers.values()))
     return table
 
 

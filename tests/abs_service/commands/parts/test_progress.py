@@ -5,7 +5,8 @@ from abs_service.commands.parts import progress
 
 
 @pytest.mark.parametrize("disable", [True, False])
-def test_kernels_are_counted_while_they_are_compiled_and_no_longer(disable, capsys):
+def test_kernels_are_counted_while_they_are_compiled_and_no_longer(disable, capsys, monkeypatch):
+    monkeypatch.setenv("FORCE_COLOR", "1")  # a terminal, for rich
     inner = numba.njit(lambda x: x + 1)
     outer = numba.njit(lambda x: 2 * inner(x))
     with progress.bars(disable) as bars:

@@ -1,11 +1,16 @@
 """`abs-service info` shows of a recording what was written into it."""
 
 import json
+import subprocess
+import sys
 
+import numpy as np
 import pytest
+from absmsg.v1.deformed_mesh_pb2 import MeshTopology
 
 from abs_service import config
 from abs_service.cli import main
+from drivers.encoding.mcap_file import Compression, McapFile
 from tests.abs_service.commands.recordings.estimated_recording import NAMES, SIMULATION, TOML, write_estimated
 from tests.abs_service.commands.recordings.simulated_recording import write_take
 
@@ -75,6 +80,40 @@ def test_people_get_one_line_per_topic(tmp_path, capsys):
     (depth,) = (line for line in lines if line.startswith("/tof/depth/image"))
     assert "30.0 Hz" in depth
     assert not any("/info" in line for line in lines)
+
+
+def test_trackers_have_a_column_each_which_fits_into_a_narrow_window(tmp_path, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    assert main(["info", str(write_estimated(tmp_path / "x.mcap"))]) == 0
+    table = capsys.readouterr().out.partition("\ntracker ")[2].splitlines()
+    assert table[1].split()[:3] == ["status", "50.0%", "TRACKING,"]
+    assert [line.split()[-2:] for line in table if line.startswith("longest")] == [["0.1", "s"]]
+    assert max(map(len, table)) <= 80
+
+
+#: Page faults of a second `info` on a file.
+_FAULTS = """
+import resource, sys
+from abs_service.cli import main
+from drivers.encoding.mcap_file import Compression, McapFile
+counts = []
+for _ in range(2):
+    main(["info", sys.argv[1], "--json"])
+    counts.append(resource.getrusage(resource.RUSAGE_SELF).ru_minflt)
+print(counts[1] - counts[0])
+"""
+
+
+def test_a_chunk_is_read_into_the_memory_of_the_one_before(tmp_path):
+    images, noise = 200, np.random.default_rng(0)
+    with (tmp_path / "x.mcap").open("wb") as stream:
+        file = McapFile(stream, Compression.LZ4)  # as the recorder
+        for number in range(images):
+            file.write("/sheet/topology", MeshTopology.DESCRIPTOR.full_name, noise.bytes(230_400), number, number)
+        file.finish()
+    program = [sys.executable, "-c", _FAULTS, str(tmp_path / "x.mcap")]
+    done = subprocess.run(program, check=True, capture_output=True, text=True)
+    assert int(done.stdout.splitlines()[-1]) < 20 * images
 
 
 def test_what_cannot_be_read_is_named_and_the_others_are_described(tmp_path, capsys):

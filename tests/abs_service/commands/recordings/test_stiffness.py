@@ -46,10 +46,11 @@ def test_the_stiffness_and_a_picture_come_out(recording, said):
 
 
 @pytest.mark.usefixtures("said")  # when no kernel has to be compiled any more, images are all that is counted
-def test_the_text_has_stiffness_and_uncertainty(recording, capsys):
+def test_the_text_has_stiffness_and_uncertainty(recording, capsys, monkeypatch):
+    monkeypatch.setenv("FORCE_COLOR", "1")  # a terminal, for rich
     assert cli.main(["stiffness", str(recording), "--weight", "0.3"]) == Exit.OK
     said, progress = capsys.readouterr()
-    assert re.search(r"images \S+ (\d+)/\1 ", progress)
+    assert re.search(r"images .*?(\d+)/\1\D", progress)
     assert "bending stiffness per width  D = " in said
     assert "mN·m ± " in said
     assert "strip-stiffness.png" in said
