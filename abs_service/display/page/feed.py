@@ -1,4 +1,4 @@
-"""Newest messages of a rig, and figures of the last minute. Images are received only while a browser is connected."""
+"""Newest messages of a rig, and figures of the last minute. Images and meshes come only while they are shown."""
 
 import threading
 from collections import deque
@@ -28,7 +28,7 @@ M = TypeVar("M", bound=Message)
 #: Time that numbers are kept [s], images that are kept of a stream, and the timeout of a query [s].
 MINUTE_S, IMAGES, QUERY_S = 60.0, 6, 0.2
 
-_PATTERNS = ("health/**", keys.state("*"), keys.mesh("*"), keys.topology("*"), keys.model("*"), keys.CONFIG)
+_PATTERNS = ("health/**", keys.state("*"), keys.topology("*"), keys.model("*"), keys.CONFIG)
 _MESSAGES: tuple[type[Message], ...] = (Health, DeformationState, DeformedMesh, MeshTopology, SensorModel, Config)
 
 
@@ -102,12 +102,14 @@ class Feed:
         """Time by the clock [s]."""
         return self._clock() * 1e-9
 
-    def watch_images(self, wanted: bool) -> None:
-        """Begins or ends receiving images."""
+    def watch(self, wanted: bool) -> None:
+        """Begins or ends receiving images and meshes."""
         if wanted and not self._watching:
-            self._watching = [self._source.subscribe("*/*/image", self._take_image)]
+            subscribe = self._source.subscribe
+            self._watching = [subscribe("*/*/image", self._take_image), subscribe(keys.mesh("*"), self._take)]
         elif not wanted and self._watching:
-            self._watching.pop().close()
+            while self._watching:
+                self._watching.pop().close()
             with self._lock:
                 self._images.clear()
 

@@ -96,7 +96,7 @@ class Page:
         while not stop.is_set():
             tick()
             looked_at = bool(self._server.get_clients())
-            self._feed.watch_images(looked_at)
+            self._feed.watch(looked_at)
             now_s = 1e-9 * self._clock()
             for draw in periods_s if looked_at else ():
                 if now_s >= self._due_s[draw]:

@@ -56,14 +56,25 @@ def test_images_come_only_while_somebody_looks_and_the_nearest_exposure_is_found
     rig = Rig()
     rig.image(100)
     assert rig.feed.streams() == []
-    rig.feed.watch_images(True)
+    rig.feed.watch(True)
     for t_ns in (200, 300, 400):
         rig.image(t_ns)
     found = [rig.feed.frame("tof/ir/image", t_ns) for t_ns in (0, 190, 310)]
     assert [one and one[0].t_host_ns for one in found] == [400, 200, 300]
-    rig.feed.watch_images(False)
+    rig.feed.watch(False)
     rig.image(500)
     assert rig.feed.streams() == []
+
+
+def test_meshes_are_received_only_while_somebody_looks():
+    rig, topic = Rig(), "sheet/mesh"
+    versions = []
+    for version, looked_at in enumerate((False, True, False), 1):
+        rig.feed.watch(looked_at)
+        rig.send(topic, DeformedMesh(tracker="sheet", mesh_version=version))
+        found = rig.feed.newest(topic, DeformedMesh)
+        versions.append(found[0].mesh_version if found else 0)
+    assert versions == [0, 2, 2]
 
 
 def test_the_topology_of_another_mesh_is_not_used_and_the_right_one_asked_for():

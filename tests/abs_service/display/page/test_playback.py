@@ -29,7 +29,7 @@ class Bench:
         self.now_ns = 10**12
         self.playback = Playback(path, lambda: self.now_ns)
         self.feed = Feed(self.playback, self.playback.now_ns)
-        self.feed.watch_images(True)
+        self.feed.watch(True)
 
     def after(self, seconds: float) -> str:
         """The status that the page has so much later; "" without one."""
@@ -98,11 +98,11 @@ def test_in_a_pause_nothing_ages_and_without_a_browser_time_stands_still(bench):
     bench.after(100.0)
     assert (bench.playback.position_s, bench.feed.age_s()) == before
     bench.playback.play()
-    bench.feed.watch_images(False)
+    bench.feed.watch(False)
     bench.after(PERIOD_S)
     assert bench.playback.position_s == before[0]
     assert bench.feed.streams() == []
-    bench.feed.watch_images(True)  # a browser that comes later sees the same at once
+    bench.feed.watch(True)  # a browser that comes later sees the same at once
     bench.after(PERIOD_S)
     assert bench.playback.position_s == before[0]
     assert "tof/depth/image" in bench.feed.streams()

@@ -106,7 +106,7 @@ def test_progress_of_the_compilation_is_told_for_each_tracker_that_compiles(rig)
 
 def test_a_slow_tracker_is_told_while_it_has_estimates(rig):
     rig.send("tof/depth/image", DeformationState())  # no image, but its stream is there
-    rig.feed.watch_images(True)
+    rig.feed.watch(True)
     rig.send("tof/depth/image", DeformationState())
     rig.health("capture", "", Health.LEVEL_OK, gauges={"rate_hz.tof/depth/image": 30.0})
     rig.state("left", "TRACKING")
