@@ -14,7 +14,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sized
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib.util import find_spec
@@ -76,12 +76,12 @@ def run(settings: Settings, context: Context) -> Findings:
         rig, port = _write_rig(Path(folder), context.seed), free_port()
         with Service(rig), Subscriber(endpoint_of(rig), _NAME, TRACKER) as estimates, _page(rig, port) as page:
             _await_tracking(estimates)
-            parts = {_BEFORE: measured(page, estimates, settings.duration_s)}
+            parts = {_BEFORE: measured(page, estimates.arrivals, settings.duration_s)}
             context.progress(_SHOWN)
             with _browser(port):
-                parts[_SHOWN] = measured(page, estimates, settings.duration_s)
+                parts[_SHOWN] = measured(page, estimates.arrivals, settings.duration_s)
             context.progress(_AFTER)
-            parts[_AFTER] = measured(page, estimates, settings.duration_s)
+            parts[_AFTER] = measured(page, estimates.arrivals, settings.duration_s)
     return findings(parts)
 
 
@@ -141,10 +141,10 @@ def _browser(port: int) -> Iterator[None]:
             browser.close()
 
 
-def measured(page: int, estimates: Subscriber, duration_s: float) -> Part:
+def measured(page: int, arrivals: Sized, duration_s: float) -> Part:
     """Processor time and estimates of so many seconds, once it has settled."""
     time.sleep(SETTLED_S)
-    begin_s, cpu_s, number = time.monotonic(), proc.usage(page).cpu_s, len(estimates.arrivals)
+    begin_s, cpu_s, number = time.monotonic(), proc.usage(page).cpu_s, len(arrivals)
     time.sleep(duration_s)
     took_s = time.monotonic() - begin_s
-    return Part((proc.usage(page).cpu_s - cpu_s) / took_s, (len(estimates.arrivals) - number) / took_s)
+    return Part((proc.usage(page).cpu_s - cpu_s) / took_s, (len(arrivals) - number) / took_s)
