@@ -44,6 +44,9 @@ MIN_WIDTH = 900
 #: Height of the line of text, width of the legend, and least height beside it [px].
 LINE, LEGEND, MIN_HEIGHT = 40, 390, 480
 
+#: Room for the rows' numbers on the left of the image, and for the columns' below it [px].
+LEFT, BELOW = 64, 52
+
 #: Pixels per inch, the unit of sizes of text.
 DPI = 100
 
@@ -117,26 +120,29 @@ class _Page:
 
     def __init__(self, width: int, height: int) -> None:
         self._image = width, height
-        self._width, self._height = width + LEGEND, max(height, MIN_HEIGHT) + LINE
+        self._width, self._height = LEFT + width + LEGEND, LINE + max(height, MIN_HEIGHT) + BELOW
         self.figure = plots.figure(self._width / DPI, self._height / DPI)
         self.figure.set_layout_engine("none")
         self.figure.set_facecolor(PAGE)
 
     def image_axes(self, columns: int, rows: int) -> "Axes":
-        """Axes of an image of so many pixels."""
+        """Axes of an image of so many pixels, by whose numbers a region is written."""
         width, height = self._image
-        axes = self.figure.add_axes(self._box(0, LINE, width, height))
+        axes = self.figure.add_axes(self._box(LEFT, LINE, width, height))
         axes.set(xlim=(-0.5, columns - 0.5), ylim=(rows - 0.5, -0.5))
-        axes.set_axis_off()
+        axes.set_xlabel("column u [px]", color=TEXT)
+        axes.set_ylabel("row v [px]", color=TEXT)
+        axes.tick_params(labelsize=9, colors=TEXT)
+        axes.spines[:].set_visible(False)  # they would hide an outline along the border
         return axes
 
     def bar_axes(self) -> "Axes":
         """Axes of a horizontal colour bar below the legend."""
-        return self.figure.add_axes(self._box(self._image[0] + 16, self._height - 62, LEGEND - 44, 12))
+        return self.figure.add_axes(self._box(LEFT + self._image[0] + 16, self._height - 62, LEGEND - 44, 12))
 
     def write_legend(self, line: str, parts: "list[Artist]", text: str) -> None:
         """Writes the line, the labels of what was drawn, and a text below them."""
-        left, top = self._box(self._image[0] + 12, LINE, 0, 0)[:2]
+        left, top = self._box(LEFT + self._image[0] + 12, LINE, 0, 0)[:2]
         self.figure.text(12 / self._width, 1 - LINE / 2 / self._height, line, va="center", fontsize=11, color=TEXT)
         legend = self.figure.legend(
             handles=parts, loc="upper left", bbox_to_anchor=(left, top),

@@ -10,7 +10,16 @@ import pytest
 from abs_service import cli, config
 from abs_service.commands.parts.checks import harmless_devices
 from abs_service.display.pictures import preview_picture
-from abs_service.display.pictures.preview_picture import CLASS_COLORS, LEGEND, LINE, NO_RETURN, REGION, WARNING
+from abs_service.display.pictures.preview_picture import (
+    BELOW,
+    CLASS_COLORS,
+    LEFT,
+    LEGEND,
+    LINE,
+    NO_RETURN,
+    REGION,
+    WARNING,
+)
 from abs_service.supervision.exit_codes import Exit
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.terms.depth.outline.rim_classes import RimClass
@@ -47,7 +56,7 @@ def count(image: np.ndarray, color: str) -> int:
 
 def has(picture: Path, color: str) -> bool:
     """True if the depth image of a picture, without the legend, has pixels of a colour."""
-    return count(drawn(picture)[LINE:, :-LEGEND], color) > 0
+    return count(drawn(picture)[LINE:-BELOW, LEFT:-LEGEND], color) > 0
 
 
 def size(picture: Path) -> tuple[int, int]:
@@ -66,7 +75,7 @@ def test_replay_draws_what_it_tracks_then(recording, tmp_path, capsys):
     assert f"mesh.vertices = {derived['mesh.vertices'][0]:.0f}, model.control_points = [" in line
     assert line.endswith("model.degree = 3, objective.outline_px = 0.5")
     assert out.exists()
-    assert size(picture) == (6 * 160 + LEGEND, 6 * 120 + LINE)
+    assert size(picture) == (LEFT + 6 * 160 + LEGEND, LINE + 6 * 120 + BELOW)
     for color in (CLASS_COLORS[RimClass.FREE], REGION, NO_RETURN):
         assert has(picture, color)
 
@@ -83,11 +92,13 @@ def test_every_class_has_its_colour_at_every_size(tmp_path, wanted):
     seen = Preview(0, camera, distance, distance > 0, found, "")
     preview_picture.draw(seen, "sheet", "nurbs", tmp_path / "x.png")
     enlarged = {160: 6, 640: 2}[width]
-    assert size(tmp_path / "x.png") == (enlarged * width + LEGEND, enlarged * height + LINE)
+    assert size(tmp_path / "x.png") == (LEFT + enlarged * width + LEGEND, LINE + enlarged * height + BELOW)
     for color in (*CLASS_COLORS.values(), REGION, NO_RETURN):
         assert has(tmp_path / "x.png", color)
     image = drawn(tmp_path / "x.png")
-    assert np.count_nonzero(image[LINE:, :-LEGEND].min(axis=2) > 150) > 1000  # the mesh, on dark grey
+    assert np.count_nonzero(image[LINE:-BELOW, LEFT:-LEGEND].min(axis=2) > 150) > 1000  # the mesh, on dark grey
+    assert (image[-BELOW + 12 :, LEFT:-LEGEND].max(axis=2) > 150).any()  # the columns' numbers
+    assert (image[LINE:-BELOW, : LEFT - 12].max(axis=2) > 150).any()  # the rows'
     assert count(image, WARNING) == 0
     title = preview_picture.title(seen, "sheet", "nurbs")
     assert title == "sheet (nurbs), frame 0: 117 vertices, 300 × 200 × 0 mm, 1.00 m away"
