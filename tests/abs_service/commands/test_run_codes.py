@@ -50,3 +50,21 @@ def test_trackers_that_never_tracked_are_named():
     assert outcome.untracked({"hat": found, "sheet": lost, "scarf": TrackerLog()}) == ["sheet", "scarf"]
     assert "nothing was tracked" in lost.summary()
     assert "nothing was tracked" not in found.summary()
+
+
+@pytest.mark.parametrize(
+    ("recorder", "statuses", "stopped", "expected"),
+    [
+        (0, [DeformationState.STATUS_TRACKING], False, Exit.OK),
+        (0, [DeformationState.STATUS_INITIALIZING], False, Exit.FAILED),
+        (0, [DeformationState.STATUS_INITIALIZING], True, Exit.OK),  # by a user, who did not wait
+        (1, [DeformationState.STATUS_TRACKING], False, Exit.FAILED),
+        (1, [DeformationState.STATUS_TRACKING], True, Exit.FAILED),
+    ],
+)
+def test_a_run_fails_if_it_ended_by_itself_untracked_or_if_its_recording_lacks_something(
+    recorder, statuses, stopped, expected
+):
+    seen = view(recorder, 0)
+    seen.live.trackers["sheet"] = log(*statuses)
+    assert outcome.code(seen, stopped) is expected
