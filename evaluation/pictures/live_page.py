@@ -37,7 +37,7 @@ HIDDEN = ".mantine-Notifications-root, .mantine-Tooltip-tooltip"
 SERVICE = [sys.executable, "-m", "abs_service"]
 
 
-def _record(folder: Path) -> Path:
+def record(folder: Path) -> Path:
     """Records the rig and tracks every image of it; returns the recording with images and estimates."""
     tracked = folder / "tracked.mcap"
     subprocess.run([*SERVICE, "run", RIG, "--duration", str(DURATION_S), "--out", folder], check=True)
@@ -46,9 +46,9 @@ def _record(folder: Path) -> Path:
 
 
 @contextmanager
-def _served(recording: Path) -> Iterator[None]:
-    """The page of a recording, as a process of its own."""
-    page = subprocess.Popen([*SERVICE, "view", recording, "--port", str(PORT), "--view-only"])
+def served(command: str, source: Path, *options: str) -> Iterator[None]:
+    """The page that `view` serves of a recording, or `run` of a rig, in processes of its own."""
+    page = subprocess.Popen([*SERVICE, command, source, *options], stdout=subprocess.DEVNULL)
     try:
         yield
     finally:
@@ -56,8 +56,8 @@ def _served(recording: Path) -> Iterator[None]:
         page.wait()
 
 
-def _open(page: Page) -> None:
-    """Waits for the page, stops it at the first time, and turns to its images."""
+def open_page(page: Page) -> None:
+    """Waits for the page."""
     deadline_s = time.monotonic() + 60
     while True:
         try:
@@ -67,11 +67,16 @@ def _open(page: Page) -> None:
             if time.monotonic() > deadline_s:
                 raise
             time.sleep(0.3)
+    page.add_style_tag(content=f"{HIDDEN} {{ display: none !important }}")
+
+
+def open_recording(page: Page, at_s: float) -> None:
+    """Waits for the page, stops its recording at a time, and turns to its images."""
+    open_page(page)
     page.get_by_role("button", name="Pause").click(timeout=120_000)
     page.get_by_role("button", name="Play").wait_for()
-    page.add_style_tag(content=f"{HIDDEN} {{ display: none !important }}")
     at = page.get_by_role("textbox").first
-    at.fill(str(FROM_S))
+    at.fill(str(at_s))
     at.press("Enter")
     page.get_by_role("tab", name="Images").click()  # the time counts when its field is left
 
@@ -94,11 +99,11 @@ def main() -> None:
     parser.add_argument("picture", type=Path)
     picture = parser.parse_args().picture
     with tempfile.TemporaryDirectory() as name, sync_playwright() as playwright:
-        recording = _record(Path(name))
+        recording = record(Path(name))
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=OPTIONS)
-        with _served(recording):
+        with served("view", recording, "--port", str(PORT), "--view-only"):
             page = browser.new_page(viewport={"width": 1180, "height": 640})
-            _open(page)
+            open_recording(page, FROM_S)
             images = _photographs(page)
         browser.close()
     period_ms = round(1000 * (TO_S - FROM_S) / len(images))

@@ -171,8 +171,7 @@ class Page:
                 self._scene.show_points(frame.sensor, points_r, spacing_m, stale, self._panel.shows[1])
             drawn = pictures.with_mesh(pictures.grey(image) if stale else image, camera, vertices, faces)
             name = topic.removesuffix("/image")
-            state = f"{words.age(age_s)} old" if stale else f"{self._feed.image_rate_hz(topic):.1f} Hz"
-            self._panel.show_image(name, f"{name}, {state}", drawn)
+            self._panel.show_image(name, words.stream(name, age_s, self._feed.image_rate_hz(topic)), drawn)
             if frame.kind == Kind.DEPTH:
                 self._draw_residual(name, frame, camera, image, stale)
 

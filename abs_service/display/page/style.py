@@ -27,7 +27,7 @@ STYLE = f"""<style>
 .abs-status {{ animation: abs-old 0s {GONE_S}s forwards }}
 div:has(> .abs-status) {{ height: 8.5em; overflow-y: auto; overscroll-behavior: contain; scrollbar-width: thin }}
 {_NEXT}, {_NEXT} + div:has(> .mantine-Button-root) {{ display: inline-block; box-sizing: border-box; width: 50%;
-  margin-inline: 0 !important; padding-inline: 6px }}
+  margin-inline: 0 !important; padding-inline: 8px }}
 pre {{ white-space: pre-wrap !important }}
 @media (max-width: {NARROW_EM}em) {{
   div:has(> .abs-status) {{ height: 7em }}

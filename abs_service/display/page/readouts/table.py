@@ -58,7 +58,7 @@ def _age(state: DeformationState, sensor: DeformationState.Sensor, since_s: floa
         return "no frame in time"
     older_s = (state.header.t_host_ns - sensor.t_host_ns) * 1e-9
     seconds = state.age_ms * 1e-3 + older_s + since_s
-    return f"{words.age(seconds)} old" if math.isfinite(seconds) else "of unknown age"
+    return f"{words.age(seconds)} old" if math.isfinite(seconds) else ""  # as in a replay
 
 
 def _likelihood(sensor: DeformationState.Sensor) -> str:

@@ -34,6 +34,13 @@ def age(seconds: float) -> str:
     return f"{seconds:.0f} s" if seconds < 120 else f"{seconds / 60:.0f} min"
 
 
+def stream(name: str, age_s: float, rate_hz: float) -> str:
+    """Title of an image: its stream, and its age if it is stale [s], else its rate [1/s] if that is known, not 0."""
+    if age_s > STALE_S:
+        return f"{name}, {age(age_s)} old"
+    return f"{name}, {rate_hz:.1f} Hz" if rate_hz else name
+
+
 def preparing(kernels: str) -> Words:
     """A tracker that compiles its kernels, with the progress of that, or loads them."""
     if not kernels:

@@ -39,7 +39,7 @@ def test_every_sensor_says_how_old_it_is_by_now():
     assert rows["tof"] == "0.1 s old, log-likelihood -1.50, no losses"
     assert rows["cam"] == "0.2 s old, no losses"
     assert rows["late"] == "no frame in time, no losses"
-    assert Bench(math.nan).rows()["tof"].startswith("of unknown age")
+    assert Bench(math.nan).rows()["tof"].startswith("log-likelihood")
 
 
 def test_losses_are_told_by_sensor_and_cause_where_they_concern_the_tracker():

@@ -52,3 +52,9 @@ def test_a_silent_rig_is_told_with_what_to_do():
     assert said.title == "Nothing heard from the rig for 12 s"
     assert "tcp/rig:1" in said.text
     assert "yet" in getattr(words.silence(math.inf, "tcp/rig:1"), "title", "")
+
+
+def test_an_image_is_titled_by_its_age_or_its_rate():
+    assert words.stream("tof/depth", 1.5, 30.0) == "tof/depth, 1.5 s old"
+    assert words.stream("tof/depth", 0.5, 30.0) == "tof/depth, 30.0 Hz"
+    assert words.stream("tof/depth", 0.5, 0.0) == "tof/depth"  # nobody says, as in a replay
