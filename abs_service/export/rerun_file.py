@@ -26,6 +26,9 @@ TIMELINE = "time"
 
 JPEG_QUALITY = 90
 
+#: Colour and radius of measured points [px], which lie around the mesh and leave it in sight.
+POINT, POINT_PX = (110, 130, 170), 0.7
+
 _COLORS = {State.Status.Name(status).removeprefix("STATUS_"): color for status, color in COLORS.items()}
 _LEVELS = {"DEGRADED": "WARN", "LOST": "ERROR"}
 
@@ -167,4 +170,4 @@ class RerunFile:
             return
         self._stream.log(name, rr.DepthImage(np.nan_to_num(z), meter=1.0))
         if points is not None:
-            self._stream.log(f"/points/{frame.sensor}", rr.Points3D(points))
+            self._stream.log(f"/points/{frame.sensor}", rr.Points3D(points, colors=POINT, radii=rr.Radius.ui_points(POINT_PX)))

@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.text import Text
 
 from abs_service.commands import run
+from abs_service.commands.parts.log import logs
 from abs_service.display.terminal import choice
 from abs_service.display.terminal.output import Output
 from abs_service.display.terminal.table import TableDisplay, draw
@@ -46,6 +47,7 @@ def main() -> None:
     display = _LastTable()
     options = argparse.ArgumentParser()
     run.add_arguments(options)
+    logs.add_arguments(options)
     with tempfile.TemporaryDirectory() as folder, mock.patch.object(choice, "shown", return_value=display):
         run.run(options.parse_args(["--duration", str(DURATION_S), "--out", folder]))
     display.save(picture)
