@@ -1,4 +1,4 @@
-"""Tracks a soft toy in a folder of colour, depth and mask images: python examples/toy_folder.py FOLDER.
+"""Tracks a sponge in a folder of colour, depth and mask images: python examples/toy_folder.py FOLDER.
 
 FOLDER holds color_NNNNNN.png, depth_mm_NNNNNN.png (16 bit, z in millimetres) and sponge_NNNNNN.png (the object's mask).
 Prints number, status and the median distance between mesh and depth image of every frame.
@@ -14,7 +14,7 @@ import abs_service as a
 
 folder = Path(sys.argv[1])
 camera = a.Camera(320, 240, fx=275, fy=275, cx=160, cy=120)
-noise = a.noise.StructuredLight(floor=0.001)  # fur is finer than the mesh
+noise = a.noise.StructuredLight(floor=0.001)  # 1 mm: pores are finer than the mesh
 tracker = a.Tracker(depth=camera, color=camera, model=a.Nurbs(6, 6), noise=noise, priors={"stretch": 0.1})
 for path in sorted(folder.glob("depth_mm_*.png")):
     number = path.stem.removeprefix("depth_mm_")

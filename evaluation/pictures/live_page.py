@@ -39,7 +39,7 @@ SERVICE = [sys.executable, "-m", "abs_service"]
 
 def record(folder: Path) -> Path:
     """Records the rig and tracks every image of it; returns the recording with images and estimates."""
-    tracked = folder / "tracked.mcap"
+    tracked = folder / "paper_replay.mcap"
     subprocess.run([*SERVICE, "run", RIG, "--duration", str(DURATION_S), "--out", folder], check=True)
     subprocess.run([*SERVICE, "replay", next(folder.glob("*.mcap")), "--images", "--out", tracked], check=True)
     return tracked

@@ -1,4 +1,4 @@
-"""The picture of the live table in the README, taken from a real run of the demo rig.
+"""The picture of the live table in the first tutorial, taken from a real run of the demo rig.
 
 python -m evaluation.pictures.live_table docs/images/table.svg
 """
