@@ -170,4 +170,6 @@ class RerunFile:
             return
         self._stream.log(name, rr.DepthImage(np.nan_to_num(z), meter=1.0))
         if points is not None:
-            self._stream.log(f"/points/{frame.sensor}", rr.Points3D(points, colors=POINT, radii=rr.Radius.ui_points(POINT_PX)))
+            self._stream.log(
+                f"/points/{frame.sensor}", rr.Points3D(points, colors=POINT, radii=rr.Radius.ui_points(POINT_PX))
+            )
