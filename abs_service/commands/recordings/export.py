@@ -22,6 +22,7 @@ from pathlib import Path
 from abs_service.api.checks import ArgumentError
 from abs_service.api.estimate import Estimate
 from abs_service.api.recording import Recording
+from abs_service.bus import keys
 from abs_service.commands.parts.progress import bars
 from abs_service.export import animation, arrays, series, table, viewers
 from abs_service.export.errors import ExportError
@@ -113,8 +114,10 @@ def _write_rerun(source: Path, tracker: str, view_hz: float, path: Path) -> str:
     recording = _recording(source)
     names = (tracker,) if tracker else recording.trackers
     estimates = {name: _estimates(recording, name) for name in names}
+    states = {f"/{keys.state(name)}" for name in names}
+    total = sum(one.count for one in scan(source).topics.values() if one.name.endswith("/image") or one.name in states)
     with bars() as progress:
-        task = progress.add_task("images and estimates", total=None)
+        task = progress.add_task("images and estimates", total=total)
         written, notes = rerun_file.write(recording, estimates, path, view_hz, lambda: progress.advance(task))
     for note in notes:
         print(f"abs-service: note: {note}", file=sys.stderr)

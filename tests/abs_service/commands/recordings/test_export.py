@@ -1,5 +1,7 @@
 """`abs-service export` for viewers: read by decoders of others, it is what was recorded, in metres."""
 
+import re
+
 import numpy as np
 import pytest
 from absmsg.v1.frame_info_pb2 import FrameInfo
@@ -184,3 +186,12 @@ def test_a_package_that_is_missing_is_named_with_its_extra(recording, tmp_path, 
     assert cli.main(["export", str(recording), "--out", str(tmp_path / name)]) == Exit.USER
     assert f"pip install -e '.[{extra}]'" in capsys.readouterr().err
     assert not (tmp_path / name).exists()
+
+
+def test_the_progress_of_a_file_for_rerun_has_its_total(recording, tmp_path, capsys, monkeypatch):
+    pytest.importorskip("rerun")
+    monkeypatch.setenv("FORCE_COLOR", "1")  # a terminal, for rich
+    assert cli.main(["export", str(recording), "--out", str(tmp_path / "x.rrd")]) == Exit.OK
+    said, progress = capsys.readouterr()
+    (written,) = re.findall(r"(\d+) images and estimates", said)
+    assert f"{written}/{written}" in progress
