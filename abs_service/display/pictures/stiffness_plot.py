@@ -8,6 +8,10 @@ from abs_service.report import plots
 from abs_service.tracking.bending_stiffness.hanging_strip import Profiles
 
 
+#: What is shown around the strip [mm]; pixels at its edges that are of the background lie anywhere.
+MARGIN_MM = 20.0
+
+
 def draw(profiles: Profiles, title: str, path: Path) -> None:
     """Draws the side view, and the inclination along the strip, in the format of the file's suffix.
 
@@ -23,7 +27,9 @@ def draw(profiles: Profiles, title: str, path: Path) -> None:
     side.plot(*(profiles.predicted.T * 1e3), color="tab:orange", label="heavy elastica")
     side.plot(0, 0, "ks", markersize=7, label="gripper")
     side.set(xlabel="horizontal distance from the gripper [mm]", ylabel="drop [mm]", aspect="equal")
-    side.invert_yaxis()
+    strip = 1e3 * np.concatenate([profiles.tracked, profiles.predicted, [[0.0, 0.0]]])
+    (left, top), (right, bottom) = strip.min(axis=0) - MARGIN_MM, strip.max(axis=0) + MARGIN_MM
+    side.set(xlim=(left, right), ylim=(bottom, top))
     side.legend()
     degrees = np.rad2deg(profiles.inclination)
     angle.errorbar(
