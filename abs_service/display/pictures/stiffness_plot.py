@@ -7,7 +7,6 @@ import numpy as np
 from abs_service.report import plots
 from abs_service.tracking.bending_stiffness.hanging_strip import Profiles
 
-
 #: What is shown around the strip [mm]; pixels at its edges that are of the background lie anywhere.
 MARGIN_MM = 20.0
 
