@@ -3,6 +3,7 @@
 import contextlib
 import fcntl
 import os
+import stat
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -104,13 +105,15 @@ def recover(source: Path, directory: Path | None = None) -> RecoveryReport:
 def leftovers(directory: Path) -> dict[Path, float]:
     """Recordings in `directory` that were not finished, oldest first, with the Unix time of their last change [s].
 
-    Some may still be written by another process. What cannot be looked at, as a link to nothing, is left out.
+    Some may still be written by another process. What is no file, or a link to nothing, is left out.
     """
     found: dict[Path, float] = {}
     with contextlib.suppress(OSError):
         for path in directory.glob(f"*.mcap{ACTIVE}"):
             with contextlib.suppress(OSError):
-                found[path] = path.stat().st_mtime
+                about = path.stat()
+                if stat.S_ISREG(about.st_mode):
+                    found[path] = about.st_mtime
     return dict(sorted(found.items(), key=lambda one: one[1]))
 
 
@@ -118,7 +121,10 @@ def remove_interrupted(directory: Path) -> None:
     """Removes the output of a killed recovery; the next one begins with the original again."""
     with contextlib.suppress(OSError):
         for path in directory.glob(f"*{RECOVERING}"):
-            with contextlib.suppress(OSError), path.open("rb") as stream:  # somebody else's, or locked by a living one
+            with (
+                contextlib.suppress(OSError),
+                limited.opened(path) as stream,
+            ):  # somebody else's, or locked by a living one
                 fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 path.unlink()
 

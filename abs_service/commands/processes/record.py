@@ -15,6 +15,7 @@ import shutil
 import threading
 import time
 from contextlib import suppress
+from pathlib import Path
 
 from abs_service import config
 from abs_service.bus.health import Health, Level
@@ -29,6 +30,7 @@ from abs_service.recording.triggers.trigger import ALWAYS, Asked, Trigger
 from abs_service.supervision.exit_codes import Exit
 from abs_service.supervision.process_setup import process_tuning
 from abs_service.wire import commands
+from calib.files import limited
 from drivers.encoding import encoded_image
 from drivers.encoding.encoded_image import ImageCodec
 from drivers.encoding.mcap_file import Compression
@@ -168,9 +170,7 @@ def recover_leftovers(settings: RecorderSettings, health: Health, begun_s: float
         try:
             if changed_s >= begun_s - TICK_S:
                 continue
-            if shutil.disk_usage(settings.directory).free < path.stat().st_size + settings.minimum_free_bytes:
-                # Recording goes first: the copy must not take the room that it needs.
-                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            _check_recoverable(path, settings)
             report = recover(path)
         except (InUseError, FileNotFoundError):  # another recorder's, which may have finished it
             continue
@@ -187,3 +187,19 @@ def recover_leftovers(settings: RecorderSettings, health: Health, begun_s: float
         health.label("recovered", str(report))
     health.report("recovery", Level.WARNING if lacking else Level.OK, lacking)
     return not lacking
+
+
+def _check_recoverable(path: Path, settings: RecorderSettings) -> None:
+    """Checks that nothing but its content keeps an unfinished recording from being recovered.
+
+    Raises:
+        OSError: something does, which may end.
+    """
+    if shutil.disk_usage(settings.directory).free < path.stat().st_size + settings.minimum_free_bytes:
+        # Recording goes first: the copy must not take the room that it needs.
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+    with limited.opened(path):
+        pass  # another user's, who alone may read it, is none that holds nothing
+    if path.with_suffix("").exists():
+        set_aside(path)  # it was recovered, and may not be removed by us: not copied again every ten seconds
+        raise FileNotFoundError

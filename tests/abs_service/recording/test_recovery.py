@@ -187,6 +187,8 @@ def test_what_cannot_be_looked_at_is_no_leftover(tmp_path):
     (tmp_path / "a.mcap.active").symlink_to(tmp_path / "gone")
     source = write(tmp_path / "b.mcap.active", finish=False)
     (tmp_path / "loop").symlink_to(tmp_path / "loop")
+    (tmp_path / "c.mcap.active").mkdir()
+    os.mkfifo(tmp_path / "d.mcap.active")
     assert list(leftovers(tmp_path)) == [source]
     assert not leftovers(tmp_path / "loop")
     remove_interrupted(tmp_path / "loop")
@@ -204,10 +206,11 @@ def test_an_interrupted_recovery_is_repeated(tmp_path, monkeypatch):
 
 def test_what_a_killed_recovery_left_is_removed_and_what_a_living_one_writes_is_not(tmp_path):
     (tmp_path / "dead.mcap.recovering").touch()
+    os.mkfifo(tmp_path / "pipe.mcap.recovering")  # nor is it waited for one
     with (tmp_path / "alive.mcap.recovering").open("wb") as writer:
         fcntl.flock(writer, fcntl.LOCK_EX)
         remove_interrupted(tmp_path)
-        assert [path.name for path in tmp_path.iterdir()] == ["alive.mcap.recovering"]
+        assert sorted(path.name[:4] for path in tmp_path.iterdir()) == ["aliv", "pipe"]
 
 
 def test_results_go_to_another_folder_and_the_originals_stay(tmp_path, capsys):

@@ -1,17 +1,23 @@
 """A recorder that starts says what it cannot recover."""
 
+import errno
 import logging
 import os
 import shutil
 import threading
 import time
+from pathlib import Path
 from types import SimpleNamespace
+
+import pytest
 
 from abs_service.bus.health import Health
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.commands.processes import record
+from abs_service.recording import recovery
 from abs_service.recording.recorder_settings import RecorderSettings
 from abs_service.recording.recording_file import RecordingFile
+from calib.files import limited
 from tests.abs_service.bus.loopback import LoopbackBus, health_now
 from tests.waiting import eventually
 
@@ -29,6 +35,44 @@ def test_an_unfinished_recording_that_holds_nothing_is_told(tmp_path, caplog):
         f"not recovered: {tmp_path}/a.mcap.active: holds no MCAP record"
     ]
     assert [path.name for path in tmp_path.iterdir()] == ["a.mcap.broken"], "which retention may delete"
+
+
+@pytest.mark.parametrize("number", [errno.EACCES, errno.EIO, errno.EMFILE])
+def test_an_unfinished_recording_that_cannot_be_opened_now_stays_for_later(tmp_path, monkeypatch, number):
+    """Of another user, say. Set aside as one that holds nothing, retention would delete it."""
+    bus = LoopbackBus()
+    health = Health(bus, "record", HeaderFactory("demo", WallClock()))
+    settings = RecorderSettings(tmp_path, "demo", "", minimum_free_bytes=0)
+    RecordingFile(tmp_path / "a.mcap", 0, {}).abandon()
+    refuses = OSError(number, os.strerror(number))
+    monkeypatch.setattr(limited, "open", lambda *_, **__: (_ for _ in ()).throw(refuses), raising=False)
+    assert not record.recover_leftovers(settings, health, LATER_S)
+    assert health_now(health, bus).message == f"{tmp_path}/a.mcap.active cannot be recovered: {os.strerror(number)}"
+    monkeypatch.undo()
+    assert record.recover_leftovers(settings, health, LATER_S)
+    assert not health_now(health, bus).message
+    assert [path.name for path in tmp_path.iterdir()] == ["a.mcap"]
+
+
+def test_a_recording_in_a_folder_where_owners_alone_may_delete_is_copied_once(tmp_path, monkeypatch):
+    """As /tmp is: it was copied again every ten seconds."""
+    health = Health(LoopbackBus(), "record", HeaderFactory("demo", WallClock()))
+    settings = RecorderSettings(tmp_path, "demo", "", minimum_free_bytes=0)
+    RecordingFile(tmp_path / "a.mcap", 0, {}).abandon()
+
+    def refuse(*_):
+        raise PermissionError(errno.EPERM, os.strerror(errno.EPERM))
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "unlink", refuse)
+        assert not record.recover_leftovers(settings, health, LATER_S)
+        copy = (tmp_path / "a.mcap").stat()
+        patch.setattr(recovery, "set_aside", refuse)
+        patch.setattr(record, "set_aside", refuse)
+        assert not record.recover_leftovers(settings, health, LATER_S)
+    assert (tmp_path / "a.mcap").stat() == copy
+    assert record.recover_leftovers(settings, health, LATER_S)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.mcap", "a.mcap.broken"]
 
 
 def test_what_is_being_recorded_is_nothing_to_recover(tmp_path, caplog):
