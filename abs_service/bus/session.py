@@ -97,7 +97,8 @@ def open_session(
     except zenoh.ZError as error:
         refusal = security.refusal(endpoint) if mode is SessionMode.CLIENT else ""
         kind = UnansweredError if mode is SessionMode.CLIENT and not refusal else BusError
-        reason = refusal or _explain(str(error), mode, connect_timeout_ms)
+        unresolved = connection.unresolved(endpoint) if mode is SessionMode.CLIENT else ""
+        reason = refusal or unresolved or _explain(str(error), mode, connect_timeout_ms)
         raise kind(f'bus.endpoint = "{endpoint}": {reason}') from error
 
 

@@ -115,7 +115,8 @@ def open_link(address: Address, timeout_s: float = ANSWER_S) -> Link:
     try:
         return Link(zenoh.open(zenoh.Config.from_json5(json.dumps(settings))))
     except zenoh.ZError as error:
-        raise DeviceError(
+        silence = (
             f"nothing answers at {address.endpoint} within {timeout_s:g} s; is `abs-service run` running there, or "
             "`abs-service capture` with --listen?"
-        ) from error
+        )
+        raise DeviceError(connection.unresolved(address.endpoint) or silence) from error

@@ -1,5 +1,7 @@
 """A connection to a router, in zenoh's configuration: that of the bus and of a rig elsewhere."""
 
+import socket
+import threading
 from collections.abc import Mapping
 
 #: A peer without a keep-alive for this long is disconnected [ms].
@@ -15,3 +17,26 @@ QUEUE: Mapping[str, Mapping[str, int]] = {"size": {"data_high": 16, "data": 16, 
 #: Levels of zenoh's log. What is off warns at each message that its sender's wall clock is ahead, as another host's is,
 #: or that one's own was set back. Only caches need these times, and zenoh mends those.
 LOG_LEVELS = "error,zenoh::net::routing::dispatcher::pubsub=off"
+
+#: Time that a name server has to answer [s].
+RESOLVE_S = 0.5
+
+
+def unresolved(endpoint: str) -> str:
+    """Says that the host of an endpoint, such as tcp/lab4:7447, has no address; "" if it has one."""
+    host = endpoint.partition("/")[2].rpartition(":")[0].strip("[]")
+    reason = ["no name server answers"]
+
+    def resolve() -> None:
+        try:
+            socket.getaddrinfo(host, None)
+            reason.append("")
+        except OSError as error:
+            reason.append(str(error.strerror))
+        except UnicodeError:
+            reason.append("no name may have an empty part, or one of more than 63 letters")
+
+    thread = threading.Thread(target=resolve, name="resolve", daemon=True)
+    thread.start()
+    thread.join(RESOLVE_S)
+    return reason[-1] and f'the name "{host}" cannot be resolved: {reason[-1]}; correct it, or write its address'

@@ -164,6 +164,11 @@ def test_an_unreachable_endpoint_raises_with_the_remedy(endpoint: str) -> None:
         open_link(parse(f"remote://{where}/x"), timeout_s=0.2)
 
 
+def test_a_host_without_an_address_raises_with_its_name() -> None:
+    with pytest.raises(DeviceError, match=r'the name "no-such-host\.invalid" cannot be resolved'):
+        open_link(parse("remote://no-such-host.invalid:7447/x"), timeout_s=0.2)
+
+
 def test_an_unknown_rig_raises_with_the_existing_ones() -> None:
     with bench() as rigs:
         with pytest.raises(

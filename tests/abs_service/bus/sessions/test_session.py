@@ -39,6 +39,20 @@ def test_a_router_that_is_not_there_is_explained(endpoint, monkeypatch):
         open_session(endpoint, SessionMode.CLIENT)
 
 
+@pytest.mark.parametrize("host", ["no-such-host.invalid", "h" * 70, "x..y"])
+def test_a_name_without_an_address_is_told_from_a_host_that_does_not_answer(host):
+    with pytest.raises(UnansweredError, match=f'the name "{host}" cannot be resolved: .*; correct it'):
+        open_session(f"tcp/{host}:7447", SessionMode.CLIENT, connect_timeout_ms=200)
+
+
+def test_a_name_server_that_does_not_answer_is_not_waited_for(monkeypatch):
+    ended = threading.Event()
+    monkeypatch.setattr("socket.getaddrinfo", lambda *_: ended.wait(30))
+    with pytest.raises(UnansweredError, match="cannot be resolved: no name server answers"):
+        open_session("tcp/no-such-host.invalid:7447", SessionMode.CLIENT, connect_timeout_ms=200)
+    ended.set()
+
+
 def test_an_unknown_host_is_explained_without_the_source_of_zenoh():
     with pytest.raises(BusError, match="cannot listen there") as error:
         open_session("tcp/no-such-host.invalid:7447", SessionMode.ROUTER)
