@@ -7,12 +7,15 @@ from abs_service.supervision.children import forked
 
 #: Beside what the demo rig names: its model, search and objective are the default ones.
 MODULES = (
+    "abs_service.cli",
     "abs_service.commands.parts.log.logs",
     "abs_service.commands.processes.capture",
     "abs_service.commands.processes.record",
     "abs_service.commands.processes.track",
-    "abs_service.tracker.measurements.color",
-    "abs_service.tracker.measurements.depth",
+    *(
+        f"abs_service.tracker.measurements.{kind}"
+        for kind in ("bayer", "binary", "color", "depth", "grey", "intensity")
+    ),
     "scipy.sparse.csgraph",
 )
 
