@@ -12,6 +12,7 @@ from abs_service.bus.health import Health, Level
 from abs_service.bus.queues import BoundedQueue
 from abs_service.bus.stamps import WallClock
 from abs_service.recording.disk import folder
+from abs_service.recording.disk.backoff import Backoff
 from abs_service.recording.disk.space import Space
 from abs_service.recording.disk.stall import DiskStall
 from abs_service.recording.losses import Losses
@@ -30,9 +31,6 @@ QUERY_S = 1.0
 LOOK_S = 1.0
 #: Time between two attempts to record after a failure [s].
 RETRY_S = 1.0
-#: Doublings of that time at most, one for each file that failed before its first flush: a disk may take the beginning
-#: of every file, and each one is left.
-DOUBLINGS = 5
 #: Time between two looks whether there is something to record [s].
 IDLE_S = 0.05
 #: Why a file ends when the trigger does.
@@ -53,7 +51,7 @@ class Recorder:
         clock: stamps messages without a stamp and measures ages.
         open_file: creates a file; a test may give a slow or full one.
         free_bytes: free space of the file system of a folder.
-        retry_s: time between two attempts after a failure [s].
+        retry_s: shortest time between two attempts after a failure [s].
         trigger: when to record.
     """
 
@@ -74,7 +72,6 @@ class Recorder:
         self._clock = clock
         self._open_file = open_file
         self._space = Space(settings.directory, settings.minimum_free_bytes, free_bytes, health)
-        self._retry_s = retry_s
         self._queue: BoundedQueue[Sample] = BoundedQueue(settings.queue_bytes + settings.pre_roll_bytes)
         self._writer = SampleWriter(settings.encode_image, health, clock)
         self._pre_roll = PreRoll(
@@ -87,10 +84,10 @@ class Recorder:
         )
         self._stopping = threading.Event()
         self._failed = ""
-        self._left = 0  # files in a row that failed before their first flush
         self._mount = Path("/")  # of the disk that has the recordings
         self._losses = Losses(health)
         self.stall = DiskStall(health, clock.monotonic, lambda: self._queue.size)
+        self._backoff = Backoff(settings.directory, retry_s, self._stopping.wait, self.stall.alive)
         self._finished = (0, 0)
         self.failures = 0
         self.written = (0, 0)  # bytes to all recordings, and to all files of estimates
@@ -141,7 +138,7 @@ class Recorder:
                 continue
             if self._stopping.is_set():
                 break
-            self._stopping.wait(self._retry_s * 2 ** min(self._left, DOUBLINGS))
+            self._backoff.pause()
         self._queue.drop_all()
 
     def _attempt(self) -> bool:
@@ -172,7 +169,7 @@ class Recorder:
             settings.chunk_bytes,
             self._open_file,
         )
-        self._left += 1
+        self._backoff.left += 1
         self._mount, self._finished = folder.mount_point(settings.directory), self.written
         self._health.label("file", take.path.name)
         self._health.count("files")
@@ -227,7 +224,7 @@ class Recorder:
     def _flush(self, take: Take) -> None:
         take.flush()
         self._writer.saved()
-        self._left = 0
+        self._backoff.left = 0
         self._measure(take)
         if self._failed:
             _log.warning("recording again, to %s", take.path.name)

@@ -1,6 +1,7 @@
 """The folder of recordings: whether it can be used."""
 
 import errno
+import os
 import os.path
 import tempfile
 import threading
@@ -12,6 +13,10 @@ _OF_THE_DISK = frozenset({errno.ENODEV, errno.EROFS, errno.EIO, errno.ENOSPC, er
 
 #: Time that the disk has to answer [s].
 PATIENCE_S = 2.0
+
+
+#: What the disk has to take, which is more than the beginning of a recording [bytes].
+SAMPLE = 1 << 20
 
 
 class FolderError(Exception):
@@ -48,6 +53,17 @@ def make(directory: Path) -> None:
             nothing = f"{there} is a link to {os.readlink(there)}, where nothing is"
             raise OSError(errno.ENODEV, nothing) from None
         raise NotADirectoryError(errno.ENOTDIR, f"{there} is no folder") from None
+
+
+def takes(directory: Path) -> bool:
+    """True if the disk takes a file of some size, which is gone at once."""
+    try:
+        with tempfile.TemporaryFile(dir=directory, buffering=0) as file:
+            written = file.write(os.urandom(SAMPLE))
+            os.fdatasync(file.fileno())
+    except OSError:
+        return False
+    return written == SAMPLE
 
 
 def mount_point(directory: Path) -> Path:
