@@ -121,6 +121,26 @@ def test_a_log_file_that_cannot_be_written_ends_nobody_and_is_told_once(log_file
     assert path.read_text() == "there\n"
 
 
+def test_nobody_waits_for_the_reader_of_a_pipe(tmp_path, capsys):
+    os.mkfifo(path := tmp_path / "log")
+    code, lines = act("1", "--log-file", path)
+    assert (code, lines) == (
+        2,
+        [f"abs-service: error: --log-file {path}: cannot be written: No such device or address"],
+    )
+    reader = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
+    log, handler = logging.Logger("rig"), LogFile(path)
+    log.addHandler(handler)
+    for _ in range(100):
+        log.warning("x" * 1000)
+    assert capsys.readouterr().err.startswith(f"abs-service: --log-file {path} cannot be written: ")
+    os.read(reader, 1 << 20)
+    log.warning("again")
+    assert "can be written again, " in capsys.readouterr().err
+    handler.close()
+    os.close(reader)
+
+
 def test_a_full_disk_does_no_more_than_that(capsys):
     log, handler = logging.Logger("rig"), LogFile("/dev/full")
     log.addHandler(handler)
