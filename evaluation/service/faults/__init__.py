@@ -8,6 +8,8 @@ TRACKING, without a recorded depth image, until a component's health was not OK,
 Goals: every promise is kept in every try; the bounds are those of `Fault`, written before the first run.
     Changed on 2026-11-24 after single tries: nothing has to be in health while the router itself is away, since nobody
     could receive it; how soon it tracks after a restart is a bound of its own, which is stricter than before.
+    Changed on 2026-11-28 after ten tries in a row: a process works for ten seconds before it is killed again, after
+    which the promise holds; the supervisor waits for up to 3 s before it starts again one that fails sooner.
 Seeds: none; faults come when the rig is calm, at no fixed phase of its periods.
 Easier than reality: one fault at a time, and a rig that may restart its processes as often as it likes.
 """
