@@ -23,6 +23,7 @@ from rich.console import Console
 
 from abs_service.commands.parts import rig_process
 from abs_service.display.terminal import devices as display
+from abs_service.display.terminal.console import TableConsole
 from abs_service.supervision.exit_codes import Exit
 from drivers import opening
 from drivers.contract.device import Device
@@ -47,7 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Lists, watches, describes or prints the rules."""
-    console = Console(soft_wrap=False)
+    console = TableConsole(soft_wrap=False)
     if arguments.udev:
         print(resources.files("drivers.contract").joinpath(RULES).read_text(encoding="utf-8"), end="")
     elif arguments.watch:

@@ -6,10 +6,10 @@ from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
-from rich.console import Console
 from rich.table import Table
 
 from abs_service.display.terminal import recorded_configuration
+from abs_service.display.terminal.console import TableConsole
 from abs_service.recording.summary import Summary, Topic, Track
 from abs_service.supervision.health.rig_view import size
 from drivers.contract.text import printable
@@ -17,7 +17,7 @@ from drivers.contract.text import printable
 
 def show(summary: Summary) -> None:
     """Prints the tables."""
-    console, found = Console(highlight=False, soft_wrap=True), values(summary)
+    console, found = TableConsole(highlight=False, soft_wrap=True), values(summary)
     state = "" if found["finished"] else ", not finished (`abs-service recover` repairs it)"
     damage = f", {summary.damaged} damaged parts" if summary.damaged else ""
     time = f"{found['duration_s']:.1f} s from {found['start']}"

@@ -18,6 +18,8 @@ from abs_service.commands import check
 from abs_service.commands.running import reinitialize
 from abs_service.supervision.exit_codes import Exit
 
+ROOT = Path(__file__).parents[3]
+
 PAGE = (Path(__file__).parents[3] / "docs" / "reference" / "command-line.md").read_text(encoding="utf-8")
 
 
@@ -89,13 +91,14 @@ def test_130_for_ctrl_c(monkeypatch):
 
 
 @pytest.mark.parametrize("buffered", [True, False])
-def test_141_for_a_reader_that_is_gone(buffered):
+@pytest.mark.parametrize("command", [("check",), ("info", "recordings/sample.mcap"), ("devices", "--timeout", "0.1")])
+def test_141_for_a_reader_that_is_gone(command, buffered):
     reader, writer = os.pipe()
     os.close(reader)
     kept = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
     environment = kept | {"PYTHONPATH": os.pathsep.join(sys.path)} | ({} if buffered else {"PYTHONUNBUFFERED": "1"})
-    command = [sys.executable, "-m", "abs_service", "check"]
-    done = subprocess.run(command, stdout=writer, stderr=subprocess.PIPE, env=environment, check=False)
+    started = [sys.executable, "-m", "abs_service", *command]
+    done = subprocess.run(started, cwd=ROOT, stdout=writer, stderr=subprocess.PIPE, env=environment, check=False)
     os.close(writer)
     assert (done.returncode, done.stderr) == (Exit.PIPE_CLOSED, b"")
 
