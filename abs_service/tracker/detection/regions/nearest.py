@@ -21,7 +21,8 @@ class Settings:
 
     Attributes:
         largest_step_m: largest difference in distance between neighbouring pixels of one surface [m]; "auto": 0.04, or
-            five standard deviations of the distance by the noise model where that is more.
+            five standard deviations of the distance by the noise model, or 3.5 widths of a pixel on the surface, where
+            that is more.
         minimum_pixels: minimum number of pixels of a surface; smaller ones are ignored as noise.
         within: mask image as of the region `mask`; pixels outside are ignored.
         polygon: corners (column, row) of a polygon around the object [px], three or more; pixels outside are ignored.

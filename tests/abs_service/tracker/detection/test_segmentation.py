@@ -91,3 +91,18 @@ def test_noise_and_steps_of_a_sensor_do_not_tear_a_far_surface(away_m, step, who
     covered = np.count_nonzero(np.isfinite(seen.distance)) / np.count_nonzero(inside)
     vertices = len(grid_mesh(seen).vertices)
     assert (covered > 0.85 and vertices > 220) == whole, (covered, vertices)
+
+
+@pytest.mark.parametrize(("step", "whole"), [("auto", True), (0.04, False)])
+def test_large_pixels_do_not_tear_a_round_surface(step, whole):
+    """A dome of 0.6 m at 2 m, before a camera with pixels of 22 mm there."""
+    coarse = Camera(128, 106, 91.4, 91.4, 63.5, 52.5)
+    rows, columns = np.indices((106, 128))
+    aside = np.hypot(columns - 63.5, rows - 52.5) * 2.0 / 91.4
+    inside = aside < 0.285
+    depth = np.where(inside, 2.3 - np.sqrt(np.maximum(0.3**2 - aside**2, 0)), np.nan).astype(np.float32)
+    rig = Rig("r", {"tof": Sensor("tof", coarse, Constant(5e-3))})
+    region = nearest.Settings(largest_step_m=step).build()
+    seen = detect_object(observation(tof=depth_image(depth)), rig, "tof", region, 300)
+    covered = np.count_nonzero(np.isfinite(seen.distance)) / np.count_nonzero(inside)
+    assert (covered > 0.75) == whole, covered
