@@ -24,6 +24,10 @@ _HIDING_STEPS = (0.5, 1.0, 1.5, LARGEST_GAP_STEPS)
 #: wanders over a body as it turns, not the end of a sheet.
 MIN_COSINE = 0.25
 
+#: All of an outline is one where a surface bulges: most normals lean outwards by 37° or more (sine 0.6), and to all
+#: sides. A sheet bends to two sides only. A direction has at least so great a share of the leaning.
+_LEANING, _MOST, _MIN_DIRECTION = 0.6, 0.75, 0.25
+
 #: The surface ends before the outline if, most of the way to it, the measurement is so far off the extrapolated mesh at
 #: most of so many neighbouring edges: at the edge of a table top, its side goes on [m].
 LEAVES_M = 0.015
@@ -89,11 +93,31 @@ def classify_rim(
     last = np.array([camera.width, camera.height]) - 1
     classes[~np.all((place >= BORDER_PX) & (place <= last - BORDER_PX), axis=1)] = RimClass.BORDER
     free = classes == RimClass.FREE
+    if _bulges(camera, surface, rim.outer[free], -gradients[free]):
+        classes[free] = RimClass.SILHOUETTE
+    free = classes == RimClass.FREE
     # That fewer lie off the outline the status could not tell, as beside specks of relief and quantised distances.
     if np.count_nonzero(free) < MIN_RIM:
         classes[free] = RimClass.CONTACT
     gap[(classes != RimClass.FREE) | rim.is_end] = 0.0
     return classes, gap.astype(np.float32)
+
+
+def _bulges(camera: Camera, surface: Surface, outer: NDArray[np.intp], outwards: NDArray[np.float64]) -> bool:
+    """True if the normals of rim vertices (k,) lean in most of their directions outwards in the image (k, 2) [px]."""
+    if len(outer) < MIN_RIM:
+        return False
+    sight = surface.vertices[0].T[outer].astype(np.float64) - camera.center
+    normals = surface.normals[0].T[outer].astype(np.float64)
+    normals *= -np.sign(np.vecdot(normals, sight))[:, None]
+    sight /= np.linalg.norm(sight, axis=1)[:, None]
+    across = (normals - np.vecdot(normals, sight)[:, None] * sight) @ camera.T_rs[:3, :3]
+    outwards = outwards / np.maximum(np.linalg.norm(outwards, axis=1), np.finfo(float).tiny)[:, None]
+    leaning = np.vecdot(across[:, :2], outwards) > _LEANING
+    if np.mean(leaning) < _MOST:
+        return False
+    shares = np.linalg.eigvalsh(outwards[leaning].T @ outwards[leaning] / np.count_nonzero(leaning))
+    return bool(shares[0] > _MIN_DIRECTION)
 
 
 def _leaves(camera: Camera, points: NDArray[np.float64], distance: NDArray[np.float32]) -> NDArray[np.bool_]:

@@ -124,6 +124,20 @@ def test_the_edge_of_a_body_that_turns_away_is_a_silhouette():
     assert np.mean(found[x > 0.14] == RimClass.SILHOUETTE) > 0.9
 
 
+@pytest.mark.parametrize(
+    ("slopes", "expected"),
+    [((1.2, 1.2), RimClass.SILHOUETTE), ((1.2, 0.0), RimClass.FREE), ((0.5, 0.5), RimClass.FREE)],
+)
+def test_the_outline_of_what_bulges_to_all_sides_is_a_silhouette(slopes: tuple[float, float], expected: RimClass):
+    """A cushion, a bent sheet, and a nearly flat cushion, of given slopes at their sides."""
+    across, down = slopes
+    body = sheet(13, 19, lambda x, y: 0.95 + across * x**2 / 0.3 + down * y**2 / 0.2)
+    view = sparse(CAMERA, body).view("tof", np.zeros((len(body.vertices), 0), np.float32))
+    shown = view.render(moved(body, 0.0))
+    found = classes(np.where(np.isfinite(shown), shown, BESIDE_M).astype(np.float32), body)
+    assert found[expected] > 0.9 * sum(found.values())
+
+
 def test_a_sheet_that_hangs_over_the_outline_or_ends_inside_it_is_told():
     found = outline(picture())
     assert (found.fit(moved(MESH, 0.0)).outside, found.fit(moved(MESH, 0.0)).inside) == (0, 0)
