@@ -1,6 +1,7 @@
 """The example applications do what they say, against a real zenoh router."""
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -81,6 +82,16 @@ def test_an_example_is_short_and_needs_nothing_of_the_service(name):
     text = (EXAMPLES / name).read_text(encoding="utf-8")
     assert len(text.splitlines()) <= 40
     assert "abs_service" not in text
+
+
+def test_the_subscriber_in_cpp_is_built_with_all_messages_that_an_estimate_contains():
+    files, needed = [DeformationState.DESCRIPTOR.file], set()
+    while files:
+        needed.add(files[-1].name)
+        files += [one for one in files.pop().dependencies if one.name.startswith("absmsg")]
+    listed = re.search(r"set\(MESSAGES (.+?)\)", (EXAMPLES / "cpp" / "CMakeLists.txt").read_text("utf-8"))
+    assert listed
+    assert {f"absmsg/v1/{name}.proto" for name in listed[1].split()} == needed
 
 
 @pytest.mark.slow
