@@ -1,5 +1,7 @@
 """Messages of a rig as ROS messages."""
 
+import struct
+
 import numpy as np
 import pytest
 from abs_client.camera import camera
@@ -131,6 +133,23 @@ def test_theta_with_its_deviation():
         ("theta, deviation; seq=5", 2, 4),
         ("m", 2, 2),
     ]
+
+
+def test_theta_in_bytes():
+    """CDR, little-endian: numbers are aligned to their size, counted from behind the first four bytes."""
+    one = estimate(theta=[1.0, 2.0], model_id="m", covariance_valid=True)
+    one.message.covariance.extend([9.0, 0.5, 16.0])
+    rows, columns = (2, 24, b"theta, deviation; seq=5\0", 2, 4), (2, b"m\0", 2, 2)
+    wanted = struct.pack("<II24sIII2s2xIIII4d", *rows, *columns, 0, 4, 1.0, 2.0, 3.0, 4.0)
+    assert cdr.serialized(estimates.theta(one)) == bytes([0, 1, 0, 0]) + wanted
+
+
+def test_poses_in_bytes():
+    """The layout in which the tests of foxglove/cdr have an example of this message."""
+    said = cdr.serialized(cameras.transforms({"tof": model()}, "demo"))
+    assert said[:44] == bytes([0, 1, 0, 0]) + struct.pack("<IiII5s3xI9s3x", 1, 0, 0, 5, b"demo\0", 9, b"demo/tof\0")
+    half = np.sqrt(0.5)
+    np.testing.assert_allclose(struct.unpack("<7d", said[44:]), [0.5, 0.25, -1, 0, 0, half, half], atol=1e-12)
 
 
 @pytest.mark.parametrize(

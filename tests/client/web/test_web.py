@@ -18,8 +18,14 @@ import pytest
 from abs_client.connection.link import Link
 from abs_client.web import program
 from abs_client.web.server import EstimateServer
+from absmsg.v1.deformation_state_pb2 import DeformationState
+from absmsg.v1.deformed_mesh_pb2 import DeformedMesh, MeshTopology
 
-from tests.client.publishing import estimating
+from abs_service.bus import keys
+from abs_service.bus.contract import MESH, STATE
+from tests.abs_service.wire.golden.freeze import BINARY
+from tests.client.publishing import PERIOD_S, estimating
+from tests.waiting import repeating
 
 NODE_PROGRAM = Path(__file__).parents[3] / "examples" / "javascript" / "states.mjs"
 TIMEOUT_S = 60.0
@@ -42,6 +48,10 @@ def address(tracker, bus, endpoint):
     bus.declare_liveliness("track/sheet")
     with serving(endpoint) as address:
         yield address
+
+
+def golden(message):
+    return message.FromString((BINARY / f"{message.DESCRIPTOR.name}.bin").read_bytes())
 
 
 def received(address, tracker, count):
@@ -113,6 +123,29 @@ def test_node_prints_estimates(tracker, address):
     lines = done.stdout.splitlines()
     assert len(lines) == 2
     assert all(f"{tracker.size} vertices, Θ[1] = 0.500" in line and " TRACKING " in line for line in lines)
+
+
+def test_node_prints_the_golden_estimate(bus, endpoint):
+    node = shutil.which("node")
+    if node is None:
+        pytest.skip("not installed: node")
+    state, topology, mesh = golden(DeformationState), golden(MeshTopology), golden(DeformedMesh)
+    mesh.vertices_f32 = topology.rest_vertices_f32
+    mesh.ClearField("covariance_f32")  # of another number of vertices
+    bus.latched_publisher(keys.topology("sheet"), topology.DESCRIPTOR.full_name).put(topology.SerializeToString())
+    states = bus.publisher(keys.state("sheet"), state.DESCRIPTOR.full_name, STATE)
+    meshes = bus.publisher(keys.mesh("sheet"), mesh.DESCRIPTOR.full_name, MESH)
+
+    def publish():
+        states.put(state.SerializeToString())
+        meshes.put(mesh.SerializeToString())
+
+    command = [node, NODE_PROGRAM]
+    with serving(endpoint) as address, repeating(publish, PERIOD_S):
+        command += [address, "sheet", "3"]  # before it nothing may have come, and after it comes nothing new: STALE
+        done = subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT_S, check=True)
+    (line,) = (line for line in done.stdout.splitlines() if line.startswith("42 DEGRADED here "))
+    assert line.endswith(f" {len(topology.rest_vertices_f32) // 12} vertices, Θ[3] = 0.000 -0.250 0.001")
 
 
 @pytest.mark.slow
