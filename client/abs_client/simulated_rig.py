@@ -74,7 +74,8 @@ class SimulatedRig:
     Attributes:
         seed: of motion, texture and noise.
         rate: exposures per second; the tracker gets 72 % of the time between two.
-        speed: factor on the speed of all motion: with `rate=60` and `speed=2` everything happens twice as fast.
+        speed: factor on the speed of all motion: `rate=60` with `speed=2` has the images of 30 and 1 twice as fast,
+            from the fifth second on; the rest before the motion and the times of `turn` and `leave` are not shorter.
         fault: what goes wrong and from which exposure on, such as `stall@90`, as the simulator calls it
             (docs/reference/simulation.md).
         keys: further keys of the simulator's address: `{"occluder": "hand"}`.

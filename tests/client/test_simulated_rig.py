@@ -9,6 +9,7 @@ from abs_client import RigFailedError, SimulatedRig, run_rig, simulated_rig
 from abs_client.pytest_plugin import settings_of
 
 from abs_service import config
+from drivers.simulated.address import parse
 
 
 def test_the_file_is_a_valid_rig_with_all_settings(tmp_path):
@@ -17,6 +18,16 @@ def test_the_file_is_a_valid_rig_with_all_settings(tmp_path):
     assert (rig.name, rig.bus.endpoint) == ("lab", "tcp/127.0.0.1:7000")
     assert rig.devices["sim"].uri == "simulated://sheet?seed=5&rate=60&speed=2&occluder=hand&fault=stall@90"
     assert rig.trackers["sheet"].budget_ms == 12.0
+
+
+def test_a_faster_or_slower_rig_has_the_same_images_once_the_object_moves(tmp_path):
+    def images(rate, speed):
+        rig = config.loads(SimulatedRig(seed=3, rate=rate, speed=speed).file("tcp/127.0.0.1:7000"), "rig", tmp_path)
+        frames = parse(rig.devices["sim"].uri).build().frames(240)  # in the fifth second, or later
+        return [frame.data.tobytes() for frame in frames]
+
+    assert images(60, 2) == images(30, 1) == images(15, 0.5)
+    assert images(60, 1) != images(30, 1)
 
 
 def test_keys_of_options_and_marks_are_settings_or_go_to_the_simulator():
