@@ -35,7 +35,8 @@ class Exposure:
 
     Attributes:
         number: of the exposure, counted by the head.
-        time_ns: its time on the processing unit's clock [ns].
+        time_ns: the middle of its first partial exposure on the processing unit's clock [ns]; in the example of ifm's
+            documentation (Timestamps) it equals the first of the acquisition timestamps, which are those of the middle.
         info: calibration and settings.
         images: by stream name: distances and their deviations in digits of `info.distance_m` or, as floating-point
             numbers, in metres; amplitudes, -1 without return; flags of the confidence.
