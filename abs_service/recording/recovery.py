@@ -121,10 +121,8 @@ def remove_interrupted(directory: Path) -> None:
     """Removes the output of a killed recovery; the next one begins with the original again."""
     with contextlib.suppress(OSError):
         for path in directory.glob(f"*{RECOVERING}"):
-            with (
-                contextlib.suppress(OSError),
-                limited.opened(path) as stream,
-            ):  # somebody else's, or locked by a living one
+            # It may be somebody else's, or locked by a living one.
+            with contextlib.suppress(OSError), limited.opened(path) as stream:
                 fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 path.unlink()
 

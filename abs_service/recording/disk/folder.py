@@ -14,9 +14,8 @@ _OF_THE_DISK = frozenset({errno.ENODEV, errno.EROFS, errno.EIO, errno.ENOSPC, er
 #: Time that the disk has to answer [s].
 PATIENCE_S = 2.0
 
-
 #: What the disk has to take, which is more than the beginning of a recording [bytes].
-SAMPLE = 1 << 20
+SAMPLE_BYTES = 1 << 20
 
 
 class FolderError(Exception):
@@ -59,11 +58,11 @@ def takes(directory: Path) -> bool:
     """True if the disk takes a file of some size, which is gone at once."""
     try:
         with tempfile.TemporaryFile(dir=directory, buffering=0) as file:
-            written = file.write(os.urandom(SAMPLE))
+            written = file.write(os.urandom(SAMPLE_BYTES))
             os.fdatasync(file.fileno())
     except OSError:
         return False
-    return written == SAMPLE
+    return written == SAMPLE_BYTES
 
 
 def mount_point(directory: Path) -> Path:
