@@ -9,15 +9,14 @@ moving picture has the speed of the recording.
 import argparse
 import io
 import subprocess
-import sys
 import tempfile
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 from PIL import Image
 from playwright.sync_api import Error, Page, sync_playwright
+
+from evaluation.service.browser import CHROMIUM, OPTIONS, SERVICE, served
 
 #: Cameras of today, which see a printed sheet.
 RIG = Path(__file__).parents[2] / "examples" / "rigs" / "paper.toml"
@@ -28,13 +27,9 @@ DURATION_S, FROM_S, TO_S, STEP = 14, 2.0, 9.0, 2
 WIDTH, DRAWN_S = 800, 0.5
 
 PORT = 8099
-CHROMIUM = "/usr/bin/chromium"
-OPTIONS = ["--headless", "--no-sandbox", "--enable-unsafe-swiftshader", "--use-angle=swiftshader"]
 
 #: Words about the missing graphics card, and those of buttons.
 HIDDEN = ".mantine-Notifications-root, .mantine-Tooltip-tooltip"
-
-SERVICE = [sys.executable, "-m", "abs_service"]
 
 
 def record(folder: Path) -> Path:
@@ -43,17 +38,6 @@ def record(folder: Path) -> Path:
     subprocess.run([*SERVICE, "run", RIG, "--duration", str(DURATION_S), "--out", folder], check=True)
     subprocess.run([*SERVICE, "replay", next(folder.glob("*.mcap")), "--images", "--out", tracked], check=True)
     return tracked
-
-
-@contextmanager
-def served(command: str, source: Path, *options: str) -> Iterator[None]:
-    """The page that `view` serves of a recording, or `run` of a rig, in processes of its own."""
-    page = subprocess.Popen([*SERVICE, command, source, *options], stdout=subprocess.DEVNULL)
-    try:
-        yield
-    finally:
-        page.terminate()
-        page.wait()
 
 
 def open_page(page: Page) -> None:

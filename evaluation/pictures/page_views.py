@@ -14,17 +14,8 @@ from pathlib import Path
 
 from playwright.sync_api import Browser, sync_playwright
 
-from evaluation.pictures.live_page import (
-    CHROMIUM,
-    DRAWN_S,
-    OPTIONS,
-    PORT,
-    RIG,
-    open_page,
-    open_recording,
-    record,
-    served,
-)
+from evaluation.pictures.live_page import DRAWN_S, PORT, RIG, open_page, open_recording, record
+from evaluation.service.browser import CHROMIUM, OPTIONS, served
 
 #: Rate [Hz] and speed of the simulated cameras that are seen live, and the time that the page has to draw them [s].
 SLOW, SETTLED_S = "rate=5&speed=0.17", 12.0

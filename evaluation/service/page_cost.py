@@ -10,8 +10,6 @@ at most 0.02 core, set before the first run, when 0.015 had been measured by han
 Seeds: the context's seed is that of the simulated device; one run.
 """
 
-import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Iterator, Sized
@@ -24,6 +22,7 @@ import tomli_w
 
 from abs_service.report.content import Cell, Column, Section, Table
 from evaluation.experiment import Context, Findings, UnavailableError, at_most
+from evaluation.service.browser import CHROMIUM, OPTIONS, served
 from evaluation.service.live import proc
 from evaluation.service.live.rig import TRACKER, demo_table, endpoint_of, free_port
 from evaluation.service.live.service import Service
@@ -37,8 +36,6 @@ WITH, WITHOUT = 0.2, 0.02
 #: Time that a rig has to track, and a page to open [s]; time after either until it is measured [s].
 PATIENCE_S, SETTLED_S = 120.0, 5.0
 
-CHROMIUM = "/usr/bin/chromium"
-OPTIONS = ["--headless", "--no-sandbox", "--enable-unsafe-swiftshader", "--use-angle=swiftshader"]
 WIDTH, HEIGHT = 400, 300
 
 _NAME = "page_cost"
@@ -74,7 +71,11 @@ def run(settings: Settings, context: Context) -> Findings:
         raise UnavailableError(f"needs playwright (`make all`) and {CHROMIUM}")
     with tempfile.TemporaryDirectory(prefix="abs-page-") as folder:
         rig, port = _write_rig(Path(folder), context.seed), free_port()
-        with Service(rig), Subscriber(endpoint_of(rig), _NAME, TRACKER) as estimates, _page(rig, port) as page:
+        with (
+            Service(rig),
+            Subscriber(endpoint_of(rig), _NAME, TRACKER) as estimates,
+            served("view", rig, "--port", str(port)) as page,
+        ):
             _await_tracking(estimates)
             parts = {_BEFORE: measured(page, estimates.arrivals, settings.duration_s)}
             context.progress(_SHOWN)
@@ -111,18 +112,6 @@ def _await_tracking(estimates: Subscriber) -> None:
         if time.monotonic() > end_s:
             raise TimeoutError(f"nothing is tracked after {PATIENCE_S:g} s")
         time.sleep(0.1)
-
-
-@contextmanager
-def _page(rig: Path, port: int) -> Iterator[int]:
-    """The page as a process of its own; its number."""
-    command = [sys.executable, "-m", "abs_service", "view", str(rig), "--port", str(port)]
-    page = subprocess.Popen(command, stdout=subprocess.DEVNULL)
-    try:
-        yield page.pid
-    finally:
-        page.terminate()
-        page.wait()
 
 
 @contextmanager

@@ -82,7 +82,6 @@ def open_bus(rig: config.ServiceConfig, arguments: argparse.Namespace, *names: s
         BusError: it cannot be opened.
         SecurityError: a file of `[bus.tls]` cannot be used.
     """
-    process_tuning.keep_freed_memory()
     mode = SessionMode.ROUTER if arguments.listen else SessionMode.CLIENT
     endpoint = arguments.listen or arguments.connect or rig.bus.endpoint
     with logs.in_background(), open_bus_at(endpoint, mode, rig, arguments, *names) as bus:

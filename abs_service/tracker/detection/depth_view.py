@@ -77,10 +77,16 @@ class DepthView:
 
     @classmethod
     def of(
-        cls, distance: NDArray[np.float32], camera: Camera, pictures: Sequence[Picture] = (), t_ns: int = 0
+        cls,
+        distance: NDArray[np.float32],
+        camera: Camera,
+        pictures: Sequence[Picture] = (),
+        t_ns: int = 0,
+        deviation: NDArray[np.float32] | float = 0.0,
     ) -> "DepthView":
         """The view of radial distances (height, width) [m], NaN without return; other arguments as in the class."""
-        return cls(camera.unproject(distance), distance, camera, PixelColors(distance, camera, pictures), t_ns)
+        colors = PixelColors(distance, camera, pictures)
+        return cls(camera.unproject(distance), distance, camera, colors, t_ns, deviation)
 
     def step(self, largest: Step) -> NDArray[np.float32] | float:
         """Largest difference in distance [m] between neighbours of one surface, (height, width) if it is "auto"."""

@@ -1,7 +1,5 @@
 """Segmentation of the object in a depth image by a region."""
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,7 +11,7 @@ from abs_service.tracker.detection.dropouts import fill_gaps
 from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection
 from abs_service.tracker.detection.plausibility import LARGEST_M, LARGEST_SCENE_M, MAX_POINTS, check_extent
 from abs_service.tracker.detection.regions.base import Region
-from calib.noise.base import DepthNoise, pixels_where, subtract_mean_offset
+from calib.noise.base import DepthNoise, Pixels, pixels_where, subtract_mean_offset
 from calib.noise.fit.scatter import scatter
 from calib.rig import Rig
 
@@ -37,8 +35,8 @@ def detect_object(
         raise DetectionError(f"no depth image from {reference} yet")
     distance = subtract_mean_offset(sensor.noise, image.distance, image.amplitude)
     pictures = [(rig.sensors[n].camera, i.rgb) for n, i in observation.images.items() if isinstance(i, ColorImage)]
-    view = DepthView.of(fill_gaps(distance), sensor.camera, pictures, observation.t_host_ns)
-    view = replace(view, deviation=_deviations(sensor.noise, image))
+    deviations = _deviations(sensor.noise, image)
+    view = DepthView.of(fill_gaps(distance), sensor.camera, pictures, observation.t_host_ns, deviations)
     check_extent(view.points_r[view.measured], "everything in sight", LARGEST_SCENE_M, sensor.head)
     inside = region.select(view)
     check_extent(view.points_r[inside], "the object", LARGEST_M, sensor.head)
@@ -77,15 +75,19 @@ def _noise_scale(
 def _deviations(noise: DepthNoise, image: DepthImage) -> NDArray[np.float32]:
     """Standard deviation (height, width) [m] of every distance by the noise model, NaN without return."""
     places = pixels_where(np.isfinite(image.distance))
-    distance, amplitude = (values[places].astype(np.float64) for values in (image.distance, image.amplitude))
     deviations = np.full(image.distance.shape, np.nan, np.float32)
-    deviations[places] = noise.deviation(distance, amplitude, places)
+    deviations[places] = _deviation_at(noise, image, places)
     return deviations
 
 
 def _median_deviation(noise: DepthNoise, image: DepthImage, inside: NDArray[np.bool_]) -> float:
     """Median standard deviation [m] of the distances at the pixels of a mask (height, width), of some of them."""
     rows, columns = (places[:: np.count_nonzero(inside) // MAX_POINTS + 1] for places in np.nonzero(inside))
-    distance, amplitude = (values[rows, columns].astype(np.float64) for values in (image.distance, image.amplitude))
-    deviation = noise.deviation(distance, amplitude, (rows, columns))
+    deviation = _deviation_at(noise, image, (rows, columns))
     return float(np.nanmedian(deviation)) if np.isfinite(deviation).any() else 0.0
+
+
+def _deviation_at(noise: DepthNoise, image: DepthImage, places: Pixels) -> NDArray[np.float64]:
+    """Standard deviation (k,) [m] of the distances in rows and columns (k,)."""
+    distance, amplitude = (values[places].astype(np.float64) for values in (image.distance, image.amplitude))
+    return noise.deviation(distance, amplitude, places)

@@ -90,7 +90,9 @@ class Hybrid:
         if share <= self._mean_outliers + limit:
             self._pauses = Pauses(self._settings.fallback_above)
         elif self._pauses.end_at(share):
-            found = (yield from self._fall_back(problem, start, found, budget)).compared(problem)
+            tried = (yield from self._fall_back(problem, start, found, budget)).compared(problem)
+            self._pauses.tried(tried.cost < found.cost, share)
+            found = tried
         self._update_mean(outlier_share(found.fits))
         return found
 
@@ -113,9 +115,7 @@ class Hybrid:
         metric = search_metric(problem.prior(start))
         sampled = yield from sample(start, np.inf, metric, self._sampler, self._schedule, budget)
         polished = yield from self._descend(problem, sampled.theta, budget)
-        is_better = polished.cost < descended.cost - SIGNIFICANT
-        self._pauses.tried(is_better, outlier_share(descended.fits))
-        if is_better:
+        if polished.cost < descended.cost - SIGNIFICANT:
             return replace(sampled, theta=polished.theta, cost=polished.cost, linearized=polished.linearized)
         return replace(descended, linearized=polished.linearized)
 
