@@ -30,15 +30,19 @@ class EvaluateOptionError(Exception):
 
 
 def available() -> dict[str, ModuleType]:
-    """Experiments by name, sorted; imports all modules of all groups."""
-    found = {}
-    for group in GROUPS:
-        package = import_module(f"evaluation.{group}")
-        for module in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
-            candidate = import_module(module.name)
-            if hasattr(candidate, "TITLE"):
-                found[module.name.rpartition(".")[2]] = candidate
-    return dict(sorted(found.items()))
+    """Experiments by name, sorted."""
+    experiments = (one for group in GROUPS for one in _experiments(import_module(f"evaluation.{group}")))
+    return dict(sorted((one.__name__.rpartition(".")[2], one) for one in experiments))
+
+
+def _experiments(package: ModuleType) -> Iterator[ModuleType]:
+    """Modules with a TITLE; the parts of one are not imported here, they may need packages that are not installed."""
+    for found in pkgutil.iter_modules(package.__path__, f"{package.__name__}."):
+        module = import_module(found.name)
+        if hasattr(module, "TITLE"):
+            yield module
+        elif found.ispkg:
+            yield from _experiments(module)
 
 
 def group(module: ModuleType) -> str:

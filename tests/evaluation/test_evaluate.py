@@ -2,6 +2,7 @@
 
 import json
 import math
+import subprocess
 import sys
 import types
 from collections.abc import Callable
@@ -181,6 +182,14 @@ def test_every_experiment_of_the_program_is_complete() -> None:
         assert one.TITLE, name
         assert callable(one.run), name
     assert "evaluation.experiment" in sys.modules
+
+
+def test_experiments_are_found_without_the_packages_of_any_extra() -> None:
+    extras = ("av", "depthai", "pyarrow", "rosbags", "trimesh", "usb", "viser")
+    hidden = f"import sys; sys.modules.update(dict.fromkeys({extras}))"
+    code = f"{hidden}; from evaluation import running; print(*running.available())"
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert ran.stdout.split() == list(running.available())
 
 
 def test_a_goal_becomes_a_verdict_with_figure_bound_and_reason() -> None:

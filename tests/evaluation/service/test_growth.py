@@ -1,14 +1,18 @@
 """The experiment `growth`: laws, walls and extrapolations."""
 
 import math
+import os
 
+import numpy as np
 import pytest
 
 from evaluation.service import growth
-from evaluation.service.growth import hosts
+from evaluation.service.frame_budget.live import Observed
+from evaluation.service.growth import hosts, services
 from evaluation.service.growth.frames import axes
 from evaluation.service.growth.hosts import Costs
 from evaluation.service.growth.laws import Law, fit
+from evaluation.service.growth.services import Services
 
 NUMBERS = (10.0, 20.0, 40.0, 80.0)
 
@@ -47,3 +51,30 @@ def test_larger_hosts_carry_what_the_costs_say() -> None:
 def test_every_axis_has_numbers_enough_for_its_law() -> None:
     assert all(len(axis.setups) >= 4 for axis in axes())
     assert {axis.power for axis in axes()} == {1, 2}
+
+
+def observed(skipped: int, cores: float) -> Observed:
+    return Observed(
+        np.full(99, 15.0), 30.0, skipped, skipped, skipped, 1.0, {"track": 0.6 * cores, "run": 0.4 * cores}, {}
+    )
+
+
+def test_rigs_side_by_side_are_held_against_the_laws() -> None:
+    costs = Costs(5.0, 1.0, 4.0, Law(1.0, 0.0, 10.0, 1.0))
+    kept = Services({}, costs, [observed(0, 0.6), observed(1, 0.7)])
+    assert [goal.met for goal in services.goals(kept)] == [True, True, True]
+    missed = Services({}, costs, [observed(1, 0.8), observed(2, 0.9)])
+    assert [goal.met for goal in services.goals(missed)] == [False, True, False]
+    assert services.values(missed)["side_by_side"][1]["cores"] == pytest.approx(0.9)
+
+
+@pytest.mark.parametrize(("capture_ms", "rigs"), [(5.0, 18), (1000.0, 1), (math.nan, 1)])
+def test_as_many_rigs_run_as_the_cores_of_this_host_carry(
+    capture_ms: float, rigs: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    costs = Costs(capture_ms, 1.0, 4.0, Law(1.0, 0.0, 10.0, 1.0))
+    monkeypatch.setattr(os, "cpu_count", lambda: 16)
+    monkeypatch.setattr(services, "write_take", lambda *_: None)
+    monkeypatch.setattr(services, "_costs", lambda _: costs)
+    monkeypatch.setattr(services.live, "observe", lambda *_, progress: observed(0, 0.6))
+    assert len(services.measure((), 1.0, 1, lambda _: None).beside) == rigs
