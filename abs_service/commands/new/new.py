@@ -67,9 +67,11 @@ def run(arguments: argparse.Namespace) -> int:
     if file.exists() and not arguments.force:
         raise NewFileError(f"{file}: exists already; choose another name, or replace it with --force")
     name = keys.check_name(arguments.name or file.name.partition(".")[0])
-    ask = _ask if sys.stdin.isatty() and sys.stdout.isatty() else _refuse
-    found = opening.discover(DISCOVERY_S) if arguments.device is None and ask is _ask else []
-    answers = answered(arguments, name, found, ask)
+    if sys.stdin.isatty() and sys.stdout.isatty():
+        found = opening.discover(DISCOVERY_S) if arguments.device is None else []
+        answers = answered(arguments, name, found, _ask)
+    else:
+        answers = _answered_by_options(arguments, name)
     try:
         file.write_text(rig_text.write(answers, str(file)), encoding="utf-8")
     except OSError as error:
@@ -158,14 +160,27 @@ def _size(text: str) -> tuple[float, float]:
     return width, height
 
 
-def _refuse(option: str, question: str, choices: Mapping[str, str]) -> str:
-    options = {
+def _answered_by_options(arguments: argparse.Namespace, name: str) -> Answers:
+    """The description by the options alone.
+
+    Raises:
+        NewFileError: also if options are missing; names all of them.
+    """
+    missing: list[str] = []
+    described = {
         "device": f"{', '.join(DEVICES)}; or --recording FILE",
         "size": "two lengths in metres",
         "color": "--color or --no-color",
     }
-    allowed = options.get(option) or ", ".join(choices)
-    raise NewFileError(f"--{option}: missing, and nobody is there to be asked; allowed: {allowed}")
+
+    def note(option: str, question: str, choices: Mapping[str, str]) -> str:
+        missing.append(f"--{option}: {described.get(option) or ', '.join(choices)}")
+        return {"device": "simulated", "size": "1 1"}.get(option, "")  # any answer, to come to the next question
+
+    answers = answered(arguments, name, [], note)
+    if missing:
+        raise NewFileError("\n  ".join(["options are missing, and nobody is there to be asked:", *missing]))
+    return answers
 
 
 def _ask(option: str, question: str, choices: Mapping[str, str]) -> str:

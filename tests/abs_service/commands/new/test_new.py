@@ -95,7 +95,16 @@ def without(option):
 @pytest.mark.parametrize("option", ["--device", "--object", "--size", "--color", "--behind"])
 def test_a_script_is_told_which_answer_is_missing(tmp_path, capsys, option):
     assert cli.main(["new", str(tmp_path / "lab.toml"), *without(option)]) == Exit.USER
-    assert f"error: {option}: missing, and nobody is there to be asked; allowed: " in capsys.readouterr().err
+    said = capsys.readouterr().err.splitlines()
+    assert said[0].endswith("error: options are missing, and nobody is there to be asked:")
+    assert [line.split(":")[0].strip() for line in said[1:]] == [option]
+
+
+def test_a_script_is_told_all_missing_answers_at_once(tmp_path, capsys):
+    assert cli.main(["new", str(tmp_path / "lab.toml")]) == Exit.USER
+    said = capsys.readouterr().err.splitlines()[1:]
+    assert [line.split(":")[0].strip() for line in said] == ["--device", "--object", "--color", "--behind"]
+    assert not list(tmp_path.iterdir())
 
 
 def test_attached_cameras_are_offered_by_their_addresses():
