@@ -62,7 +62,9 @@ def tracker(
         slow: warning of `slow`; the first reason, since a tracker that misses images gets into all other trouble.
     """
     if not status:
-        return Words("No estimate yet", "The tracker is starting, or its sensors deliver nothing.", STALE_COLOR)
+        return Words(
+            "No estimate yet", "The first one is still to come; if none does, the sensors deliver nothing.", STALE_COLOR
+        )
     title, color, remedy = STATUS.get(status, (status.title(), STALE_COLOR, ""))
     if age_s > STALE_S:
         text = f"The last estimate said: {title.lower()}. Check that the tracker runs and its sensors deliver."
