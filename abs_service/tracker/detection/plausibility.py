@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from abs_service.pairing.images import Image
 from abs_service.tracker.detection.image_alignment import alignment_warnings
 from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection
-from abs_service.tracker.mesh import Mesh, pieces_of
+from abs_service.tracker.mesh import Mesh, edge_lengths, pieces_of
 from calib.rig import Rig
 
 #: Range of the extent of an object [m]; outside, the distances have the wrong unit.
@@ -37,6 +37,10 @@ LINING = 1.2
 
 #: Depth below the border of all that is measured at which the length along it is counted [px]: surfaces end inside.
 BELOW_BORDER_PX = 6
+
+#: A mesh leaves out what it should not if more than this share of the object's pixels lie farther beside its faces than
+#: two vertices are apart: faces end at most that far inside an edge.
+LEFT_OUT = 0.05
 
 
 class ExtentError(DetectionError):
@@ -119,6 +123,7 @@ def doubts(detection: InitialDetection, mesh: Mesh, images: Mapping[str, Image],
         warnings(detection)
         + noise_warnings(detection)
         + mesh_warnings(mesh)
+        + left_out_warnings(detection, mesh)
         + alignment_warnings(detection, images, rig)
     )
 
@@ -132,6 +137,26 @@ def mesh_warnings(mesh: Mesh) -> tuple[str, ...]:
     return (
         f"the mesh has {len(sizes)} pieces, of {shares} of its vertices: is something in front of the object, "
         "or another one in the region?",
+    )
+
+
+def left_out_warnings(detection: InitialDetection, mesh: Mesh) -> tuple[str, ...]:
+    """Doubts about a mesh beside which much of the object lies, unless a file has it so: its parts are too narrow."""
+    inside = np.isfinite(detection.distance)
+    if mesh.is_complete or not inside.any():
+        return ()
+    free = np.ones(inside.shape, np.uint8)
+    for corners in np.round(detection.camera.project(mesh.vertices)).astype(np.int32)[mesh.faces]:
+        cv2.fillConvexPoly(free, corners, 0)
+    spacing = np.sqrt(np.count_nonzero(inside) / detection.vertices)
+    left_out = inside & (cv2.distanceTransform(free, cv2.DIST_L2, cv2.DIST_MASK_5) > spacing + 1)
+    share = np.count_nonzero(left_out) / np.count_nonzero(inside)
+    if share <= LEFT_OUT:
+        return ()
+    apart = float(np.median(edge_lengths(mesh.vertices, mesh.edges)))
+    return (
+        f"{share:.0%} of what was found lie beside the mesh, whose vertices are {apart * 1e3:.0f} mm apart: narrow "
+        "parts are not tracked – give the mesh more vertices, or leave these parts out by a mask",
     )
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from abs_service.tracker.detection.grid_mesh import grid_mesh
-from abs_service.tracker.detection.plausibility import mesh_warnings, noise_warnings, warnings
+from abs_service.tracker.detection.plausibility import left_out_warnings, mesh_warnings, noise_warnings, warnings
 from abs_service.tracker.detection.regions import box, nearest, seed
 from tests.abs_service.tracker.detection.test_segmentation import EVERYWHERE, SHEET, detect
 
@@ -58,3 +58,16 @@ def test_a_mesh_of_two_pieces_is_told_unless_a_file_has_it_so():
     (doubt,) = mesh_warnings(parted)
     assert doubt.startswith("the mesh has 2 pieces, of 78% and 22% of its vertices: ")
     assert mesh_warnings(replace(parted, is_complete=True)) == ()
+
+
+def test_parts_that_are_too_narrow_for_the_mesh_are_told():
+    distance = np.full((48, 64), np.nan, np.float32)
+    distance[8:40, 4:28] = 1.0
+    palm = replace(detect(distance), vertices=60)
+    for row in (9, 18, 27, 36):  # four fingers
+        distance[row : row + 3, 28:60] = 1.0
+    hand = replace(detect(distance), vertices=60)
+    assert left_out_warnings(palm, grid_mesh(palm)) == ()
+    (doubt,) = left_out_warnings(hand, grid_mesh(hand))
+    assert doubt.startswith("28% of what was found lie beside the mesh, whose vertices are ")
+    assert left_out_warnings(hand, replace(grid_mesh(hand), is_complete=True)) == ()
