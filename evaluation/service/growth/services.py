@@ -34,7 +34,7 @@ _COMMANDS = ("run", "capture", "track", "record")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Services:
-    """What was measured of services.
+    """Measured costs of services.
 
     Attributes:
         by_trackers: processor time of an exposure [ms] by process, for every number of trackers.
