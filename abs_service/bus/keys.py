@@ -75,6 +75,11 @@ def mesh(tracker: str) -> str:
     return f"{tracker}/mesh"
 
 
+def theta(tracker: str) -> str:
+    """Topic of a tracker's estimates for slow links: absmsg.v1.CompactState."""
+    return f"{tracker}/theta"
+
+
 def scene(tracker: str) -> str:
     """Topic of a tracker's mesh as a foxglove.SceneUpdate."""
     return f"{tracker}/scene"

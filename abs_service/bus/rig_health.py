@@ -8,7 +8,8 @@ from absmsg.v1.health_pb2 import Health
 from abs_service.bus import keys
 from abs_service.bus.security.mutual_tls import NO_SECURITY, MutualTls, NoSecurity
 from abs_service.bus.session import SessionMode, open_session
-from drivers.encoding.message_check import MessageError, parse_valid
+from drivers.encoding.message_check import parse_valid
+from drivers.encoding.message_content import MessageError
 
 #: Timeout of the connection [ms].
 CONNECT_MS = 1000

@@ -14,7 +14,7 @@ from abs_service.bus.health import Health
 from abs_service.bus.stamps import HeaderFactory
 from abs_service.wire.edge import check_sample
 from drivers.contract.text import printable
-from drivers.encoding.message_check import MessageError
+from drivers.encoding.message_content import MessageError
 
 _log = logging.getLogger(__name__)
 

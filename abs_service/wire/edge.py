@@ -29,7 +29,8 @@ from abs_service.bus import keys
 from abs_service.bus.contract import Sample
 from drivers.contract.text import is_name, printable
 from drivers.encoding import codec
-from drivers.encoding.message_check import MessageError, check_size, parse_valid
+from drivers.encoding.message_check import check_size, parse_valid
+from drivers.encoding.message_content import MessageError
 
 #: Topics of which messages are taken. A rig of ten sensors and four trackers has about 70.
 MAX_TOPICS = 1000
@@ -141,6 +142,7 @@ SCHEMAS: Mapping[str, type[Message]] = {
         RawImage_pb2.RawImage,
         health_pb2.Health,
         deformation_state_pb2.DeformationState,
+        deformation_state_pb2.CompactState,
         deformed_mesh_pb2.DeformedMesh,
         deformed_mesh_pb2.MeshTopology,
         sensor_model_pb2.SensorModel,
@@ -164,6 +166,7 @@ SCHEMAS: Mapping[str, type[Message]] = {
 _TOPICS: Mapping[type[Message], Callable[[Any], str]] = {
     health_pb2.Health: lambda message: keys.health(message.component),
     deformation_state_pb2.DeformationState: lambda message: keys.state(message.tracker),
+    deformation_state_pb2.CompactState: lambda message: keys.theta(message.tracker),
     deformed_mesh_pb2.DeformedMesh: lambda message: keys.mesh(message.tracker),
     deformed_mesh_pb2.MeshTopology: lambda message: keys.topology(message.tracker),
     sensor_model_pb2.SensorModel: lambda message: keys.model(message.sensor),

@@ -13,13 +13,18 @@ from numpy.typing import NDArray
 from abs_service.pairing.observation import Source
 from abs_service.tracker.estimate import Estimate, Status
 from abs_service.tracker.mesh import Mesh
+from abs_service.tracker.models.base import DeformationModel, HasVertexBasis
 from abs_service.tracker.optimizers.base import Stop
 
 State = deformation_state_pb2.DeformationState
 
 STATE = State.DESCRIPTOR.full_name
 MESH = deformed_mesh_pb2.DeformedMesh.DESCRIPTOR.full_name
+COMPACT = deformation_state_pb2.CompactState.DESCRIPTOR.full_name
 TOPOLOGY = deformed_mesh_pb2.MeshTopology.DESCRIPTOR.full_name
+
+#: Most numbers in each table of a basis, those of 16,000 vertices and cubic splines; larger ones are not sent.
+LARGEST_BASIS = 1 << 18
 
 _STATUS = {
     Status.INITIALIZING: State.STATUS_INITIALIZING,
@@ -165,8 +170,13 @@ def mesh(header: common_pb2.Header, estimate: Estimate, identity: Identity) -> d
     )
 
 
-def topology(header: common_pb2.Header, undeformed: Mesh, identity: Identity) -> deformed_mesh_pb2.MeshTopology:
-    """The undeformed mesh as a message; the header has the time of the frames that it was made from."""
+def topology(
+    header: common_pb2.Header, undeformed: Mesh, identity: Identity, model: DeformationModel | None = None
+) -> deformed_mesh_pb2.MeshTopology:
+    """The undeformed mesh as a message, with the model's basis if it has one.
+
+    The header has the time of the frames that it was made from.
+    """
     colored = np.isfinite(undeformed.colors).any()
     colors = np.nan_to_num(undeformed.colors).astype(np.uint8).tobytes() if colored else b""
     return deformed_mesh_pb2.MeshTopology(
@@ -176,6 +186,41 @@ def topology(header: common_pb2.Header, undeformed: Mesh, identity: Identity) ->
         rest_vertices_f32=undeformed.vertices.astype("<f4").tobytes(),
         faces_u32=undeformed.faces.astype("<u4").tobytes(),
         colors_u8=colors,
+        basis=_basis(model) if isinstance(model, HasVertexBasis) else None,
+    )
+
+
+def _basis(model: HasVertexBasis) -> deformed_mesh_pb2.VertexBasis | None:
+    basis = model.vertex_basis
+    if basis.value.size > LARGEST_BASIS:
+        return None
+    return deformed_mesh_pb2.VertexBasis(
+        support=basis.value.shape[1],
+        control_points_u16=basis.control_points.astype("<u2").tobytes(),
+        value_f32=basis.value.astype("<f4").tobytes(),
+        along_u_f32=basis.along_u.astype("<f4").tobytes(),
+        along_w_f32=basis.along_w.astype("<f4").tobytes(),
+        offset_f32=model.offset.astype("<f4").tobytes(),
+    )
+
+
+def compact(state: State, offset: NDArray[np.floating]) -> deformation_state_pb2.CompactState:
+    """The part of an estimate that goes over a slow link.
+
+    Args:
+        state: the estimate.
+        offset: of the vertices along their normals (n,), if they are new [m]; (0,) if not.
+    """
+    return deformation_state_pb2.CompactState(
+        header=state.header,
+        tracker=state.tracker,
+        status=state.status,
+        mesh_version=state.mesh_version,
+        theta_f32=np.array(state.theta, "<f4").tobytes(),
+        deviation_m=state.deviation_m,
+        age_ms=state.age_ms,
+        offset_f32=offset.astype("<f4").tobytes(),
+        reasons=state.reasons,
     )
 
 

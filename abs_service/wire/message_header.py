@@ -46,6 +46,7 @@ class MessageHeader:
 
 _WITH_HEADER = (
     deformation_state_pb2.DeformationState,
+    deformation_state_pb2.CompactState,
     deformed_mesh_pb2.DeformedMesh,
     deformed_mesh_pb2.MeshTopology,
     health_pb2.Health,

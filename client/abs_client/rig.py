@@ -14,7 +14,7 @@ from abs_client.connection.link import DEFAULT_ENDPOINT, Link, checked
 from abs_client.connection.received import decoded
 from abs_client.connection.tls import Tls
 from abs_client.errors import ClientError
-from abs_client.estimates import states
+from abs_client.estimates import feeds, states
 from abs_client.estimates.state import State
 from abs_client.images import Image
 from abs_client.stream import NothingReceivedError, Stream
@@ -77,6 +77,14 @@ class Rig:
     def states(self, tracker: str, largest_age_s: float = LARGEST_AGE_S) -> Stream[State]:
         """The estimates of a tracker, see `subscribe`."""
         return states.states(self._link, checked(tracker), largest_age_s)
+
+    def compact_states(self, tracker: str, largest_age_s: float = LARGEST_AGE_S) -> Stream[State]:
+        """The same over a slow link: only theta and status are sent, some hundred bytes for each estimate.
+
+        Vertices are computed here, from a basis that is sent once for each mesh. Covariances and shares are unknown.
+        Models without a basis, all but `nurbs`, have no vertices.
+        """
+        return states.states(self._link, checked(tracker), largest_age_s, feed=feeds.compact)
 
     def images(self, sensor: str, stream: str) -> Stream[Image]:
         """The images of a sensor's stream, for `for` or `async for`: always the newest."""

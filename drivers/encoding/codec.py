@@ -17,7 +17,8 @@ from google.protobuf.message import DecodeError
 from drivers.contract.device import Truth
 from drivers.contract.frame import Frame, FrameError, Geometry, Kind, Reference
 from drivers.encoding import raw_image
-from drivers.encoding.message_check import MessageError, check, parse_valid
+from drivers.encoding.message_check import check, parse_valid
+from drivers.encoding.message_content import MessageError
 from drivers.encoding.parsing import CodecError, bytes_per_pixel, pixels_of
 
 IMAGE_SCHEMA = RawImage.DESCRIPTOR.full_name

@@ -1,11 +1,12 @@
-"""Images, calibrations and commands of a rig, by what its own processes publish and answer."""
+"""Images, calibrations, commands and compact estimates of a rig, by what its own processes publish and answer."""
 
+import math
 import threading
 from functools import partial
 
 import numpy as np
 import pytest
-from abs_client import NothingReceivedError, RefusedError, Rig, Tls, UnknownNameError, UnreachableError
+from abs_client import NothingReceivedError, RefusedError, Rig, Status, Tls, UnknownNameError, UnreachableError
 from abs_client.connection.received import Received
 from abs_client.images import ImageError, read
 from absmsg.v1.common_pb2 import Header
@@ -13,15 +14,16 @@ from absmsg.v1.sensor_model_pb2 import SensorModel
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
 from abs_service.bus import keys as topics
-from abs_service.bus.contract import IMAGES
+from abs_service.bus.contract import IMAGES, STATE
 from abs_service.bus.health import Health
 from abs_service.bus.session import SessionMode
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.capture.requested_controls import RequestedControls
-from abs_service.wire import commands, control_commands
+from abs_service.wire import commands, control_commands, estimate_messages
 from drivers.encoding import codec
 from drivers.simulated.address import parse
 from tests.abs_service.capture.fake_device import adjustable
+from tests.client.estimates.test_expansion import Bench
 from tests.client.publishing import PERIOD_S
 from tests.conftest import encrypted
 from tests.waiting import repeating
@@ -165,3 +167,17 @@ def test_the_processes_that_live(bus, rig):
 def test_a_certificate_that_is_not_there_is_told_without_a_try_to_connect(endpoint, tmp_path):
     with pytest.raises(UnknownNameError, match=r"viewer\.key is no file"):
         Rig(encrypted(endpoint), tls=Tls(__file__, __file__, tmp_path / "viewer.key"))
+
+
+def test_a_slow_link_gives_vertices_of_theta_and_a_basis_that_was_sent_before(bus, endpoint):
+    bench = Bench()
+    latched = bus.latched_publisher(topics.topology("sheet"), estimate_messages.TOPOLOGY)
+    latched.put(bench.topology().payload)
+    publisher = bus.publisher(topics.theta("sheet"), estimate_messages.COMPACT, STATE)
+    with Rig(endpoint) as rig, repeating(lambda: publisher.put(bench.compact().payload), PERIOD_S):
+        state = next(one for one in rig.compact_states("sheet", math.inf) if one.status is Status.DEGRADED)
+    np.testing.assert_allclose(state.vertices, bench.expected, atol=2e-6)
+    assert state.reasons == ("folded",)
+    assert state.faces.shape == bench.model.mesh.faces.shape
+    assert np.isnan(state.theta_covariance).all()
+    assert np.isnan(state.vertex_covariance).all()

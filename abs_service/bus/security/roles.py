@@ -19,7 +19,7 @@ PUBLISHES: Mapping[str, tuple[str, ...]] = {
         *(keys.health("capture"), keys.live("capture")),
     ),
     "tracker": (
-        *(topic("*") for topic in (keys.state, keys.mesh, keys.scene, keys.topology, keys.reinitialize)),
+        *(topic("*") for topic in (keys.state, keys.mesh, keys.theta, keys.scene, keys.topology, keys.reinitialize)),
         keys.state("*") + "/@adv/**",  # history for late joiners
         *(keys.health("track/*"), keys.live("track/*")),
     ),

@@ -21,7 +21,8 @@ from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.commands.parts import rig_process
 from abs_service.supervision.exit_codes import Exit
 from abs_service.wire import commands
-from drivers.encoding.message_check import LARGEST_SIDE, MAX_CORNERS, MIN_CORNERS
+from drivers.encoding.message_check import LARGEST_SIDE
+from drivers.encoding.message_content import MAX_CORNERS, MIN_CORNERS
 
 #: Timeout of the detection [s].
 TIMEOUT_S = 10.0

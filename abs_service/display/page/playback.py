@@ -14,7 +14,7 @@ from mcap.records import Message
 from abs_service.bus.contract import Sample
 from abs_service.wire.edge import SCHEMAS, check_sample
 from drivers.encoding import codec, encoded_image
-from drivers.encoding.message_check import MessageError
+from drivers.encoding.message_content import MessageError
 from drivers.encoding.parsing import CodecError
 from drivers.replay.contents import Topic, scan
 from drivers.replay.messages import messages

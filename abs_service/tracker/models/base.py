@@ -70,6 +70,39 @@ class HasDerived(Protocol):
         ...
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class VertexBasis:
+    """Vertices as a function of theta, for a surface whose points are linear in it.
+
+    With the control points p of theta, a vertex is Σ value p + offset · n, with the unit normal n of the tangents
+    Σ along_u p and Σ along_w p (eqs. 2 and 8).
+
+    Attributes:
+        control_points: numbers (n, k) of the control points that each vertex depends on.
+        value, along_u, along_w: (n, k).
+    """
+
+    control_points: NDArray[np.int32]
+    value: NDArray[np.float32]
+    along_u: NDArray[np.float32]
+    along_w: NDArray[np.float32]
+
+
+@runtime_checkable
+class HasVertexBasis(Protocol):
+    """A model whose vertices follow from theta by a basis, so that other programs can compute them."""
+
+    @property
+    def vertex_basis(self) -> VertexBasis:
+        """The basis; the same for the life of the model."""
+        ...
+
+    @property
+    def offset(self) -> NDArray[np.float32]:
+        """Offsets of the vertices along their normals (n,) [m], as they are known now."""
+        ...
+
+
 class DeformationModel(Protocol):
     """A deformation `D_Θ` of a mesh (eq. 1).
 

@@ -11,7 +11,7 @@ from abs_service.tracker import resolution
 from abs_service.tracker.detection.grid_mesh import grid_mesh
 from abs_service.tracker.detection.initial_detection import InitialDetection
 from abs_service.tracker.mesh import Mesh, edge_lengths
-from abs_service.tracker.models.base import BOARD, ModelError, SparseJacobian, Surface
+from abs_service.tracker.models.base import BOARD, ModelError, SparseJacobian, Surface, VertexBasis
 from abs_service.tracker.models.parts import binding, spline
 from abs_service.tracker.models.parts.bspline_patches import Patches
 from calib.jit import kernel
@@ -178,6 +178,12 @@ class Nurbs:
     def offset(self) -> NDArray[np.float32]:
         """Offsets of the vertices along their normals (n,) [m]."""
         return self._offset
+
+    @property
+    def vertex_basis(self) -> VertexBasis:
+        """Rational basis functions of every vertex, and their derivatives along both directions."""
+        value, along_u, along_w = self._basis.transpose(0, 2, 1)
+        return VertexBasis(self._span_control[self._span], value, along_u, along_w)
 
     def set_offsets(self, offset: NDArray[np.float64], deviation: NDArray[np.float64]) -> None:
         """Replaces the vertex offsets (n,) [m], known with a standard deviation (n,) [m], in mesh and deformations."""

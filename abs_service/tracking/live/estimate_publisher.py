@@ -1,5 +1,6 @@
 """Publishes the results of a tracker: estimates, meshes, their topologies, and scenes for viewers."""
 
+import numpy as np
 from absmsg.v1.common_pb2 import Header
 from absmsg.v1.deformed_mesh_pb2 import MeshTopology
 
@@ -8,11 +9,18 @@ from abs_service.bus.clock_offsets import Offset
 from abs_service.bus.contract import IMAGES, MESH, STATE, Bus
 from abs_service.bus.stamps import HeaderFactory
 from abs_service.tracker.estimate import Estimate
+from abs_service.tracker.models.base import HasVertexBasis
 from abs_service.tracking.session import TrackingSession
 from abs_service.wire import estimate_messages
-from abs_service.wire.estimate_messages import Effort, Identity
+from abs_service.wire.estimate_messages import Effort, Identity, State
 from abs_service.wire.message_header import SCENE
 from abs_service.wire.viewer_messages import ViewRate, scene_update
+
+#: Offsets of vertices are told to those who compute vertices if they have changed by so much, root mean square [m], and
+#: this many times a second in any case, for those who come later [Hz].
+OFFSETS_CHANGED_M, OFFSETS_HZ = 1e-4, 1.0
+
+_NO_OFFSETS = np.zeros(0, np.float32)
 
 
 class EstimatePublisher:
@@ -31,8 +39,10 @@ class EstimatePublisher:
         self._state = bus.publisher(keys.state(tracker), estimate_messages.STATE, STATE)
         self._mesh = bus.publisher(keys.mesh(tracker), estimate_messages.MESH, MESH)
         self._topology = bus.latched_publisher(keys.topology(tracker), estimate_messages.TOPOLOGY)
+        self._compact = bus.publisher(keys.theta(tracker), estimate_messages.COMPACT, STATE)
         self._scene = bus.publisher(keys.scene(tracker), SCENE, IMAGES)
-        self._view_rate = ViewRate(view_hz)
+        self._view_rate, self._offset_rate = ViewRate(view_hz), ViewRate(OFFSETS_HZ)
+        self._sent_offset = _NO_OFFSETS
         self._topology_message = MeshTopology()
         self._identity = Identity(tracker, model, "", calib_id, 0)
         self._seq = 0
@@ -52,16 +62,28 @@ class EstimatePublisher:
             self._identity = estimate_messages.with_mesh(self._identity, *made)
             # Numbered by itself, or a recorder would take the estimates in between for topologies that it missed.
             header = self._header(tracking.made_ns, host_clock, offset, tracking.mesh_version)
-            self._topology_message = estimate_messages.topology(header, tracking.mesh, self._identity)
+            self._topology_message = estimate_messages.topology(header, tracking.mesh, self._identity, tracking.model)
             self._topology.put(self._topology_message.SerializeToString())
         header = self._header(estimate.t_host_ns, host_clock, offset, self._seq)
         state = estimate_messages.state(header, estimate, self._identity, effort)
         mesh = estimate_messages.mesh(header, estimate, self._identity)
         self._state.put(state.SerializeToString())
         self._mesh.put(mesh.SerializeToString())
+        self._publish_compact(state, tracking)
         if self._view_rate.due(estimate.t_host_ns):
             self._scene.put(scene_update(mesh, self._topology_message, state.status).SerializeToString())
         self._seq += 1
+
+    def _publish_compact(self, state: State, tracking: TrackingSession) -> None:
+        """Publishes theta and status, with the offsets of the vertices if that is due."""
+        now = tracking.model.offset if isinstance(tracking.model, HasVertexBasis) else _NO_OFFSETS
+        is_new = len(now) != len(self._sent_offset) or np.sum(
+            (now - self._sent_offset) ** 2
+        ) > OFFSETS_CHANGED_M**2 * len(now)
+        if is_due := self._offset_rate.due(state.header.t_host_ns) or is_new:
+            self._sent_offset = now
+        compact = estimate_messages.compact(state, now if is_due else _NO_OFFSETS)
+        self._compact.put(compact.SerializeToString())
 
     def _header(self, t_host_ns: int, host_clock: str, offset: Offset, seq: int) -> Header:
         return self._headers.elsewhere(t_host_ns, host_clock, t_host_ns + offset.ns, seq, keys.RIG_FRAME)

@@ -12,9 +12,10 @@ from abs_client.connection.link import Link
 from abs_client.connection.received import Received, decoded
 from abs_client.connection.wake import Wake
 from abs_client.errors import RangeError
-from abs_client.estimates import reading
+from abs_client.estimates import feeds
 from abs_client.estimates.ages import Ages
 from abs_client.estimates.assembly import Assembly
+from abs_client.estimates.feeds import Feed
 from abs_client.estimates.state import State, Status, received
 from abs_client.stream import Stream
 
@@ -26,7 +27,13 @@ FOREVER_S = 1e9
 _NOTHING = State(DeformationState(), DeformedMesh(), MeshTopology(), Status.STALE, (), float("nan"))
 
 
-def states(link: Link, tracker: str, largest_age_s: float, close: Callable[[], None] | None = None) -> Stream[State]:
+def states(
+    link: Link,
+    tracker: str,
+    largest_age_s: float,
+    close: Callable[[], None] | None = None,
+    feed: Feed = feeds.whole,
+) -> Stream[State]:
     """The estimates of a tracker, the newest first and only.
 
     Args:
@@ -34,12 +41,13 @@ def states(link: Link, tracker: str, largest_age_s: float, close: Callable[[], N
         tracker: its name.
         largest_age_s: older estimates are left out; when there are no others for so long, a STALE one is given.
         close: what ends the link, if the stream is all that uses it.
+        feed: what is received of the tracker.
 
     Raises:
         RangeError: `largest_age_s` is not greater than 0.
     """
     wake = Wake()
-    source = StateSource(link, tracker, checked_age(largest_age_s), wake, monotonic_ns)
+    source = StateSource(link, tracker, checked_age(largest_age_s), feed, wake, monotonic_ns)
     return Stream(source, wake, link, close or source.close)
 
 
@@ -58,12 +66,14 @@ class StateSource:
     """Joins what arrives of a tracker and judges its age; see `stream.Source`.
 
     Args:
-        link, tracker, largest_age_s: see `states`.
+        link, tracker, largest_age_s, feed: see `states`.
         wake: signalled when there may be a state.
         clock: this host's monotonic clock [ns].
     """
 
-    def __init__(self, link: Link, tracker: str, largest_age_s: float, wake: Wake, clock: Callable[[], int]) -> None:
+    def __init__(
+        self, link: Link, tracker: str, largest_age_s: float, feed: Feed, wake: Wake, clock: Callable[[], int]
+    ) -> None:
         self._link = link
         self._tracker = tracker
         self._wake = wake
@@ -75,11 +85,13 @@ class StateSource:
         self._stale_ns = self._silent_at_ns()
         self._skipped = 0
         # What receives holds neither the source nor the link, so that both end with their stream.
-        self._subscriptions = _subscribe(link, tracker, self._assembly, wake)
+        handlers = {topic: _signalling(handler, wake) for topic, handler in feed(self._assembly).items()}
+        self._subscriptions = [link.subscribe(f"{tracker}/{topic}", one) for topic, one in handlers.items()]
+        self._on_topology = handlers["topology"]
         self._requested_ns = clock()
         self._living: set[str] = set()
         link.ask_living(_keys_into(self._living))
-        link.ask(f"{tracker}/topology", _topology_into(self._assembly, wake))  # there is one already, most often
+        link.ask(f"{tracker}/topology", self._on_topology)  # there is one already, most often
 
     @property
     def skipped(self) -> int:
@@ -140,32 +152,19 @@ class StateSource:
     def _ask_for_topology(self) -> None:
         if self._assembly.lacks_topology and self._clock() - self._requested_ns > PAUSE_NS:
             self._requested_ns = self._clock()
-            self._link.ask(f"{self._tracker}/topology", _topology_into(self._assembly, self._wake))
+            self._link.ask(f"{self._tracker}/topology", self._on_topology)
 
     def _ask_clock(self, host_clock: str) -> None:
         ages = self._ages
         self._link.ask(f"clock/{host_clock}", lambda one: ages.add(decoded(Header, one)))
 
 
-def _subscribe(link: Link, tracker: str, assembly: Assembly, wake: Wake) -> list[Callable[[], None]]:
-    def on_state(one: Received) -> None:
-        assembly.add_state(reading.state(one))
+def _signalling(handler: Callable[[Received], None], wake: Wake) -> Callable[[Received], None]:
+    def on_message(one: Received) -> None:
+        handler(one)
         wake.signal()
 
-    def on_mesh(one: Received) -> None:
-        assembly.add_mesh(reading.mesh(one))
-        wake.signal()
-
-    topics = {"topology": _topology_into(assembly, wake), "state": on_state, "mesh": on_mesh}
-    return [link.subscribe(f"{tracker}/{topic}", on_message) for topic, on_message in topics.items()]
-
-
-def _topology_into(assembly: Assembly, wake: Wake) -> Callable[[Received], None]:
-    def on_topology(one: Received) -> None:
-        assembly.add_topology(reading.topology(one))
-        wake.signal()
-
-    return on_topology
+    return on_message
 
 
 def _keys_into(living: set[str]) -> Callable[[Received], None]:

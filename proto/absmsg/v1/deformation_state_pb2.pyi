@@ -154,3 +154,25 @@ class DeformationState(_message.Message):
     derived: _containers.MessageMap[str, _sensor_model_pb2.NumberList]
     age_error_ms: float
     def __init__(self, header: _Optional[_Union[_common_pb2.Header, _Mapping]] = ..., tracker: _Optional[str] = ..., status: _Optional[_Union[DeformationState.Status, str]] = ..., reasons: _Optional[_Iterable[str]] = ..., model: _Optional[str] = ..., model_id: _Optional[str] = ..., calib_id: _Optional[str] = ..., theta: _Optional[_Iterable[float]] = ..., log_likelihood: _Optional[float] = ..., search_deviation: _Optional[float] = ..., generations: _Optional[int] = ..., evaluations: _Optional[int] = ..., solve_ms: _Optional[float] = ..., age_ms: _Optional[float] = ..., skipped: _Optional[int] = ..., mesh_version: _Optional[int] = ..., sensors: _Optional[_Iterable[_Union[DeformationState.Sensor, _Mapping]]] = ..., inlier_share: _Optional[float] = ..., covariance: _Optional[_Iterable[float]] = ..., covariance_valid: _Optional[bool] = ..., samples: _Optional[int] = ..., clock_sigma_ns: _Optional[int] = ..., searcher: _Optional[str] = ..., stop: _Optional[_Union[DeformationState.Stop, str]] = ..., budget_evaluations: _Optional[int] = ..., budget_ms: _Optional[float] = ..., stretch: _Optional[float] = ..., folded_share: _Optional[float] = ..., deviation_m: _Optional[float] = ..., warnings: _Optional[_Iterable[str]] = ..., derived: _Optional[_Mapping[str, _sensor_model_pb2.NumberList]] = ..., age_error_ms: _Optional[float] = ...) -> None: ...
+
+class CompactState(_message.Message):
+    __slots__ = ("header", "tracker", "status", "mesh_version", "theta_f32", "deviation_m", "age_ms", "offset_f32", "reasons")
+    HEADER_FIELD_NUMBER: _ClassVar[int]
+    TRACKER_FIELD_NUMBER: _ClassVar[int]
+    STATUS_FIELD_NUMBER: _ClassVar[int]
+    MESH_VERSION_FIELD_NUMBER: _ClassVar[int]
+    THETA_F32_FIELD_NUMBER: _ClassVar[int]
+    DEVIATION_M_FIELD_NUMBER: _ClassVar[int]
+    AGE_MS_FIELD_NUMBER: _ClassVar[int]
+    OFFSET_F32_FIELD_NUMBER: _ClassVar[int]
+    REASONS_FIELD_NUMBER: _ClassVar[int]
+    header: _common_pb2.Header
+    tracker: str
+    status: DeformationState.Status
+    mesh_version: int
+    theta_f32: bytes
+    deviation_m: float
+    age_ms: float
+    offset_f32: bytes
+    reasons: _containers.RepeatedScalarFieldContainer[str]
+    def __init__(self, header: _Optional[_Union[_common_pb2.Header, _Mapping]] = ..., tracker: _Optional[str] = ..., status: _Optional[_Union[DeformationState.Status, str]] = ..., mesh_version: _Optional[int] = ..., theta_f32: _Optional[bytes] = ..., deviation_m: _Optional[float] = ..., age_ms: _Optional[float] = ..., offset_f32: _Optional[bytes] = ..., reasons: _Optional[_Iterable[str]] = ...) -> None: ...

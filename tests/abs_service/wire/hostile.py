@@ -6,7 +6,7 @@ from typing import Any
 
 from absmsg.v1.command_pb2 import Control, Record, Reinitialize, Reload, SetControls
 from absmsg.v1.common_pb2 import Header
-from absmsg.v1.deformation_state_pb2 import DeformationState
+from absmsg.v1.deformation_state_pb2 import CompactState, DeformationState
 from absmsg.v1.deformed_mesh_pb2 import DeformedMesh, MeshTopology
 from absmsg.v1.frame_info_pb2 import FrameInfo
 from absmsg.v1.health_pb2 import Health
@@ -63,6 +63,7 @@ VALID: Mapping[str, Message] = {
     "config": Config(toml="version = 1\n"),
     "sim/truth": SurfaceTruth(rows=1, columns=2, points_f32=bytes(24)),
     "sheet/state": DeformationState(tracker="sheet", theta=[0.0], status=DeformationState.STATUS_TRACKING),
+    "sheet/theta": CompactState(tracker="sheet", theta_f32=bytes(36), offset_f32=bytes(8)),
     "sheet/mesh": DeformedMesh(tracker="sheet", vertices_f32=bytes(24), covariance_f32=bytes(48)),
     "sheet/topology": MeshTopology(tracker="sheet", rest_vertices_f32=bytes(24), faces_u32=bytes(12)),
     "sheet/reinitialize": Reinitialize(tracker="sheet", seed=Reinitialize.Pixel(column=111, row=133)),

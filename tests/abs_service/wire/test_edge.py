@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 from absmsg.v1.common_pb2 import Header
-from absmsg.v1.deformation_state_pb2 import DeformationState
-from absmsg.v1.deformed_mesh_pb2 import DeformedMesh, MeshTopology
+from absmsg.v1.deformation_state_pb2 import CompactState, DeformationState
+from absmsg.v1.deformed_mesh_pb2 import DeformedMesh, MeshTopology, VertexBasis
 from absmsg.v1.health_pb2 import Health
 from absmsg.v1.sensor_model_pb2 import Config, SensorModel
 from absmsg.v1.surface_truth_pb2 import SurfaceTruth
@@ -28,6 +28,7 @@ from tests.abs_service.wire.hostile import INFO, MODEL, VALID, samples
 S = 1_000_000_000
 
 SHEET = DeformedMesh(tracker="sheet", vertices_f32=np.ones((3000, 3), "<f4").tobytes())
+BASIS = VertexBasis(support=2, control_points_u16=bytes(4), value_f32=bytes(8), offset_f32=bytes(4))
 FLAT = MeshTopology(tracker="sheet", faces_u32=np.array([[0, 1, 2]], "<u4").tobytes())
 
 
@@ -105,6 +106,13 @@ def test_no_text_or_number_of_the_golden_messages_is_refused(name):
             "finite",
         ),
         (sample("sheet/topology", MeshTopology(faces_u32=bytes(12))), "content", "a face of 0 vertices"),
+        (
+            sample("sheet/topology", MeshTopology(rest_vertices_f32=bytes(12), basis=BASIS)),
+            "content",
+            "basis: its sizes",
+        ),
+        (sample("sheet/theta", CompactState(tracker="sheet", theta_f32=b"123")), "content", "no numbers"),
+        (sample("sheet/theta", CompactState(theta_f32=np.array([np.inf], "<f4").tobytes())), "number", "finite"),
         (sample("sim/truth", SurfaceTruth(rows=2**31, columns=2**31)), "content", "are allowed"),
         (sample("tof/model", changed(MODEL, width=2**31)), "range", "SensorModel.width"),
         (sample("tof/model", SensorModel(sensor="tof")), "content", "is no camera"),

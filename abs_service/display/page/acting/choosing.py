@@ -12,7 +12,7 @@ from abs_service.display.page.acting.gestures import Eye, Gestures, Ray
 from abs_service.wire import commands
 from abs_service.wire.commands import Choice, Pixel
 from calib.camera import Camera
-from drivers.encoding.message_check import MAX_CORNERS, MIN_CORNERS
+from drivers.encoding.message_content import MAX_CORNERS, MIN_CORNERS
 
 #: A click means the first point that is so near to its ray, in distances between neighbouring points.
 REACH = 1.5

@@ -71,12 +71,14 @@ def test_doubts_about_the_object_are_in_every_state_and_in_health():
         bench.expose(k)
         bench.live.process_next()
     first, second = bench.states
-    (doubt,) = first.warnings
-    assert "is the region right?" in doubt
-    assert list(second.warnings) == [doubt]
+    region, left_out = first.warnings
+    assert "is the region right?" in region
+    assert "lie beside the mesh" in left_out  # it does not go from the wall to the sheet
+    assert list(second.warnings) == [region, left_out]
     said = bench.said
     assert said.level == Message.LEVEL_WARNING
-    assert doubt in said.message
+    assert region in said.message
+    assert left_out in said.message
 
 
 def test_a_wrong_depth_scale_is_a_warning_until_it_is_right(bench):

@@ -1,10 +1,12 @@
 """A live tracker turns exposures into estimates, and announces its mesh before it uses it."""
 
 import dataclasses
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from absmsg.v1.deformation_state_pb2 import DeformationState
+from abs_client.estimates.expansion import surface_of
+from absmsg.v1.deformation_state_pb2 import CompactState, DeformationState
 from absmsg.v1.deformed_mesh_pb2 import DeformedMesh, MeshTopology
 from absmsg.v1.health_pb2 import Health as Message
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
@@ -36,7 +38,8 @@ def test_the_topology_is_announced_before_the_first_state_that_uses_it(bench):
         bench.expose(k)
         bench.live.process_next()
     topics = [sample.topic for sample in bench.bus.sent if sample.topic.startswith("sheet/")]
-    assert topics == ["sheet/topology", "sheet/state", "sheet/mesh", "sheet/state", "sheet/mesh"]
+    estimate = ["sheet/state", "sheet/mesh", "sheet/theta"]
+    assert topics == ["sheet/topology", *estimate, *estimate]
     (topology,) = bench.sent("sheet/topology", MeshTopology)
     assert {state.mesh_version for state in bench.states} == {topology.mesh_version}
     meshes = bench.sent("sheet/mesh", DeformedMesh)
@@ -44,6 +47,26 @@ def test_the_topology_is_announced_before_the_first_state_that_uses_it(bench):
     assert [mesh.header.t_host_ns for mesh in meshes] == [state.header.t_host_ns for state in bench.states]
     # Whoever comes later asks.
     assert [MeshTopology.FromString(s.payload) for s in bench.bus.query("sheet/topology", 0.0)] == [topology]
+
+
+def test_vertices_follow_from_theta_and_the_basis_of_the_mesh(bench):
+    for k in range(40):
+        bench.expose(k)
+        bench.live.process_next()
+    (topology,) = bench.sent("sheet/topology", MeshTopology)
+    compact, meshes = bench.sent("sheet/theta", CompactState), bench.sent("sheet/mesh", DeformedMesh)
+    surface = surface_of(topology.basis)
+    assert 2 <= [bool(one.offset_f32) for one in compact].count(True) < 10  # in each second, and while they are learnt
+    off = []
+    for one, mesh in zip(compact, meshes, strict=True):
+        if one.offset_f32:
+            surface = replace(surface, offset=np.frombuffer(one.offset_f32, "<f4"))
+        expected = np.frombuffer(mesh.vertices_f32, "<f4").reshape(-1, 3)
+        found = surface.vertices(np.frombuffer(one.theta_f32, "<f4"))
+        off.append(np.sqrt(np.mean(np.sum((found - expected) ** 2, axis=1))))
+        assert (one.header, one.mesh_version) == (mesh.header, mesh.mesh_version)
+    assert max(off) < 1e-3  # offsets are those learnt from the frame itself, vertices were computed before
+    assert max(off[10:]) < 0.2e-3
 
 
 def test_topologies_are_numbered_by_themselves_so_that_a_recorder_misses_none(bench):
