@@ -1,6 +1,5 @@
 """The connection to a rig: a zenoh session of a client, and the threads that receive on it."""
 
-import json
 import re
 import threading
 import weakref
@@ -13,18 +12,16 @@ from typing import Any, Self
 
 import zenoh
 
-from abs_client.connection import shared_memory
 from abs_client.connection.received import Received
+from abs_client.connection.session import opened
 from abs_client.connection.tls import Tls
 from abs_client.connection.wake import Wake
 from abs_client.errors import MalformedError, UnknownNameError, UnreachableError
 
 #: Default address at which a rig listens.
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
-#: By when a rig must answer that is connected to, and a query [s].
-CONNECT_S, QUERY_S = 3.0, 2.0
-#: Time between the tries to connect again to a rig that is gone, at first and at most, and the longest of a try [ms].
-RETRY_MS, TRY_MS = (250, 1000), 2000
+#: By when a query must be answered [s].
+QUERY_S = 2.0
 #: Messages of one topic that may wait for their thread; the oldest goes first.
 WAITING = 4
 #: By when receiving threads have ended after their session has [s].
@@ -61,10 +58,7 @@ class Link:
         self._lock = threading.RLock()
         self._threads: list[threading.Thread] = []
         self._waiting: weakref.WeakSet[Wake] = weakref.WeakSet()
-        try:
-            self._session = zenoh.open(zenoh.Config.from_json5(json.dumps(client_settings(endpoint, tls))))
-        except zenoh.ZError as error:
-            raise UnreachableError(f"nothing answers at {endpoint} within {CONNECT_S:g} s: is it running?") from error
+        self._session = opened(endpoint, tls)
         self._end = weakref.finalize(self, _end, self._session, self._lock, self._threads)
 
     @property
@@ -174,27 +168,6 @@ def checked(name: str) -> str:
     if not _NAME.fullmatch(name):
         raise UnknownNameError(f"{name!r} is no name: 1 to 64 letters, digits, - and _, the first a letter or digit")
     return name
-
-
-def client_settings(endpoint: str, tls: Tls | None = None) -> dict[str, object]:
-    """Configuration of zenoh for a client of the router at an endpoint; without certificates if `tls` is None."""
-    own = {} if tls is None else {"connect_certificate": str(tls.certificate), "connect_private_key": str(tls.key)}
-    link = {"tls": {"root_ca_certificate": str(tls.authority), "enable_mtls": True, **own}} if tls else {}
-    return {
-        "mode": "client",
-        "connect": {
-            "endpoints": [endpoint],
-            "timeout_ms": round(CONNECT_S * 1000),
-            "exit_on_failure": True,
-            "retry": {"period_init_ms": RETRY_MS[0], "period_max_ms": RETRY_MS[1]},
-        },
-        "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}, "delay": 0},
-        "transport": {
-            "unicast": {"open_timeout": TRY_MS},
-            "link": link,
-            "shared_memory": {"enabled": shared_memory.is_usable()},
-        },
-    }
 
 
 def _undeclare(subscriber: Any) -> None:

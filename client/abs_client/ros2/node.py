@@ -1,6 +1,5 @@
 """A node of the ROS graph: its session with the router of the ROS system, tokens and publishers."""
 
-import json
 import threading
 from collections.abc import Callable
 from time import time_ns
@@ -10,8 +9,7 @@ from typing import Any, Self
 import zenoh
 from zenoh import ext
 
-from abs_client.connection.link import CONNECT_S, client_settings
-from abs_client.errors import UnreachableError
+from abs_client.connection.session import opened
 from abs_client.ros2 import cdr, layout
 from abs_client.ros2.layout import Qos
 
@@ -36,10 +34,7 @@ class RosNode:
         self._clock = clock
         self._lock = threading.Lock()
         self._publishers: dict[str, _Publisher] = {}
-        try:
-            self._session = zenoh.open(zenoh.Config.from_json5(json.dumps(client_settings(router))))
-        except zenoh.ZError as error:
-            raise UnreachableError(f"nothing answers at {router} within {CONNECT_S:g} s: is it running?") from error
+        self._session = opened(router)
         self._node = layout.Node(domain, str(self._session.info.zid()), name)
         self._token = self._session.liveliness().declare_token(self._node.token())
 

@@ -11,7 +11,8 @@ from typing import ClassVar
 
 import pytest
 from abs_client.connection import shared_memory
-from abs_client.connection.link import Link, client_settings
+from abs_client.connection.link import Link
+from abs_client.connection.session import client_settings
 from abs_client.errors import UnreachableError
 
 Thread = threading.Thread

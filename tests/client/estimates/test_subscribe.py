@@ -155,6 +155,11 @@ def test_nobody_there_is_told(endpoint):
         subscribe(endpoint)
 
 
+def test_a_name_without_an_address_is_said():
+    with pytest.raises(UnreachableError, match=r'the name "nowhere\.invalid" in tcp/nowhere\.invalid:7447 cannot be'):
+        subscribe("tcp/nowhere.invalid:7447")
+
+
 @pytest.mark.parametrize("wrong", [{"endpoint": "127.0.0.1"}, {"rig": "a/b"}, {"tracker": "**"}])
 def test_a_name_that_cannot_be_one_is_told(endpoint, wrong):
     with pytest.raises(UnknownNameError, match=r"no endpoint|no name"):

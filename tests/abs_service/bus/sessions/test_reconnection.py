@@ -6,7 +6,7 @@ from contextlib import closing
 
 import pytest
 import zenoh
-from abs_client.connection.link import client_settings
+from abs_client.connection.session import client_settings
 
 from abs_service.bus.session import SessionMode, open_session
 from drivers.remote.address import Address
