@@ -27,7 +27,7 @@ class Chessboard:
     """Black and white squares, black in the upper left corner; its corners are where four squares meet.
 
     With `columns + rows` odd the orientation is unique. Otherwise the board is symmetric under rotation by 180°, and
-    corners are numbered so that x points to the right in the image: sensors rolled by 90° or more will disagree.
+    corners are numbered so that x points to the right in the image; see `calib.solve.start.half_turns`.
 
     Attributes:
         columns, rows: inner corners along x and y: one less than squares.
@@ -130,7 +130,8 @@ class Charuco:
 class Circles:
     """Black discs on a regular grid.
 
-    Symmetric under rotation by 180°; discs are numbered so that x points to the right in the image.
+    Symmetric under rotation by 180°; discs are numbered so that x points to the right in the image; see
+    `calib.solve.start.half_turns`.
 
     Attributes:
         columns, rows: discs along x and y.
@@ -201,6 +202,17 @@ class AsymmetricCircles:
 
 
 Target = Chessboard | Charuco | Circles | AsymmetricCircles | AprilGrid
+
+
+def has_two_ways_up(target: Target) -> bool:
+    """True if the board looks the same after half a turn."""
+    match target:
+        case Chessboard():
+            return (target.columns + target.rows) % 2 == 0
+        case Circles():
+            return True
+        case _:
+            return False
 
 
 def outline(target: Target) -> Points:

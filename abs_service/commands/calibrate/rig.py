@@ -22,10 +22,12 @@ options have to be changed first. What the verdicts mean: docs/how-to/calibratio
 import argparse
 from collections.abc import Iterable
 
+from abs_service.calibration.files import target_file
 from abs_service.commands.calibrate import solving
 from abs_service.commands.calibrate.inputs import material
 from abs_service.commands.calibrate.inputs.material import Material, SolveOptionError
 from abs_service.config.problems import allowed_instead
+from calib.board.target import has_two_ways_up
 from calib.solve.bundle.tasks import Task
 
 #: Values of `--depth-terms`.
@@ -84,7 +86,8 @@ def _solve(arguments: argparse.Namespace) -> int:
         for name in there
     }
     reference = arguments.reference or _reference(found, there, arguments.free_running)
-    task = Task(sensors, found.seen.corners, found.seen.planes, reference)
+    two_ways_up = has_two_ways_up(target_file.read(arguments.target))
+    task = Task(sensors, found.seen.corners, found.seen.planes, reference, two_ways_up=two_ways_up)
     return solving.finish(f"Calibration of {', '.join(there)}", task, arguments, found)
 
 

@@ -17,6 +17,7 @@ import argparse
 import json
 import sys
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from abs_service.calibration.cameras import verification
@@ -32,8 +33,9 @@ from abs_service.commands.parts import rig_process
 from abs_service.config.problems import allowed_instead
 from abs_service.report import page, provenance
 from abs_service.report.content import Level, Report, Verdict, to_json
-from calib.board.target import Target
+from calib.board.target import Target, has_two_ways_up
 from calib.camera import Camera
+from calib.solve.start.half_turns import numbered_alike
 from drivers.replay import Recording
 
 
@@ -73,6 +75,9 @@ def run(arguments: argparse.Namespace) -> int:
     known = calibrations.load(arguments.calibration)
     target = target_file.read(arguments.target)
     seen, files = _look(arguments, target, known)
+    if has_two_ways_up(target) and seen.corners:
+        cameras = {name: sensor.camera for name, sensor in known.sensors.items()}
+        seen = replace(seen, corners=tuple(numbered_alike(seen.corners, cameras)))
     origin = provenance.trace(_command_line(arguments), [arguments.calibration, arguments.target, *files])
     path = arguments.report or arguments.calibration.with_name(f"{arguments.calibration.stem}-verify.html")
     try:

@@ -13,7 +13,7 @@ from calib.solve.bundle.adjustment import NotSolvedError, search
 from calib.solve.bundle.formulation import formulate
 from calib.solve.bundle.parameters.state import SensorState, State
 from calib.solve.bundle.tasks import SensorTask, Task
-from calib.solve.start import extrinsics_graph, registration
+from calib.solve.start import extrinsics_graph, half_turns, registration
 from calib.solve.start.board_poses import PoseCandidate, initial_camera, pose_candidates
 
 #: Reprojection errors are clipped here [px] when board poses are compared.
@@ -37,6 +37,8 @@ def start(task: Task, note: Callable[[str], None]) -> tuple[Task, State]:
             raise NotSolvedError(f"{name}: no view shows a board that its camera could have seen")
         if views:
             seen[name] = {shot: each for shot, each in found.items() if each}
+    if task.two_ways_up and len(seen) > 1:
+        task, seen = _numbered_alike(task, cameras, seen)
     placed = _placed(task, cameras, seen)
     usable = _usable(task, seen)
     for said in left_out(task, usable):
@@ -75,6 +77,20 @@ def fit_camera(name: str, sensor: SensorTask, views: Sequence[CornerView], first
     task = Task({name: free}, views, (), name).of_shots([*boards])
     state = State({name: SensorState(replace(first, T_rs=pose.identity()))}, boards)
     return search(formulate(task)(state, (1.0,))).sensors[name].camera
+
+
+def _numbered_alike(
+    task: Task, cameras: Mapping[str, Camera], seen: Mapping[str, Mapping[int, list[PoseCandidate]]]
+) -> tuple[Task, dict[str, dict[int, list[PoseCandidate]]]]:
+    """Task and pose candidates with corners numbered from the same end of the board in all sensors of a shot."""
+    poses = extrinsics_graph.poses(half_turns.both_ways(seen, task.corners), next(iter(seen)))
+    placed = {name: replace(cameras[name], T_rs=T_0s) for name, T_0s in poses.items()}
+    corners = half_turns.numbered_alike(task.corners, placed)
+    found: dict[str, dict[int, list[PoseCandidate]]] = {name: {} for name in seen}
+    for view in corners:
+        if candidates := pose_candidates(cameras[view.sensor], view):
+            found[view.sensor][view.shot] = candidates
+    return replace(task, corners=corners), found
 
 
 def _placed(task: Task, cameras: Mapping[str, Camera], seen: extrinsics_graph.PoseCandidates) -> State:
