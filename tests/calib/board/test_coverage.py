@@ -123,6 +123,14 @@ def test_images_of_one_sensor_that_are_given_for_two_are_noticed() -> None:
         coverage.check(views)
 
 
+def test_images_that_were_compressed_anew_are_the_same_images() -> None:
+    random = np.random.default_rng(0)
+    copies = [replace(one, sensor="tof", pixels=one.pixels + random.normal(0, 0.1, one.pixels.shape)) for one in many()]
+    with pytest.raises(coverage.SameImagesError, match="color and tof have the same images"):
+        coverage.check([*many(), *copies])
+    coverage.check([*many(), *(replace(one, pixels=one.pixels + 0.5) for one in copies)])
+
+
 def test_the_simulated_board_is_shown_in_all_poses_that_are_needed() -> None:
     simulation = parse("simulated://target?sensors=tof,color&reach=1.5").build()
     target, surface = TARGETS["chessboard"], simulation.scene.surfaces[0]
