@@ -29,11 +29,13 @@ class Hints:
         name: of the camera, for a format without names.
         size: width and height [px], for a format without image sizes; None if unknown.
         lens: "brown-conrady" or "fisheye", for a format that leaves it open; "" if unknown.
+        pair: text of another file that says where two cameras stand; "" without one.
     """
 
     name: str = "camera"
     size: tuple[int, int] | None = None
     lens: str = ""
+    pair: str = ""
 
 
 @dataclass(frozen=True)
@@ -53,12 +55,14 @@ class Written:
 
 
 def rigid(matrix: ArrayLike) -> Pose:
-    """Pose from 3 × 4 or 4 × 4 numbers; the rotation is orthonormalised.
+    """Pose from 3 × 4 or 4 × 4 numbers, in rows or one after the other; the rotation is orthonormalised.
 
     Raises:
         FormatError: the numbers are not a pose.
     """
     given = np.asarray(matrix, np.float64)
+    if given.shape in {(12,), (16,)}:
+        given = given.reshape(-1, 4)
     if given.shape not in {(3, 4), (4, 4)}:
         raise FormatError(f"a pose has 4 × 4 numbers, not {given.tolist()}")
     try:

@@ -30,8 +30,11 @@ from calib.lenses.lens import LensModel
 
 _MATRICES = ("camera_matrix", "Camera_Matrix", "cameraMatrix", "CameraMatrix", "K", "M1", "M2")
 _DISTORTIONS = (
-    "distortion_coefficients", "Distortion_Coefficients", "distCoeffs", "dist_coeffs", "dist", "D", "D1", "D2",
+    "distortion_coefficients", "Distortion_Coefficients", "distCoeffs", "dist_coeffs", "dist_coeff", "dist", "D", "D1",
+    "D2",
 )  # fmt: skip
+#: Other keys with such a part may hold a lens, which must not be lost.
+_OF_A_LENS = ("dist", "coef")
 #: Kinds of lenses that four coefficients may be those of.
 FISHEYE, BROWN_CONRADY = "fisheye", "brown-conrady"
 FISHEYE_COEFFICIENTS = 4
@@ -41,6 +44,9 @@ FISHEYE_NAMES = (KannalaBrandt.name, "fisheye", "equidistant", "kannala_brandt",
 _SIZES = ("img_size", "image_size", "imageSize", "size")
 _WIDTHS = ("image_width", "image_Width", "width")
 _HEIGHTS = ("image_height", "image_Height", "height")
+_ERRORS = ("avg_reprojection_error", "Avg_Reprojection_Error")
+#: Largest reprojection error of a calibration, as a share of the image's width.
+_LARGEST_ERROR = 0.01
 _KNOWN = (
     *_MATRICES, *_DISTORTIONS, *_SIZES, *_WIDTHS, *_HEIGHTS, "T_rs", "R", "T", "camera_name", "distortion_model",
     "fisheye_model", "xi",
@@ -56,6 +62,8 @@ def read(text: str, hints: Hints) -> Content:
     root = file_storage.parse(text)
     if not isinstance(root, dict):
         raise FormatError("an empty FileStorage")
+    if hints.pair and "M1" in root:
+        root = {**root, **file_storage.parse(hints.pair)}
     if "M1" in root and "M2" in root:
         return _stereo(root, hints)
     name = str(root.get("camera_name") or hints.name)
@@ -66,9 +74,29 @@ def read(text: str, hints: Hints) -> Content:
         if isinstance(table, dict) and _find(table, _MATRICES) is not None
     }
     if not cameras:
-        raise FormatError(f"no camera: none of the keys {', '.join(_MATRICES)}")
+        alone = "; R and T say where two cameras stand: give the file with M1 and M2 as well" if _is_pair(root) else ""
+        raise FormatError(f"no camera: none of the keys {', '.join(_MATRICES)}{alone}")
     lost = (part for key in cameras for part in extra(key, tables[key], _KNOWN))
     return Content(cameras, tuple(lost))
+
+
+def is_pair(text: str) -> bool:
+    """True for a file of stereo_calib.cpp that says where two cameras stand, and not what they are (extrinsics.yml)."""
+    try:
+        root = file_storage.parse(text)
+    except (
+        ArithmeticError,
+        AttributeError,
+        LookupError,
+        TypeError,
+        ValueError,
+    ):  # of a damaged file, or another format
+        return False
+    return isinstance(root, dict) and _is_pair(root)
+
+
+def _is_pair(root: Mapping[str, Any]) -> bool:
+    return {"R", "T"} <= {*root} and _find(root, _MATRICES) is None
 
 
 def write(cameras: Mapping[str, Camera], dialect: int = cv2.FILE_STORAGE_FORMAT_YAML) -> Written:
@@ -108,6 +136,12 @@ def _camera(name: str, table: Mapping[str, Any], hints: Hints) -> Camera:
         if hints.size is None:
             raise FormatError(f"{name}: the size of the image is missing; give it as --size WIDTHxHEIGHT")
         size = list(hints.size)
+    error = _find(table, _ERRORS)
+    if error is not None and float(error) > _LARGEST_ERROR * float(size[0]):
+        raise FormatError(
+            f"{name}: corners missed by {float(error):.3g} px when it was calibrated, which is no calibration of this "
+            "camera: calibrate anew"
+        )
     T_rs = rigid(table["T_rs"]) if table.get("T_rs") is not None else pose.identity()
     try:
         return camera(size, focal(_find(table, _MATRICES)), _lens(table, hints), T_rs)
@@ -117,6 +151,8 @@ def _camera(name: str, table: Mapping[str, Any], hints: Hints) -> Camera:
 
 def _lens(table: Mapping[str, Any], hints: Hints) -> LensModel:
     coefficients = _find(table, _DISTORTIONS)
+    if coefficients is None and (other := _maybe_a_lens(table)):
+        raise FormatError(f"{other}: is this the lens? Call it {_DISTORTIONS[0]}")
     numbers = np.zeros(0) if coefficients is None else np.ravel(np.asarray(coefficients, float))
     if np.any(table.get("xi")):
         raise FormatError("xi: the omnidirectional model cannot be expressed by our lenses")
@@ -129,6 +165,12 @@ def _lens(table: Mapping[str, Any], hints: Hints) -> LensModel:
             f"{BROWN_CONRADY} or --lens {FISHEYE}"
         )
     return fisheye(numbers) if FISHEYE in (said, hints.lens) else brown_conrady(numbers)
+
+
+def _maybe_a_lens(table: Mapping[str, Any]) -> str:
+    """An unknown key that may hold coefficients of a lens; "" if there is none."""
+    keys = (key for key, value in table.items() if isinstance(value, np.ndarray | list) and key not in _KNOWN)
+    return next((key for key in keys if any(part in key.lower() for part in _OF_A_LENS)), "")
 
 
 def _is_fisheye(table: Mapping[str, Any]) -> bool:

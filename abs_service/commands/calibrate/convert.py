@@ -2,6 +2,7 @@
 
   abs-service calibrate convert camchain.yaml lab.calibration.toml        from Kalibr
   abs-service calibrate convert calib.json lab.calibration.toml --rename cam_a=color --rename cam_b=left
+  abs-service calibrate convert intrinsics.yml extrinsics.yml lab.calibration.toml --size 640x480 --unit mm   OpenCV's
   abs-service calibrate convert left.cameramodel right.cameramodel lab.calibration.toml
   abs-service calibrate convert lab.calibration.toml color.yaml --to ros --sensor color
   abs-service calibrate convert rig.toml rig.urdf                         the frames, for robots
@@ -81,7 +82,7 @@ def run(arguments: argparse.Namespace) -> int:
     names = camera_files.pairs("--rename OLD=NEW", arguments.rename)
     sensors = tuple(arguments.sensor)
     options = Options(arguments.source, arguments.target, sensors, names, arguments.unit, hints)
-    read = [camera_files.read(path, options.hints, options.source, options.unit) for path in arguments.inputs]
+    read = camera_files.read_all(arguments.inputs, options.hints, options.source, options.unit)
     content = _chosen(read, options)
     target = options.target or exchange.of_name(out)
     lost = [*content.lost, *_write(out, target, content.cameras, arguments)]
@@ -92,7 +93,8 @@ def run(arguments: argparse.Namespace) -> int:
         print(f"abs-service: lost: {one}", file=sys.stderr)
     print(f"wrote {out}: {', '.join(content.cameras)}")
     for pair, how in plausibility.baselines(content.cameras).items():
-        print(f"  {pair}: {how}")
+        first, second = pair.split(", ")
+        print(f"  {pair}: {how}, {second} {how.side} {first}")
     return Exit.OK
 
 

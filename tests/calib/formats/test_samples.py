@@ -1,6 +1,7 @@
 """Formats of other programs: samples checked by hand, and refusal of what cannot be expressed."""
 
 import json
+from typing import Any
 
 import cv2
 import numpy as np
@@ -189,6 +190,38 @@ def test_opencv_finds_a_stereo_pair() -> None:
     assert (found["left"].lens.coefficients[4], found["right"].lens.coefficients[4]) == (1, 2)
     with pytest.raises(FormatError, match="--size"):
         opencv.read(text, HINTS)
+
+
+def _one_camera(**values: Any) -> str:
+    storage = cv2.FileStorage("", cv2.FILE_STORAGE_WRITE | cv2.FILE_STORAGE_MEMORY | cv2.FILE_STORAGE_FORMAT_YAML)
+    storage.write("camera_matrix", np.array([[500.0, 0, 320], [0, 501, 240], [0, 0, 1]]))
+    for key, value in values.items():
+        storage.write(key, value)
+    return storage.releaseAndGetString()
+
+
+def test_a_lens_under_another_name_is_no_lens_without_distortion() -> None:
+    hints, lens = Hints(size=(640, 480)), np.array([[0.1, 0.2, 0, 0, 0.3]])
+    found = opencv.read(_one_camera(dist_coeff=lens), hints)
+    assert found.cameras["camera"].lens.coefficients[4] == 0.3
+    assert not found.lost
+    with pytest.raises(FormatError, match=r"lensDistortion: is this the lens\?"):
+        opencv.read(_one_camera(lensDistortion=lens), hints)
+
+
+def test_a_calibration_that_failed_in_opencv_is_refused() -> None:
+    lens = np.zeros((5, 1))
+    assert opencv.read(_one_camera(distCoeffs=lens, avg_reprojection_error=0.4), Hints(size=(640, 480))).cameras
+    with pytest.raises(FormatError, match="corners missed by 190 px"):
+        opencv.read(_one_camera(distCoeffs=lens, avg_reprojection_error=190.0), Hints(size=(640, 480)))
+
+
+def test_poses_of_kalibr_may_stand_in_one_row() -> None:
+    camera = {"camera_model": "pinhole", "intrinsics": [500, 500, 320, 240], "distortion_model": "radtan"}
+    camera |= {"distortion_coeffs": [0, 0, 0, 0], "resolution": [640, 480]}
+    T = [1.0, 0, 0, -0.32, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]
+    found = kalibr.read(yaml.safe_dump({"cam0": camera, "cam1": camera | {"T_cn_cnm1": T}}), HINTS).cameras
+    np.testing.assert_allclose([one.T_rs[0, 3] for one in found.values()], [0, 0.32])
 
 
 @pytest.mark.parametrize("text", ["", "%YAML:1.0\n---\na: 1\n", "hello", "%YAML:1.0\n---\nM: [\n"])

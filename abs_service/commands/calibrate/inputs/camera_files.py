@@ -9,7 +9,7 @@ from abs_service.calibration.files import exchange
 from abs_service.commands.calibrate.inputs import calibrations
 from calib.camera import Camera
 from calib.files import limited
-from calib.formats import plausibility
+from calib.formats import opencv, plausibility
 from calib.formats.content import Content, Hints
 
 #: Metres per unit, as values of `--unit`.
@@ -18,6 +18,15 @@ UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 
 class CamerasError(Exception):
     """A calibration that cannot be read, or that no camera has."""
+
+
+def read_all(paths: Sequence[Path], hints: Hints, source: str | None, unit: str | None) -> list[Content]:
+    """The cameras of several files; see `read`. OpenCV's extrinsics.yml belongs to the intrinsics.yml beside it."""
+    pairs_of = [path for path in paths if len(paths) > 1 and source in (None, "opencv") and opencv.is_pair(_text(path))]
+    if len(pairs_of) != 1:
+        return [read(path, hints, source, unit) for path in paths]
+    whole = replace(hints, pair=_text(pairs_of[0]))
+    return [read(path, whole, source, unit) for path in paths if path not in pairs_of]
 
 
 def read(path: Path, hints: Hints, source: str | None = None, unit: str | None = None) -> Content:
@@ -32,12 +41,7 @@ def read(path: Path, hints: Hints, source: str | None = None, unit: str | None =
     Raises:
         CamerasError: it cannot be read, or what it says cannot be.
     """
-    try:
-        text = limited.text(path)
-    except OSError as error:
-        raise CamerasError(f"{path}: cannot be read: {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        raise CamerasError(f"{path}: all formats are UTF-8 text, byte {error.start} is not") from error
+    text = _text(path)
     name = source or exchange.of_content(path, text)
     if hints.lens and name != "opencv":
         raise CamerasError(f"--lens {hints.lens}: {path} says itself which lens it has")
@@ -48,6 +52,15 @@ def read(path: Path, hints: Hints, source: str | None = None, unit: str | None =
     scaled = {key: _scaled(one, UNITS[unit or "m"]) for key, one in content.cameras.items()}
     _check(path, scaled, unit)
     return replace(content, cameras=scaled)
+
+
+def _text(path: Path) -> str:
+    try:
+        return limited.text(path)
+    except OSError as error:
+        raise CamerasError(f"{path}: cannot be read: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise CamerasError(f"{path}: all formats are UTF-8 text, byte {error.start} is not") from error
 
 
 def size(given: str | None) -> tuple[int, int] | None:

@@ -53,9 +53,8 @@ def convert(capsys):
 def test_there_and_back_again(convert, lab: Path, name: str, options: tuple[str, ...]) -> None:
     between, back = lab.parent / name, lab.parent / "back.toml"
     code, out, err = convert(lab, between, *options)
-    assert (code, out) == (
-        Exit.OK, f"wrote {between}: tof, color\n  tof, color: 50.0 mm apart, turned by 20.67°\n"
-    )  # fmt: skip
+    apart = "tof, color: 50.0 mm apart, turned by 20.67°, color to the right of tof"
+    assert (code, out) == (Exit.OK, f"wrote {between}: tof, color\n  {apart}\n")
     assert "lost: tof: depth terms" in err
     assert "lost: tof: noise model" in err
     renamed = ("--rename", "cam_a=tof", "--rename", "cam_b=color") if name == "c.json" else ()
@@ -67,6 +66,28 @@ def test_there_and_back_again(convert, lab: Path, name: str, options: tuple[str,
         assert found.sensors[sensor].camera.fx == pytest.approx(camera.fx, rel=1e-12)
         np.testing.assert_allclose(found.sensors[sensor].camera.T_rs, camera.T_rs, atol=1e-9)
         np.testing.assert_allclose(found.sensors[sensor].camera.lens.coefficients, camera.lens.coefficients)
+
+
+def test_the_two_files_of_a_pair_of_opencv_are_put_together(convert, tmp_path: Path) -> None:
+    turn = cv2.Rodrigues(np.array([0, 0.1, 0]))[0]
+    cameras = {}
+    for side in "12":
+        cameras |= {f"M{side}": np.array([[500.0, 0, 320], [0, 500, 240], [0, 0, 1]]), f"D{side}": np.zeros((1, 5))}
+    for name, values in (
+        ("intrinsics.yml", cameras),
+        ("extrinsics.yml", {"R": turn, "T": np.array([[-60.0], [1], [2]]), "Q": np.eye(4)}),
+    ):
+        storage = cv2.FileStorage(str(tmp_path / name), cv2.FILE_STORAGE_WRITE)
+        for key, value in values.items():
+            storage.write(key, value)
+        storage.release()
+    inputs, options = (tmp_path / "intrinsics.yml", tmp_path / "extrinsics.yml"), ("--size", "640x480", "--unit", "mm")
+    code, said, _ = convert(*inputs, tmp_path / "pair.toml", *options)
+    assert code == Exit.OK
+    assert "left, right: 60.0 mm apart" in said
+    code, _, said = convert(inputs[1], tmp_path / "alone.toml", *options)
+    assert code == Exit.USER
+    assert "give the file with M1 and M2 as well" in said
 
 
 def test_files_of_one_camera_are_put_together(convert, lab: Path) -> None:
