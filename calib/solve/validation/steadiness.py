@@ -72,7 +72,7 @@ def changes_of_optics(free: FreeShape, needed_px: float) -> list[Change]:
     for name, directions in optics(free):
         if split := _split(free, directions):
             shot, values = split
-            shift = _rms(values[0] * _from_middle(free.solution, name) + values[1:])
+            shift = rms(values[0] * from_middle(free.solution, name) + values[1:])
             found.append(Change(name, shot, values, shift))
     return [one for one in found if one.shift_px > HARMLESS * needed_px]
 
@@ -85,7 +85,7 @@ def changes_of_place(free: FreeShape, needed_px: float) -> list[Change]:
             directions = np.eye(free.size)[:, layout.columns(name, POSE)]
             if split := _split(free, directions):
                 shot, values = split
-                found.append(Change(name, shot, values, _rms(_moved(free.solution, name, values))))
+                found.append(Change(name, shot, values, rms(_moved(free.solution, name, values))))
     return [one for one in found if one.shift_px > HARMLESS * needed_px]
 
 
@@ -184,7 +184,7 @@ def _best(own: Array, whole: Array, pulls: Array) -> _Split:
     return _Split(float(squares[best]), best + MIN_POSES, sizes[best], np.sqrt(np.maximum(variances, 0)))
 
 
-def _from_middle(solution: Solution, name: str) -> Array:
+def from_middle(solution: Solution, name: str) -> Array:
     """Places of all corners of a sensor relative to its principal point (n, 2) [px]."""
     pixels = np.concatenate([view.pixels for view in solution.task.corners if view.sensor == name])
     return pixels - (solution.cameras[name].cx, solution.cameras[name].cy)
@@ -192,7 +192,7 @@ def _from_middle(solution: Solution, name: str) -> Array:
 
 def from_middle_px(solution: Solution, name: str) -> float:
     """Root mean square distance of a sensor's corners from its principal point [px]."""
-    return _rms(_from_middle(solution, name))
+    return rms(from_middle(solution, name))
 
 
 def _moved(solution: Solution, name: str, values: Array) -> Array:
@@ -206,6 +206,7 @@ def _moved(solution: Solution, name: str, values: Array) -> Array:
     return after.project(points) - camera.project(points)
 
 
-def _rms(displacements: Array) -> float:
+def rms(displacements: Array) -> float:
+    """Root mean square length of displacements (n, 2), without those that are not finite."""
     squares = np.sum(displacements**2, axis=1)
     return float(np.sqrt(np.mean(squares[np.isfinite(squares)])))

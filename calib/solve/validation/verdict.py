@@ -8,7 +8,7 @@ import numpy as np
 from calib.formats.plausibility import exchanged
 from calib.solve.calibrate import calibrate
 from calib.solve.solution import Solution
-from calib.solve.validation import projection_uncertainty
+from calib.solve.validation import changes, projection_uncertainty
 from calib.solve.validation.board_shape import ShapeError, shape_errors
 from calib.solve.validation.contradictions import SCATTERS_PX, Contradiction, Scatter, contradictions, outliers, scatter
 from calib.solve.validation.cross_validation import Agreement, TooFewToSplitError, cross_validate
@@ -17,7 +17,7 @@ from calib.solve.validation.free_shape import free_shape
 from calib.solve.validation.groups import groups
 from calib.solve.validation.other_lens import other_lenses
 from calib.solve.validation.projection_uncertainty import UncertaintyMap
-from calib.solve.validation.steadiness import Change, changes_of_optics, changes_of_place, focal_scatter
+from calib.solve.validation.steadiness import changes_of_optics, changes_of_place, focal_scatter
 from calib.solve.validation.weak_directions import weak_directions
 
 #: Largest ratio of observed to predicted difference of the halves; exceeded by chance in about 1 % of the cases.
@@ -115,7 +115,9 @@ def _unlike(
     free = free_shape(solution)
     moved = changes_of_place(free, needed_px)
     # What happened to a sensor looks as if its image changed, and a wrong board as if every shot had another lens.
-    refocused = [] if moved else changes_of_optics(free, needed_px)
+    changed = [] if moved else changes_of_optics(free, needed_px)
+    confirmed = {id(one): changes.is_confirmed(solution, one) for one in changed}
+    refocused = [one for one in changed if confirmed[id(one)]]
     contradicting = [] if moved else contradictions(solution, free.misses)
     scattered = [] if moved else _scattered(solution, contradicting, SCATTERS_PX)
     if scattered:
@@ -125,37 +127,12 @@ def _unlike(
     mixed = [] if lasting or contradicting or shape else groups(free, needed_px)
     focus = {} if lasting or contradicting or mixed else focal_scatter(free, needed_px)
     cause = [] if lasting or solution.task.planes else _scattered(solution, contradicting, 0.0)  # or wrong distances
-    reasons = [*map(_of_place, moved), *(_of_optics(one, len(solution.task.sensors)) for one in refocused)]
-    reasons += [*misprinted, *map(str, mixed), *(_of_focus(*each) for each in focus.items())]
+    reasons = [changes.of_place(one) for one in moved]
+    reasons += [changes.of_optics(one, len(solution.task.sensors)) for one in refocused]
+    reasons += [*misprinted, *map(str, mixed), *(changes.of_focus(*each) for each in focus.items())]
     reasons += [*map(str, scattered), *_contradicting(contradicting)]
+    reasons += [changes.unexplained(one) for one in changed if not confirmed[id(one)]]
     return reasons, contradicting, [*map(str, cause)]
-
-
-def _of_place(one: Change) -> str:
-    turn, move = np.linalg.norm(one.values[:3]), np.linalg.norm(one.values[3:])
-    return (
-        f"{one.sensor}: stands elsewhere from about shot {one.shot} on, by about {move * 1e3:.2g} mm and "
-        f"{np.degrees(turn):.2g}°, which shifts its corners by {one.shift_px:.2g} px: it or the reference was moved; "
-        "fasten the sensors, and leave out the shots before or after with --skip"
-    )
-
-
-def _of_optics(one: Change, sensors: int) -> str:
-    focal, across, down = one.values.tolist()
-    cause = "it was refocused, zoomed or moved: fasten the sensors," if sensors > 1 else "it was refocused or zoomed:"
-    return (
-        f"{one.sensor}: projects otherwise from about shot {one.shot} on: focal length by {focal:+.1%}, principal "
-        f"point by ({across:+.1f}, {down:+.1f}) px, which shifts its corners by {one.shift_px:.2g} px: {cause} "
-        "switch autofocus, zoom and image stabilisation off, and leave out the shots before or after with --skip; if "
-        "nothing changed but where the boards were, the kind of lens fits nearly only, or the board is bent"
-    )
-
-
-def _of_focus(sensor: str, deviation: float) -> str:
-    return (
-        f"{sensor}: its focal length differs by ± {deviation:.1%} from shot to shot: switch autofocus, zoom and image "
-        "stabilisation off; if they are, make sure of a flat board and even, sharp images, and try another kind of lens"
-    )
 
 
 def _excess(of: str, agreements: Sequence[Agreement]) -> float:
