@@ -63,7 +63,9 @@ def by_number(folder: Path, pattern: str, rate_hz: float, *, alone: bool = False
         raise ImageFolderError(f"{folder}: no file matches {pattern!r}{_instead(folder)}")
     for path in paths:
         if last_number(path.stem) is None:
-            raise ImageFolderError(f"{path}: there is no number in its name to tell which exposure it is")
+            raise ImageFolderError(
+                f"{path}: there is no number in its name to tell which exposure it is{_instead(folder)}"
+            )
     numbered = {number: path for path in paths if (number := last_number(path.stem)) is not None}
     if len(numbered) < len(paths):
         numbered = dict(enumerate(_by_all_numbers(paths, alone)))

@@ -118,7 +118,8 @@ def with_boards(independent: NDArray[np.float64], sensors: NDArray[np.float64]) 
     """Covariance of all parameters (n, n): `independent`, with that of the first k replaced by `sensors` (k, k)."""
     count = len(sensors)
     own = independent[:count, :count]
-    carried = linalg.solve(own, independent[:count], assume_a="pos").T
+    size = np.sqrt(np.diag(own))  # of pixels and of coefficients beside k6: without it, the solve loses all digits
+    carried = linalg.solve(own / np.outer(size, size), independent[:count] / size[:, None], assume_a="pos").T / size
     return independent + carried @ (sensors - own) @ carried.T
 
 

@@ -105,7 +105,9 @@ def focal_scatter(free: FreeShape, needed_px: float) -> dict[str, float]:
 
 def of_focal(information: Array, prior: Array, scores: Array, focal: Array) -> tuple[float, float]:
     """Disagreement of poses about the focal length, a direction (k,), to that about all else, and its deviation [1]."""
-    taken = linalg.inv(information.sum(axis=0) + prior)
+    whole = information.sum(axis=0) + prior
+    size = np.sqrt(np.diag(whole))
+    taken = linalg.inv(whole / np.outer(size, size)) / np.outer(size, size)
     own = information - information @ taken @ information
     weights = np.maximum(focal @ own @ focal, 1e-12)
     ratio = float(np.mean((scores @ focal) ** 2 / weights)) / disagreement(own, scores)
