@@ -11,6 +11,7 @@ from calib.camera import Camera
 from calib.pose import Pose
 from calib.solve.bundle.adjustment import NotSolvedError, search
 from calib.solve.bundle.formulation import formulate
+from calib.solve.bundle.parameters.lens_parameters import FISHEYE
 from calib.solve.bundle.parameters.state import SensorState, State
 from calib.solve.bundle.tasks import SensorTask, Task
 from calib.solve.start import extrinsics_graph, half_turns, registration
@@ -170,5 +171,7 @@ def left_out(task: Task, usable: Task) -> list[str]:
             all_shots, shots = ({view.shot for view in each if view.sensor == name} for each in (views, kept))
             if lost := sorted(all_shots - shots):
                 numbers = ", ".join(map(str, lost))
-                found.append(f"{name}: {len(lost)} of {len(all_shots)} {why}; left out: {numbers}")
+                wide = views is task.corners and task.sensors[name].lens is FISHEYE
+                reach = ", or beyond 90° from its axis, where a fisheye ends here" if wide else ""
+                found.append(f"{name}: {len(lost)} of {len(all_shots)} {why}{reach}; left out: {numbers}")
     return found

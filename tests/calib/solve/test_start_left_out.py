@@ -23,3 +23,13 @@ def test_views_without_a_pose_of_the_board_are_counted(monkeypatch) -> None:
         "tof: 2 of 8 images show a board where its camera could not have seen one; left out: 2, 5",
         "tof: 2 of 8 shots have distances, but no sensor's corners tell where the board is; left out: 2, 5",
     ]
+
+
+def test_what_a_wide_fisheye_sees_beyond_its_model_is_said() -> None:
+    heads, random = {"tof": three_heads()["tof"]}, np.random.default_rng(1)
+    seen = look(heads, random_boards(3, random), random)
+    whole = Task({"tof": SensorTask(320, 240, KINDS["fisheye"])}, seen.corners, (), "tof")
+    assert module.left_out(whole, whole.of_shots([0, 1])) == [
+        "tof: 1 of 3 images show a board where its camera could not have seen one, or beyond 90° from its axis, where "
+        "a fisheye ends here; left out: 2"
+    ]
