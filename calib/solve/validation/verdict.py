@@ -15,7 +15,7 @@ from calib.solve.validation.cross_validation import Agreement, TooFewToSplitErro
 from calib.solve.validation.distance_errors import distance_errors
 from calib.solve.validation.free_shape import free_shape
 from calib.solve.validation.groups import groups
-from calib.solve.validation.other_lens import other_lenses
+from calib.solve.validation.other_lens import other_lenses, undescribed
 from calib.solve.validation.projection_uncertainty import UncertaintyMap
 from calib.solve.validation.steadiness import changes_of_optics, changes_of_place, focal_scatter
 from calib.solve.validation.weak_directions import weak_directions
@@ -89,6 +89,7 @@ def assess(
     reasons += exchanged(solution.cameras)
     reasons += weak_directions(solution, distance)
     reasons += outliers(solution, {one.shot for one in contradicting})
+    reasons += undescribed(solution, needed_px)
     try:
         agreements = cross_validate(solution, distance, note, half)
         reasons += _disagreeing(agreements, needed_px)

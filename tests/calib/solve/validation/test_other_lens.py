@@ -1,5 +1,7 @@
 """A lens of another kind that fits far better is said first: its shots seemed to have focal lengths of their own."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from calib.board.views import CornerView
@@ -8,7 +10,7 @@ from calib.lenses.lens import Lens
 from calib.solve.bundle.parameters.lens_parameters import BROWN_CONRADY, RATIONAL, LensKind
 from calib.solve.bundle.tasks import SensorTask, Task
 from calib.solve.calibrate import calibrate
-from calib.solve.validation.other_lens import other_lenses
+from calib.solve.validation.other_lens import other_lenses, undescribed
 from calib.solve.validation.verdict import assess
 from tests.calib.solve import board_views
 
@@ -34,3 +36,23 @@ def test_a_lens_that_fits_far_better_is_said_first() -> None:
 
 def test_a_lens_that_fits_is_not_named() -> None:
     assert other_lenses(calibrate(task(RATIONAL))) == []
+
+
+def behind_a_wavy_window(shift_px: float) -> Task:
+    """As through plastic foil: corners are displaced by where they are in the image."""
+    head = board_views.Head(board_views.three_heads()["color"].camera, 0.1)
+    boards = board_views.random_boards(24, np.random.default_rng(3), 0.5, 0.8)
+    seen = board_views.look({"color": head}, boards, np.random.default_rng(4))
+    wavy = [
+        replace(view, pixels=np.clip(view.pixels + shift_px * np.sin(view.pixels / (30, 25)), 0, (1279, 719)))
+        for view in seen.corners
+    ]
+    return Task({"color": SensorTask(1280, 720)}, wavy, (), "color")
+
+
+def test_what_no_kind_of_lens_describes_is_not_trusted() -> None:
+    solution = calibrate(behind_a_wavy_window(0.7))
+    (said,) = undescribed(solution, 1.0)
+    assert said.startswith("color: corners miss by 0.56 px in the same places of the image in all shots")
+    assert assess(solution, 1.0, 1.0).reasons == [said]  # nothing else shows it
+    assert undescribed(calibrate(behind_a_wavy_window(0.0)), 0.1) == []
