@@ -9,7 +9,7 @@ from abs_service.calibration.shots.shots import Shot
 from calib.board.april_grid import AprilGrid
 from calib.board.corners import description, errors
 from calib.board.corners.search import chessboard_size, find
-from calib.board.corners.to_8bit import grey
+from calib.board.corners.to_8bit import Grey, grey
 from calib.board.target import AsymmetricCircles, Charuco, Chessboard, Circles, Target
 
 _WORDS = {
@@ -48,6 +48,25 @@ def instead(target: Target, shown: Sequence[Shot]) -> str:
     return f"{said}: correct the description of the board, or the images" if said else ""
 
 
+def more_than_described(target: Target, shown: Sequence[Shot]) -> str:
+    """Sentence on a chessboard that has more corners than its description; "" if two images do not agree on it.
+
+    Some of its corners are then taken for the described board, other ones by another sensor or in another image.
+    """
+    if not isinstance(target, Chessboard):
+        return ""
+    sizes = Counter(chessboard_size(levels) for _, levels in _images(shown))
+    longer, shorter = sorted(target.grid, reverse=True)
+    for (columns, rows), count in sizes.most_common():
+        if count > 1 and columns >= longer and rows >= shorter and (columns, rows) != (longer, shorter):
+            return (
+                f"{count} images show a board of {columns} × {rows} inner corners, more than the {target.columns} × "
+                f"{target.rows} of the description, so that other corners may be taken in each image: correct the "
+                "description of the board, or the images"
+            )
+    return ""
+
+
 def mostly_moved(seen: BoardObservations) -> bool:
     """True if most rejected images seem to show a board that moves."""
     moved = sum(isinstance(error, errors.MovedError) for error in seen.rejected.values())
@@ -82,10 +101,19 @@ def _name(target: Target) -> str:
     return kind.format(target.columns, target.rows)
 
 
+def _images(shown: Sequence[Shot]) -> list[tuple[str, Grey]]:
+    """Names and levels of the images of some shots."""
+    return [
+        (f"Image {shot.number}", grey(each.image))
+        for shot in shown
+        for each in shot.sensor_shots.values()
+        if each.image.size
+    ]
+
+
 def _instead(target: Target, shown: Sequence[Shot]) -> str:
     """Clause on what shots show in place of the described board; "" if that is not clear."""
-    images = [(f"Image {shot.number}", grey(each.image)) for shot in shown for each in shot.sensor_shots.values()
-              if each.image.size]  # fmt: skip
+    images = _images(shown)
     for image, levels in images:
         if said := description.mismatch(target, levels):
             return f"{image} {said}"

@@ -79,10 +79,13 @@ def material(arguments: argparse.Namespace) -> Material:
                 break
     if shown and not seen.corners:
         raise UnusableImagesError(unseen.reason(target, seen, shown))
+    is_seen = len(seen.corners) >= len(seen.rejected)
+    if is_seen and (more := unseen.more_than_described(target, shown)):
+        raise UnusableImagesError(more)
     corner_file.write(seen, corner_file.path_beside(arguments.out))
     if arguments.corners is not None:
         mrcal_corners.write(seen, target, arguments.corners)
-    other = unseen.instead(target, shown) if len(seen.rejected) > len(seen.corners) else ""
+    other = "" if is_seen else unseen.instead(target, shown)
     return _checked(seen, known, data, other)
 
 

@@ -10,6 +10,8 @@ import pytest
 
 from abs_service import cli
 from abs_service.calibration.files import target_file
+from abs_service.calibration.shots import unseen
+from abs_service.calibration.shots.shots import SensorShot, Shot
 from calib.board.target import Charuco, Chessboard, Target
 from tests.abs_service.calibration.simulated import scene
 from tests.calib.board.boards import VGA, as_bytes, centered, photograph
@@ -48,6 +50,23 @@ def test_a_board_of_which_only_a_part_is_found_is_not_suggested(said, tmp_path: 
     error = said(Chessboard(9, 6, 0.025), "--images", f"color={tmp_path}/c_*.png")
     assert ("2 images show a board of 9 × 5 inner corners" in error) == told
     assert told or "inner corners: correct" not in error
+
+
+def test_a_board_with_more_corners_than_described_is_refused(said, data_set: Callable[[str], Path]) -> None:
+    folder = data_set("calib_opencv_stereo")
+    images = [word for side in ("left", "right") for word in ("--images", f"{side}={folder}/{side}*.jpg")]
+    error = said(Chessboard(8, 6, 0.025), *images)
+    assert "images show a board of 9 × 6 inner corners, more than the 8 × 6 of the description" in error
+
+
+def test_only_images_that_agree_tell_that_a_board_has_more_corners() -> None:
+    boards = [Chessboard(9, 6, 0.025), Chessboard(9, 6, 0.025), Chessboard(8, 6, 0.025)]
+    images = [as_bytes(photograph(board, VGA, centered(board, (0.2, 0.1, 0.3), 0.4))) for board in boards]
+    shots = [Shot(number, {"color": SensorShot(0, image, image)}) for number, image in enumerate(images)]
+    assert "9 × 6 inner corners, more than the 6 × 8" in unseen.more_than_described(Chessboard(6, 8, 0.025), shots)
+    assert not unseen.more_than_described(Chessboard(6, 8, 0.025), shots[1:])
+    assert not unseen.more_than_described(Chessboard(6, 9, 0.025), shots)
+    assert not unseen.more_than_described(Chessboard(10, 7, 0.025), shots)
 
 
 PRINT = Charuco(7, 5, 0.03, 0.022, "5x5_50")
