@@ -117,8 +117,8 @@ def _unlike(
     moved = changes_of_place(free, needed_px)
     # What happened to a sensor looks as if its image changed, and a wrong board as if every shot had another lens.
     changed = [] if moved else changes_of_optics(free, needed_px)
-    confirmed = {id(one): changes.is_confirmed(solution, one) for one in changed}
-    refocused = [one for one in changed if confirmed[id(one)]]
+    confirmed = [changes.is_confirmed(solution, one) for one in changed]
+    refocused = [one for one, is_so in zip(changed, confirmed) if is_so]
     contradicting = [] if moved else contradictions(solution, free.misses)
     scattered = [] if moved else _scattered(solution, contradicting, SCATTERS_PX)
     if scattered:
@@ -132,7 +132,7 @@ def _unlike(
     reasons += [changes.of_optics(one, len(solution.task.sensors)) for one in refocused]
     reasons += [*misprinted, *map(str, mixed), *(changes.of_focus(*each) for each in focus.items())]
     reasons += [*map(str, scattered), *_contradicting(contradicting)]
-    reasons += [changes.unexplained(one) for one in changed if not confirmed[id(one)]]
+    reasons += [changes.unexplained(one) for one, is_so in zip(changed, confirmed) if not is_so]
     return reasons, contradicting, [*map(str, cause)]
 
 
