@@ -15,6 +15,11 @@ MIN_EXPLAINED = 0.7
 #: It is longer than so many pixels: mixed pixels along an outline let all edges of a side err alike.
 MIN_PX = 2.0
 
+#: Share of its length by which a motion displaces edges across the outline, root mean square, if they can show it: an
+#: outline is known to half a pixel, which would be a motion of `MIN_PX`. A slide along a straight side, and a turn of
+#: an arc about its centre, show nothing of themselves; a turn of a hexagon shows 0.3.
+MIN_SHOWN = 0.25
+
 
 def displacement(away: NDArray[np.float64], directions: NDArray[np.float64]) -> float:
     """Distance of edges from the outline: the mean of all, or what shows that the mesh has slid if that is larger.
@@ -38,6 +43,7 @@ def motion(away: NDArray[np.float64], directions: NDArray[np.float64], places: N
 
     A turn leaves half of every side inside the object and half beside it, which neither mean nor sides tell. It counts
     if it explains most of the squared distances: what lies against one side, or a bend, does not look like a motion.
+    Of all motions, only those are looked for that the edges in sight can show, see `MIN_SHOWN`.
 
     Args:
         away: signed distances (k,) of the edges from the outline [px].
@@ -49,10 +55,15 @@ def motion(away: NDArray[np.float64], directions: NDArray[np.float64], places: N
     """
     if len(away) < MIN_OF_A_SIDE or not away.any():
         return 0.0
-    (along, across, turn), left = _explained(away, directions, places)
-    x, y = (places - places.mean(axis=0)).T
+    arms = places - places.mean(axis=0)
+    reach = max(float(np.sqrt(np.mean(arms**2) * 2)), np.finfo(float).tiny)
+    rows = _shown_by(directions, arms / reach)
+    shown_as, sizes, motions = np.linalg.svd(rows, full_matrices=False)
+    parts = (away @ shown_as)[sizes >= MIN_SHOWN * np.sqrt(len(away))]
+    along, across, turn = (parts / sizes[: len(parts)]) @ motions[: len(parts)]
+    x, y = arms.T / reach
     length = median(np.hypot(along - turn * y, across + turn * x))
-    explained = left @ left < (1 - MIN_EXPLAINED) * (away @ away)
+    explained = parts @ parts > MIN_EXPLAINED * (away @ away)
     return length if explained and length > MIN_PX else 0.0
 
 
@@ -64,18 +75,14 @@ def without_motion(
     Args:
         away, directions, places: as in `motion`; at least `MIN_OF_A_SIDE`.
     """
-    return _explained(away, directions, places)[1]
+    rows = _shown_by(directions, places - places.mean(axis=0))
+    return away - rows @ np.linalg.lstsq(rows, away)[0]
 
 
-def _explained(
-    away: NDArray[np.float64], directions: NDArray[np.float64], places: NDArray[np.float64]
-) -> tuple[NDArray[np.floating], NDArray[np.float64]]:
-    """Slide [px] along the columns and rows and turn [rad] that explain most, and what is left (k,) [px]."""
-    x, y = (places - places.mean(axis=0)).T
+def _shown_by(directions: NDArray[np.float64], arms: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Displacement of edges across the outline (k, 3), by a slide along the columns, one along the rows, and a turn."""
     right, down = (directions / np.linalg.norm(directions, axis=1, keepdims=True)).T
-    rows = np.stack([right, down, down * x - right * y], axis=1)
-    found, *_ = np.linalg.lstsq(rows, away)
-    return found, away - rows @ found
+    return np.stack([right, down, down * arms[:, 0] - right * arms[:, 1]], axis=1)
 
 
 def _typical(away: NDArray[np.float64]) -> float:

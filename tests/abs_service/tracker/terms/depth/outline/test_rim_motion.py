@@ -36,3 +36,15 @@ def test_noise_and_what_lies_against_a_side_and_a_few_edges_are_no_motion():
     assert motion(off((3.0, 0.0))[:7], OUT[:7], PLACES[:7]) == 0
     assert motion(np.zeros(60), OUT, PLACES) == 0
     assert motion(off((1.9, 0.0)), OUT, PLACES) == 0  # as mixed pixels may show
+
+
+def test_edges_show_no_motion_along_the_outline():
+    """Nine edges on a sixth of a circle, and on a straight side: half a pixel off, as by mixed pixels, is no motion."""
+    angle = np.linspace(-0.5, 0.5, 9)
+    arc = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    off_by = 0.5 * np.sign(np.arange(9) - 3.5)
+    for seed in range(20):
+        out = arc + 0.05 * np.random.default_rng(seed).standard_normal((9, 2))  # directions of a mesh's edges are rough
+        assert motion(off_by, out, 100 + 20 * arc) == 0
+        assert motion(off_by, out - arc + OUT[:9], PLACES[:9]) == 0
+        assert motion(3 * arc[:, 0], out, 100 + 20 * arc) == pytest.approx(3, rel=0.1)  # a slide across it is one
