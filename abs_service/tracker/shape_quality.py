@@ -24,12 +24,15 @@ class ShapeQuality:
         folded_share: share of the pairs of neighbouring faces that are folded onto each other, 0…1.
         deviation_m: standard deviation of the position of a vertex, median [m].
         single_frame_deviation_m: the same by the measurements of this frame alone, without the past [m].
+        has_back: True for a template, which may have sides that the first image does not show; a mesh made from that
+            image is what faced the sensor in it.
     """
 
     stretch: float = 0.0
     folded_share: float = 0.0
     deviation_m: float = float("nan")
     single_frame_deviation_m: float = float("nan")
+    has_back: bool = False
 
 
 class ShapeComparison:
@@ -40,7 +43,7 @@ class ShapeComparison:
     """
 
     def __init__(self, mesh: Mesh):
-        self._edges = mesh.edges
+        self._edges, self._has_back = mesh.edges, mesh.is_complete
         self._lengths = edge_lengths(mesh.vertices, self._edges)
         pairs = _neighbors(mesh.faces)
         normals = _normals(mesh.vertices, mesh.faces)
@@ -65,6 +68,7 @@ class ShapeComparison:
             folded_share=folded / len(self._pairs) if len(self._pairs) else 0.0,
             deviation_m=float(np.sqrt(percentile(variance, 0.5))),
             single_frame_deviation_m=single_frame_deviation_m,
+            has_back=self._has_back,
         )
 
 

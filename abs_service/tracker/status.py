@@ -10,13 +10,21 @@ from typing import Annotated
 import numpy as np
 from annotated_types import Gt, Interval
 
+from abs_service.tracker.agreement import (
+    MIN_JUDGED,
+    distances_share,
+    most_agreeing,
+    of_distances,
+    outside_share,
+    rim_distance,
+    rim_share,
+    rims,
+    turned_away_share,
+    unexplained_share,
+)
 from abs_service.tracker.estimate import Status
 from abs_service.tracker.shape_quality import ShapeQuality
-from abs_service.tracker.terms.base import MIN_RIM, RimFit, SensorFit, inlier_share, occluded_share
-from abs_service.tracker.terms.vertex_counts import VertexCounts
-
-#: Minimum number of vertices that agree or disagree with a sensor, or should, for their share to be judged.
-MIN_JUDGED = 20
+from abs_service.tracker.terms.base import SensorFit, inlier_share, occluded_share
 
 
 @dataclass(frozen=True)
@@ -28,7 +36,8 @@ class Settings:
         lost_below: inlier share, of all sensors or of those of distances alone, below which the object is LOST.
         degraded_agreeing: share that agrees with a measurement, of the vertices that should be in sight, below which an
             estimate is DEGRADED, in the sensor in which most do. Vertices without return, behind an occluder or outside
-            the image count against it. As large a share has to be inside the image of a depth sensor.
+            the image count against it. As large a share has to be inside the image of a depth sensor and, without a
+            template, to face it.
         degraded_occluded: occluded share above which an estimate is DEGRADED, in the sensor that sees most.
         degraded_rim: share of the visible free edges that lie off the outline above which an estimate is DEGRADED.
         degraded_rim_m: distance of the visible free edges from the outline, mean of all or of those across a slide,
@@ -72,6 +81,7 @@ def judge(
     lost = min(inlier_share(fits), distances_share(fits)) < limits.lost_below
     reasons = [f"no frame from {name}" for name in missing]
     reasons += _seen(fits, lost, limits) if fits else [_UNMEASURED]
+    reasons += _faced(fits, shape, limits)
     reasons += _placed(fits, shape, innovation, limits)
     reasons += _shaped(shape, limits)
     if lost:
@@ -108,9 +118,18 @@ def _seen(fits: Sequence[SensorFit], lost: bool, limits: Settings) -> Iterator[s
         )
 
 
+def _faced(fits: Sequence[SensorFit], shape: ShapeQuality, limits: Settings) -> Iterator[str]:
+    """Reason by how much of what the first image showed has turned away from the sensors of distances."""
+    if not shape.has_back and (away := turned_away_share(fits)) > 1 - limits.degraded_agreeing:
+        yield (
+            f"{away:.0%} of the vertices, all of which faced the depth sensor at first, are turned away from it, and "
+            "nothing says where they are – turn the object back, or have the mesh made anew by abs-service reinitialize"
+        )
+
+
 def _contradicted(fits: Sequence[SensorFit], advice: str) -> Iterator[str]:
     """Reasons by sensors of distances most of which contradict the others: colours that agree do not outvote them."""
-    for fit in _of_distances(fits):
+    for fit in of_distances(fits):
         judged = fit.counts.agreeing + fit.counts.disagreeing
         if judged >= MIN_JUDGED and fit.counts.agreeing < judged / 2:
             yield f"only {fit.counts.agreeing / judged:.0%} of the distances of {fit.sensor} agree – {advice}"
@@ -186,63 +205,12 @@ def _shaped(shape: ShapeQuality, limits: Settings) -> Iterator[str]:
         )
 
 
-def most_agreeing(fits: Sequence[SensorFit]) -> VertexCounts:
-    """Counts of the sensor in which the largest share of what should be in sight agrees; zeros without any."""
-    counts = (fit.counts for fit in fits if fit.counts.expected)
-    return max(counts, key=lambda one: one.agreeing / one.expected, default=VertexCounts())
-
-
-def outside_share(fits: Sequence[SensorFit]) -> float:
-    """Share outside the depth image of what should be in sight; the smallest of the sensors of distances, 0 without.
-
-    Within a hole of an image the surface around it holds a vertex, and its colour. Beyond the border nothing is around
-    it, and a colour says where it is across the line of sight at best; on a plain surface not even that.
-    """
-    counts = (fit.counts for fit in _of_distances(fits) if fit.counts.expected >= MIN_JUDGED)
-    return min((one.outside / one.expected for one in counts), default=0.0)
-
-
-def distances_share(fits: Sequence[SensorFit]) -> float:
-    """Share of the distances that agree; the largest of the sensors that measure half of what faces them, 1 without."""
-    counts = [fit.counts for fit in _of_distances(fits)]
-    seen = [(one.agreeing, one.agreeing + one.disagreeing, one.facing - one.behind_itself) for one in counts]
-    return max((good / known for good, known, facing in seen if known >= max(MIN_JUDGED, facing / 2)), default=1.0)
-
-
-def _of_distances(fits: Sequence[SensorFit]) -> list[SensorFit]:
-    return [fit for fit in fits if fit.is_surprised or np.isfinite(fit.remainder.at_first)]
-
-
-def unexplained_share(fits: Sequence[SensorFit]) -> float:
-    """Surface beside the mesh that was not there at first, see `Remainder`; the smallest of the sensors, 0 without.
-
-    Where the object comes into sight beyond an edge that something hid at first, the mesh is right as far as it goes.
-    """
-    shares = [fit.remainder.gained for fit in fits if np.isfinite(fit.remainder.share) and not fit.rim.uncovered]
-    return min(shares, default=0.0)
-
-
 def is_misplaced(fits: Sequence[SensorFit], shape: ShapeQuality, limits: Settings) -> bool:
     """True if the free edges lie off the outline: too many of them, or by more than the covariances claim."""
     claimed = np.fmax(limits.degraded_rim_m, shape.deviation_m)
     return rim_share(fits) > limits.degraded_rim or bool(rim_distance(fits) > claimed)
 
 
-def rim_share(fits: Sequence[SensorFit]) -> float:
-    """Share of the visible vertices on free edges that lie off the outline; the smallest of the sensors, 0 without."""
-    shares = [(rim.outside + rim.inside) / rim.visible for rim in _rims(fits)]
-    return min(shares, default=0.0)
-
-
-def rim_distance(fits: Sequence[SensorFit]) -> float:
-    """Distance [m] of the visible free edges from the outline, see `RimFit.off_m`; the smallest of the sensors."""
-    return min((rim.off_m for rim in _rims(fits)), default=0.0)
-
-
 def _hangs_over(fits: Sequence[SensorFit]) -> bool:
     """True if a mesh off its outline hangs over it: one that slides does so on the side that it slides to."""
-    return any(4 * rim.outside >= rim.inside for rim in _rims(fits))
-
-
-def _rims(fits: Sequence[SensorFit]) -> list[RimFit]:
-    return [fit.rim for fit in fits if fit.rim.visible >= MIN_RIM]
+    return any(4 * rim.outside >= rim.inside for rim in rims(fits))

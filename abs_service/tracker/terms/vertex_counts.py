@@ -20,6 +20,7 @@ class VertexCounts:
         behind_occluder: something in front of the object hides them.
         behind_itself: the object itself hides them.
         outside: outside the image.
+        turned_away: do not face the sensor; none of the others.
     """
 
     facing: int = 0
@@ -29,6 +30,7 @@ class VertexCounts:
     behind_occluder: int = 0
     behind_itself: int = 0
     outside: int = 0
+    turned_away: int = 0
 
     @property
     def expected(self) -> int:
@@ -81,14 +83,16 @@ class Sight:
     def count(self, measured: NDArray[np.bool_], agreeing: NDArray[np.bool_]) -> VertexCounts:
         """Numbers of samples, by masks (n,) of those that are measured and those that agree."""
         known, good = self.visible & measured, _count(self.visible & agreeing)
+        facing = _count(self.visible) + self.occluded + _count(self.outside) + _count(self.unjudged)
         return VertexCounts(
-            facing=_count(self.visible) + self.occluded + _count(self.outside) + _count(self.unjudged),
+            facing=facing,
             agreeing=good,
             disagreeing=_count(known) - good,
             missing=_count(self.missing) + _count(self.visible) - _count(known),
             behind_occluder=_count(self.behind_occluder),
             behind_itself=_count(self.behind_itself),
             outside=_count(self.outside),
+            turned_away=len(self.visible) - facing,
         )
 
 

@@ -22,7 +22,7 @@ SIGMA = 3e-3
 #: Sees a sheet of 0.3 × 0.2 m at z = 1 m with room around it.
 CAMERA = Camera(160, 120, 300.0, 300.0, 79.3, 59.2)
 MESH = sheet(13, 19, flat)
-CLASSES = [field.name for field in fields(VertexCounts) if field.name != "facing"]
+CLASSES = [field.name for field in fields(VertexCounts) if field.name not in ("facing", "turned_away")]
 
 
 def picture(size: tuple[float, float] = (0.32, 0.22), to_the_right: float = 0.0) -> np.ndarray:

@@ -1,0 +1,75 @@
+"""How much of a mesh agrees with what all sensors together show of it."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from abs_service.tracker.terms.base import MIN_RIM, RimFit, SensorFit
+from abs_service.tracker.terms.vertex_counts import VertexCounts
+
+#: Minimum number of vertices that agree or disagree with a sensor, or should, for their share to be judged.
+MIN_JUDGED = 20
+
+
+def most_agreeing(fits: Sequence[SensorFit]) -> VertexCounts:
+    """Counts of the sensor in which the largest share of what should be in sight agrees; zeros without any."""
+    counts = (fit.counts for fit in fits if fit.counts.expected)
+    return max(counts, key=lambda one: one.agreeing / one.expected, default=VertexCounts())
+
+
+def outside_share(fits: Sequence[SensorFit]) -> float:
+    """Share outside the depth image of what should be in sight; the smallest of the sensors of distances, 0 without.
+
+    Within a hole of an image the surface around it holds a vertex, and its colour. Beyond the border nothing is around
+    it, and a colour says where it is across the line of sight at best; on a plain surface not even that.
+    """
+    counts = (fit.counts for fit in of_distances(fits) if fit.counts.expected >= MIN_JUDGED)
+    return min((one.outside / one.expected for one in counts), default=0.0)
+
+
+def turned_away_share(fits: Sequence[SensorFit]) -> float:
+    """Share of all vertices that do not face it; the smallest of the sensors of distances, 0 without."""
+    counts = [fit.counts for fit in of_distances(fits)]
+    shares = [one.turned_away / (one.facing + one.turned_away) for one in counts if one.facing + one.turned_away]
+    return min(shares, default=0.0)
+
+
+def distances_share(fits: Sequence[SensorFit]) -> float:
+    """Share of the distances that agree; the largest of the sensors that measure half of what they could, 1 without.
+
+    A sensor could measure what faces it inside its image and is not behind the object itself.
+    """
+    counts = [fit.counts for fit in of_distances(fits)]
+    inside = [one.facing - one.behind_itself - one.outside for one in counts]
+    seen = [(one.agreeing, one.agreeing + one.disagreeing, whole) for one, whole in zip(counts, inside)]
+    return max((good / known for good, known, whole in seen if known >= max(MIN_JUDGED, whole / 2)), default=1.0)
+
+
+def of_distances(fits: Sequence[SensorFit]) -> list[SensorFit]:
+    """The sensors of distances among them."""
+    return [fit for fit in fits if fit.is_surprised or np.isfinite(fit.remainder.at_first)]
+
+
+def unexplained_share(fits: Sequence[SensorFit]) -> float:
+    """Surface beside the mesh that was not there at first, see `Remainder`; the smallest of the sensors, 0 without.
+
+    Where the object comes into sight beyond an edge that something hid at first, the mesh is right as far as it goes.
+    """
+    shares = [fit.remainder.gained for fit in fits if np.isfinite(fit.remainder.share) and not fit.rim.uncovered]
+    return min(shares, default=0.0)
+
+
+def rim_share(fits: Sequence[SensorFit]) -> float:
+    """Share of the visible vertices on free edges that lie off the outline; the smallest of the sensors, 0 without."""
+    shares = [(rim.outside + rim.inside) / rim.visible for rim in rims(fits)]
+    return min(shares, default=0.0)
+
+
+def rim_distance(fits: Sequence[SensorFit]) -> float:
+    """Distance [m] of the visible free edges from the outline, see `RimFit.off_m`; the smallest of the sensors."""
+    return min((rim.off_m for rim in rims(fits)), default=0.0)
+
+
+def rims(fits: Sequence[SensorFit]) -> list[RimFit]:
+    """Agreement of the edges with the outline, of the sensors in which enough are visible."""
+    return [fit.rim for fit in fits if fit.rim.visible >= MIN_RIM]
