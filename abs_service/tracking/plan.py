@@ -167,7 +167,7 @@ def make_tracker(
         model, sight = template.bind(plan.model, detection)
     except ModelError as error:
         if doubts := warnings(detection):
-            raise ExtentError(f"{', '.join(doubts)} The model cannot be made of it") from error
+            raise ExtentError(f"the model cannot be made of it: {'; '.join(doubts)}") from error
         raise
     rig = _as_seen(rig, plan.reference, detection)
     posterior, mesh = make_posterior(plan, rig, model, observation, sight)

@@ -107,8 +107,13 @@ def note(preview: Preview) -> str:
     """Warnings about the object, and the reason why the first frame shows none; "" without any."""
     if preview.found is None:
         return preview.reason
-    late = (f"Not found in the first frame: {preview.reason}",) if preview.reason else ()
-    return ". ".join((*preview.warnings, *late))
+    late = (f"not found in the first frame: {preview.reason}",) if preview.reason else ()
+    return " ".join(_sentence(one) for one in (*preview.warnings, *late))
+
+
+def _sentence(words: str) -> str:
+    """Words with a capital letter and a full stop, unless they end with one or ask."""
+    return words[:1].upper() + words[1:] + ("" if words.endswith((".", "?")) else ".")
 
 
 class _Page:

@@ -51,7 +51,7 @@ class RimFit:
         inside: of these, far inside the outline: measured surface of the object continues beyond the mesh.
         off_m: distance of the visible ones from the outline [m], see `displacement` and `motion` in `rim_motion`.
         occluded: on free edges, but not visible.
-        covered: on edges that something hid in the first image.
+        covered: on edges that something hid in the first image, or that its border cut.
         uncovered: of these, measured surface of the object now continues beyond the mesh.
     """
 

@@ -104,6 +104,19 @@ def test_every_class_has_its_colour_at_every_size(tmp_path, wanted):
     assert title == "sheet (nurbs), frame 0: 117 vertices, 300 × 200 × 0 mm, 1.00 m away"
 
 
+def test_doubts_are_sentences_of_their_own():
+    distance = np.ones((4, 4), np.float32)
+    camera = Camera(4, 4, 4.0, 4.0, 1.5, 1.5)
+    mesh = sheet(3, 3, flat)
+    found = FoundMesh(mesh, mesh.vertices, np.zeros(0, np.intp), np.zeros(0, np.uint8))
+    seen = Preview(
+        7, camera, distance, distance > 0, found, "nothing is near", ("it is large: is it right?", "it slants")
+    )
+    assert preview_picture.note(seen) == (
+        "It is large: is it right? It slants. Not found in the first frame: nothing is near."
+    )
+
+
 def test_check_draws_what_a_simulated_device_shows(tmp_path, capsys):
     (tmp_path / "rig.toml").write_text(RIG)
     picture = tmp_path / "first.png"

@@ -45,7 +45,7 @@ class RimClass(IntEnum):
     CONTACT = 1  # measured surface goes on: another object or side, a mask cuts this one, or its mesh ends far inside
     SILHOUETTE = 2  # the surface turns away from the sensor
     OCCLUDED = 3  # an occluder lies before it, or the measurement has a hole
-    BORDER = 4  # the image ends
+    BORDER = 4  # the image ends: on what comes into it, the mesh may go on as beyond an occluder
 
 
 def classify_rim(
@@ -81,17 +81,21 @@ def classify_rim(
     classes = np.full(len(beyond), RimClass.FREE, np.uint8)
     gap = np.where(beyond <= LARGEST_GAP_STEPS, np.maximum(beyond, 0.0), 0.0)
     step = outer - inner
-    hidden = np.any([np.isnan(inside_at(outer + by * step)) for by in _HIDING_STEPS], axis=0)
+    further = [outer + by * step for by in _HIDING_STEPS]
+    hidden = np.any([np.isnan(inside_at(points)) for points in further], axis=0)
+    last = np.array([camera.width, camera.height]) - 1
+    leaves = np.any([~_is_within(camera.project(points), last, 0.0) for points in further], axis=0)
+    unseen = np.where(leaves, RimClass.BORDER, RimClass.OCCLUDED)
     # If the mesh ends far inside the object, or the outline bends, it is nearest elsewhere than where the edge points.
     missed = np.abs(inside_at(outer + gap[:, None] * step)) > LARGEST_MISS_PX
     goes_on = ~(beyond <= LARGEST_GAP_STEPS) | (missed & (gap > 0))
     far = ~goes_on & (inside > LARGEST_MISS_PX) & (not rim.is_end)
     goes_on[far] = _leaves(camera, (outer + _ALMOST * gap[:, None] * step)[far], distance)
-    classes[goes_on] = np.where(hidden, RimClass.OCCLUDED, RimClass.CONTACT)[goes_on]
+    classes[goes_on] = np.where(hidden, unseen, RimClass.CONTACT)[goes_on]
     classes[end_cosine < MIN_COSINE] = RimClass.SILHOUETTE
-    classes[inside > camera.width + camera.height] = RimClass.OCCLUDED
-    last = np.array([camera.width, camera.height]) - 1
-    classes[~np.all((place >= BORDER_PX) & (place <= last - BORDER_PX), axis=1)] = RimClass.BORDER
+    unknown = inside > camera.width + camera.height
+    classes[unknown] = unseen[unknown]
+    classes[~_is_within(place, last, BORDER_PX)] = RimClass.BORDER
     free = classes == RimClass.FREE
     if _bulges(camera, surface, rim.outer[free], -gradients[free]):
         classes[free] = RimClass.SILHOUETTE
@@ -101,6 +105,11 @@ def classify_rim(
         classes[free] = RimClass.CONTACT
     gap[(classes != RimClass.FREE) | rim.is_end] = 0.0
     return classes, gap.astype(np.float32)
+
+
+def _is_within(places: NDArray[np.float64], last: NDArray[np.int_], margin: float) -> NDArray[np.bool_]:
+    """True for places (k, 2) in an image, up to its last column and row (2,), and so far from its border [px]."""
+    return np.all((places >= margin) & (places <= last - margin), axis=1)
 
 
 def _bulges(camera: Camera, surface: Surface, outer: NDArray[np.intp], outwards: NDArray[np.float64]) -> bool:

@@ -134,7 +134,7 @@ class RimOutline:
         points, places, away = self._edges(surface)
         known = ~np.isnan(away)
         pixel_m = np.linalg.norm(points - self._camera.center, axis=1) / self._camera.fx
-        covered = np.flatnonzero(self.classes == RimClass.OCCLUDED)
+        covered = np.flatnonzero((self.classes == RimClass.OCCLUDED) | (self.classes == RimClass.BORDER))
         beyond = self._beyond_gap(surface, covered)
         return RimFit(
             visible=int(np.count_nonzero(known)),

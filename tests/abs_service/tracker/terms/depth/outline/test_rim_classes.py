@@ -116,6 +116,23 @@ def test_an_edge_at_the_border_of_the_image_may_continue_beyond_it():
     assert found[RimClass.FREE] >= 2 * 15
 
 
+def test_an_edge_up_to_two_cells_before_the_border_is_cut_by_it_until_the_object_comes_into_the_image():
+    """Half of the sheet is to the right of the image; the mesh ends a cell before its last column."""
+    rays = CAMERA.unproject(np.ones((CAMERA.height, CAMERA.width)))
+    end = (rays[..., 0] / rays[..., 2]).max()
+    shift = end - MESH.vertices[:, 0].max() - 0.012
+    cut, left = (replace(MESH, vertices=MESH.vertices + np.array([by, 0, 0])) for by in (shift, shift - 0.1))
+    whole = replace(MESH, vertices=MESH.vertices * (2, 1, 1) + np.array([shift + 0.15, 0, 0]))
+    found = outline(picture(whole), cut)
+    right = cut.vertices[Rim.of(cut).outer, 0] > end - 0.02
+    assert np.mean(found.classes[right] == RimClass.BORDER) > 0.8  # but for the corners
+    assert not np.any(found.classes == RimClass.OCCLUDED)
+    assert found.fit(moved(cut, 0.0)).uncovered == 0
+    look(found, picture(whole, -0.1), left)
+    seen = found.fit(moved(left, 0.0))
+    assert seen.uncovered >= 0.8 * seen.covered > 8
+
+
 def test_the_edge_of_a_body_that_turns_away_is_a_silhouette():
     """A roll: its mesh ends where its surface is seen at a grazing angle."""
     roll = sheet(13, 19, lambda x, y: 1.15 - np.sqrt(0.15**2 - np.clip(x, -0.1495, 0.1495) ** 2) + 0 * y)
