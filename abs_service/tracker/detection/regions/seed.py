@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.detection.depth_view import DepthView, Step
 from abs_service.tracker.detection.initial_detection import DetectionError
+from abs_service.tracker.detection.plausibility import is_scene
 from abs_service.tracker.detection.segments.color_growth import grown_by_color
-from abs_service.tracker.detection.segments.seeds import ColorSeed, MotionSeed, PixelSeed, Seed, Surfaces
+from abs_service.tracker.detection.segments.seeds import ColorSeed, MotionSeed, PixelSeed, Seed, Seeded, Surfaces
 from abs_service.tracker.detection.segments.within import Polygon, Restricted, restricted
 
 Level = Annotated[int, Ge(0), Le(255)]
@@ -56,7 +57,9 @@ class Settings:
 
         def select(view: DepthView) -> NDArray[np.bool_]:
             seeded = seed(view, surfaces)
-            return seeded.surface if self.grow == "depth" else grown_by_color(seeded, view)
+            if self.grow == "color":
+                return grown_by_color(seeded, view)
+            return _apart_from_what_rests(seeded, view) if self.motion_s is not None else seeded.surface
 
         return restricted(select, self.within, self.polygon)
 
@@ -72,3 +75,15 @@ class Settings:
         raise DetectionError(
             f"one of pixel, color and motion_s says where the object is, not {' and '.join(given) or 'none'}"
         )
+
+
+def _apart_from_what_rests(seeded: Seeded, view: DepthView) -> NDArray[np.bool_]:
+    """The surface of what moved; DetectionError if it is the scene, and most of it rests."""
+    size, whole = np.count_nonzero(seeded.surface), np.count_nonzero(view.measured)
+    if np.count_nonzero(seeded.core) < size / 2 and is_scene(seeded.surface, view.measured):
+        raise DetectionError(
+            f"what moved is connected to {size / whole:.0%} of all returns, which span the image and rest: that is the "
+            'scene, not an object. Set region.grow to "color", region.polygon to corners around the object, or a '
+            "smaller region.largest_step_m, or take the object away from what it touches"
+        )
+    return seeded.surface

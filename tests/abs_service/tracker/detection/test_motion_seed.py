@@ -65,3 +65,35 @@ def test_motion_is_compared_anew_after_a_break():
             region.select(moving(k, 20))
     with pytest.raises(UndecidedError, match=r"0\.00 s"):
         region.select(moving(300, 60))
+
+
+def on_the_floor(k: int, away: float) -> DepthView:
+    """Image k of 30 in a second: a floor before a wall at 2 m, and a person who walks on it at a distance."""
+    row = np.arange(120)[:, None] + np.zeros(160)
+    distance = np.where(row > 60, 2.0 - 0.008 * (row - 60), 2.0)
+    column = 20 + k
+    moving = slice(30, 100), slice(column, column + 20)
+    distance[moving] = np.minimum(distance[moving], away)
+    return DepthView.of(distance.astype(np.float32), DEPTH, t_ns=round(k * 1e9 / 30))
+
+
+def test_what_moves_on_a_floor_that_is_most_of_the_image_is_not_the_scene():
+    """Feet and floor are one surface, and floor and wall: all of them were tracked, and said to be the object."""
+    region = seed.Settings(motion_s=1.0).build()
+    for k in range(30):
+        with pytest.raises(UndecidedError):
+            region.select(on_the_floor(k, 1.69))
+    with pytest.raises(DetectionError, match=r"what moved is connected to \d+% of all returns, .* that is the scene"):
+        region.select(on_the_floor(30, 1.69))
+
+
+def test_an_object_that_fills_the_image_may_move():
+    region = seed.Settings(motion_s=1.0).build()
+
+    def nearer(k: int) -> DepthView:
+        return DepthView.of(np.full((120, 160), 1.5 - 0.005 * k, np.float32), DEPTH, t_ns=round(k * 1e9 / 30))
+
+    for k in range(30):
+        with pytest.raises(UndecidedError):
+            region.select(nearer(k))
+    assert region.select(nearer(30)).all()
