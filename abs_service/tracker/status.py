@@ -10,7 +10,9 @@ from typing import Annotated
 import numpy as np
 from annotated_types import Gt, Interval
 
-from abs_service.tracker.agreement import (
+from abs_service.tracker.estimate import Status
+from abs_service.tracker.shape_quality import ShapeQuality
+from abs_service.tracker.terms.agreement import (
     MIN_JUDGED,
     distances_share,
     most_agreeing,
@@ -22,8 +24,6 @@ from abs_service.tracker.agreement import (
     turned_away_share,
     unexplained_share,
 )
-from abs_service.tracker.estimate import Status
-from abs_service.tracker.shape_quality import ShapeQuality
 from abs_service.tracker.terms.base import SensorFit, inlier_share, occluded_share
 
 

@@ -83,8 +83,8 @@ def alignment_warnings(detection: InitialDetection, images: Mapping[str, Image],
     return tuple(
         f"the edges in the image of {name} lie {one.px:.0f} px beside those in the distances (fx and fy × "
         f"{one.scale:.2f}, cx {one.shift[0]:+.0f} and cy {one.shift[1]:+.0f} would bring them together): is its "
-        "calibration that of images of this size, its pose T_rs that from sensor to rig and not the other way round, and "
-        "are both of the same moment?"
+        "calibration that of images of this size, its pose T_rs that from sensor to rig and not the other way round, "
+        "and are both of the same moment?"
         for name, one in found.items()
         if one is not None
     )

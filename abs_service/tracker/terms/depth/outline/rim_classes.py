@@ -83,8 +83,7 @@ def classify_rim(
     step = outer - inner
     further = [outer + by * step for by in _HIDING_STEPS]
     hidden = np.any([np.isnan(inside_at(points)) for points in further], axis=0)
-    last = np.array([camera.width, camera.height]) - 1
-    leaves = np.any([~_is_within(camera.project(points), last, 0.0) for points in further], axis=0)
+    leaves = np.any([~_is_within(camera, camera.project(points)) for points in further], axis=0)
     unseen = np.where(leaves, RimClass.BORDER, RimClass.OCCLUDED)
     # If the mesh ends far inside the object, or the outline bends, it is nearest elsewhere than where the edge points.
     missed = np.abs(inside_at(outer + gap[:, None] * step)) > LARGEST_MISS_PX
@@ -93,22 +92,21 @@ def classify_rim(
     goes_on[far] = _leaves(camera, (outer + _ALMOST * gap[:, None] * step)[far], distance)
     classes[goes_on] = np.where(hidden, unseen, RimClass.CONTACT)[goes_on]
     classes[end_cosine < MIN_COSINE] = RimClass.SILHOUETTE
-    unknown = inside > camera.width + camera.height
-    classes[unknown] = unseen[unknown]
-    classes[~_is_within(place, last, BORDER_PX)] = RimClass.BORDER
+    classes = np.where(inside > camera.width + camera.height, unseen, classes).astype(np.uint8)
+    classes[~_is_within(camera, place, BORDER_PX)] = RimClass.BORDER
     free = classes == RimClass.FREE
     if _bulges(camera, surface, rim.outer[free], -gradients[free]):
         classes[free] = RimClass.SILHOUETTE
-    free = classes == RimClass.FREE
-    # That fewer lie off the outline the status could not tell, as beside specks of relief and quantised distances.
-    if np.count_nonzero(free) < MIN_RIM:
+    elif np.count_nonzero(free) < MIN_RIM:
+        # That fewer lie off the outline the status could not tell, as beside specks of relief and quantised distances.
         classes[free] = RimClass.CONTACT
     gap[(classes != RimClass.FREE) | rim.is_end] = 0.0
     return classes, gap.astype(np.float32)
 
 
-def _is_within(places: NDArray[np.float64], last: NDArray[np.int_], margin: float) -> NDArray[np.bool_]:
-    """True for places (k, 2) in an image, up to its last column and row (2,), and so far from its border [px]."""
+def _is_within(camera: Camera, places: NDArray[np.float64], margin: float = 0.0) -> NDArray[np.bool_]:
+    """True for places (k, 2) in a camera's image that are so far from its border [px]."""
+    last = np.array([camera.width, camera.height]) - 1
     return np.all((places >= margin) & (places <= last - margin), axis=1)
 
 

@@ -1,4 +1,4 @@
-"""How much of a mesh agrees with what all sensors together show of it."""
+"""Shares of a mesh that agree with what all sensors together show of it."""
 
 from collections.abc import Sequence
 
