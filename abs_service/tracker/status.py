@@ -15,6 +15,7 @@ from abs_service.tracker.shape_quality import ShapeQuality
 from abs_service.tracker.terms.agreement import (
     MIN_JUDGED,
     distances_share,
+    has_left,
     most_agreeing,
     of_distances,
     outside_share,
@@ -78,9 +79,13 @@ def judge(
         innovation: see `RecentMotion`.
         limits: thresholds.
     """
-    lost = min(inlier_share(fits), distances_share(fits)) < limits.lost_below
+    gone = has_left(fits, limits.degraded_agreeing)
+    lost = gone or min(inlier_share(fits), distances_share(fits)) < limits.lost_below
     reasons = [f"no frame from {name}" for name in missing]
-    reasons += _seen(fits, lost, limits) if fits else [_UNMEASURED]
+    if gone:
+        reasons.append(_left(fits))
+    else:
+        reasons += _seen(fits, lost, limits) if fits else [_UNMEASURED]
     reasons += _faced(fits, shape, limits)
     reasons += _placed(fits, shape, innovation, limits)
     reasons += _shaped(shape, limits)
@@ -116,6 +121,14 @@ def _seen(fits: Sequence[SensorFit], lost: bool, limits: Settings) -> Iterator[s
             f"{outside:.0%} of the vertices that should be in sight are outside the depth image, where nothing says "
             "how far they are – bring the object back into it"
         )
+
+
+def _left(fits: Sequence[SensorFit]) -> str:
+    """Reason of a mesh that is outside the depth images."""
+    return (
+        f"{outside_share(fits):.0%} of the vertices that should be in sight are outside the depth image, and hardly a "
+        f"distance of the others agrees – {_FIND}"
+    )
 
 
 def _faced(fits: Sequence[SensorFit], shape: ShapeQuality, limits: Settings) -> Iterator[str]:

@@ -27,6 +27,15 @@ def outside_share(fits: Sequence[SensorFit]) -> float:
     return min((one.outside / one.expected for one in counts), default=0.0)
 
 
+def has_left(fits: Sequence[SensorFit], share: float) -> bool:
+    """True if more than a share is outside the depth images, hardly a distance agrees, and less than it in any sensor.
+
+    Colours of the few vertices that a wider camera still sees would hold a mesh beside the images for good.
+    """
+    best, distances = most_agreeing(fits), sum(fit.counts.agreeing for fit in of_distances(fits))
+    return outside_share(fits) > share and distances < MIN_JUDGED and best.agreeing < share * best.expected
+
+
 def turned_away_share(fits: Sequence[SensorFit]) -> float:
     """Share of all vertices that do not face it; the smallest of the sensors of distances, 0 without."""
     counts = [fit.counts for fit in of_distances(fits)]

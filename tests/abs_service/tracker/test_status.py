@@ -225,6 +225,20 @@ def test_a_mesh_is_lost_if_no_distance_agrees_where_the_image_shows_the_rest_of_
     assert judge([hand, colors], (), SHAPE, 0.0, SETTINGS)[0] == Status.DEGRADED, "the rest may be behind a hand"
 
 
+def test_a_mesh_beside_the_depth_image_is_lost_if_few_of_its_colors_agree():
+    out = replace(depth("tof", 0, 0), counts=VertexCounts(facing=300, agreeing=5, missing=30, outside=265))
+    few = replace(fit(0.95), counts=VertexCounts(facing=300, agreeing=80, disagreeing=20, outside=200))
+    status, reasons = judge([out, few], (), SHAPE, 0.0, SETTINGS)
+    assert status == Status.LOST
+    assert facts(reasons)[0].startswith("88% of the vertices that should be in sight are outside the depth image")
+    most = replace(fit(0.95), counts=VertexCounts(facing=300, agreeing=200, disagreeing=20, outside=80))
+    assert judge([out, most], (), SHAPE, 0.0, SETTINGS)[0] == Status.DEGRADED, "a wider camera sees it"
+    edge = replace(depth("tof", 0, 0), counts=VertexCounts(facing=300, agreeing=35, outside=265))
+    assert judge([edge, few], (), SHAPE, 0.0, SETTINGS)[0] == Status.DEGRADED, "its edge is measured"
+    hidden = replace(depth("tof", 0, 0), counts=VertexCounts(facing=300, agreeing=5, behind_occluder=295))
+    assert judge([hidden, few], (), SHAPE, 0.0, SETTINGS)[0] == Status.DEGRADED, "it may be behind a hand"
+
+
 def test_a_mesh_that_has_turned_away_from_the_sensors_is_not_tracked():
     """It was made from an image in which all of it faced them: on what has turned away there is nothing to go by."""
     turned = replace(depth("tof", 300, 0), counts=VertexCounts(facing=140, agreeing=140, turned_away=160))
