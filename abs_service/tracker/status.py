@@ -4,7 +4,7 @@ A reason says what is the matter, and after a dash what to do about it.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
@@ -79,6 +79,7 @@ def judge(
         innovation: see `RecentMotion`.
         limits: thresholds.
     """
+    fits = [_without_back(fit) for fit in fits] if shape.has_back else fits
     gone = has_left(fits, limits.degraded_agreeing)
     lost = gone or min(inlier_share(fits), distances_share(fits)) < limits.lost_below
     reasons = [f"no frame from {name}" for name in missing]
@@ -86,7 +87,7 @@ def judge(
         reasons.append(_left(fits))
     else:
         reasons += _seen(fits, lost, limits) if fits else [_UNMEASURED]
-    reasons += _faced(fits, shape, limits)
+    reasons += _faced(fits, limits)
     reasons += _placed(fits, shape, innovation, limits)
     reasons += _shaped(shape, limits)
     if lost:
@@ -123,17 +124,22 @@ def _seen(fits: Sequence[SensorFit], lost: bool, limits: Settings) -> Iterator[s
         )
 
 
+def _without_back(fit: SensorFit) -> SensorFit:
+    """Agreement of a mesh of which a part has always been turned away."""
+    return replace(fit, counts=replace(fit.counts, turned_away=0))
+
+
 def _left(fits: Sequence[SensorFit]) -> str:
-    """Reason of a mesh that is outside the depth images."""
+    """Reason of a mesh that the depth sensors cannot see."""
     return (
-        f"{outside_share(fits):.0%} of the vertices that should be in sight are outside the depth image, and hardly a "
-        f"distance of the others agrees – {_FIND}"
+        f"{outside_share(fits):.0%} of the vertices that should be in sight are outside the depth image, "
+        f"{turned_away_share(fits):.0%} of all are turned away, and hardly a distance of the others agrees – {_FIND}"
     )
 
 
-def _faced(fits: Sequence[SensorFit], shape: ShapeQuality, limits: Settings) -> Iterator[str]:
+def _faced(fits: Sequence[SensorFit], limits: Settings) -> Iterator[str]:
     """Reason by how much of what the first image showed has turned away from the sensors of distances."""
-    if not shape.has_back and (away := turned_away_share(fits)) > 1 - limits.degraded_agreeing:
+    if (away := turned_away_share(fits)) > 1 - limits.degraded_agreeing:
         yield (
             f"{away:.0%} of the vertices, all of which faced the depth sensor at first, are turned away from it, and "
             "nothing says where they are – turn the object back, or have the mesh made anew by abs-service reinitialize"

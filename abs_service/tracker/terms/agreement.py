@@ -28,12 +28,16 @@ def outside_share(fits: Sequence[SensorFit]) -> float:
 
 
 def has_left(fits: Sequence[SensorFit], share: float) -> bool:
-    """True if more than a share is outside the depth images, hardly a distance agrees, and less than it in any sensor.
+    """True if the depth sensors cannot see more than a share, hardly a distance agrees, and less than it in any sensor.
 
-    Colours of the few vertices that a wider camera still sees would hold a mesh beside the images for good.
+    They cannot see what is outside their images or turned away from them. Colours of the few vertices that a wider
+    camera still sees would hold a mesh beside the images for good.
     """
-    best, distances = most_agreeing(fits), sum(fit.counts.agreeing for fit in of_distances(fits))
-    return outside_share(fits) > share and distances < MIN_JUDGED and best.agreeing < share * best.expected
+    depths = [fit.counts for fit in of_distances(fits)]
+    unseen = [(one.outside + one.turned_away) / max(one.expected + one.turned_away, 1) for one in depths]
+    agreeing = [fit.counts.agreeing / max(fit.counts.expected + fit.counts.turned_away, 1) for fit in fits]
+    few = sum(one.agreeing for one in depths) < MIN_JUDGED
+    return min(unseen, default=0.0) > share and few and max(agreeing) < share
 
 
 def turned_away_share(fits: Sequence[SensorFit]) -> float:

@@ -235,6 +235,10 @@ def test_a_mesh_beside_the_depth_image_is_lost_if_few_of_its_colors_agree():
     assert judge([out, most], (), SHAPE, 0.0, SETTINGS)[0] == Status.DEGRADED, "a wider camera sees it"
     edge = replace(depth("tof", 0, 0), counts=VertexCounts(facing=300, agreeing=35, outside=265))
     assert judge([edge, few], (), SHAPE, 0.0, SETTINGS)[0] == Status.DEGRADED, "its edge is measured"
+    back = VertexCounts(facing=12, agreeing=4, disagreeing=8, turned_away=290)
+    both = [replace(depth("tof", 0, 0), counts=back), replace(few, counts=back)]
+    assert judge(both, (), SHAPE, 0.0, SETTINGS)[0] == Status.LOST, "it has turned inside out"
+    assert judge(both, (), replace(SHAPE, has_back=True), 0.0, SETTINGS)[0] == Status.DEGRADED
     hidden = replace(depth("tof", 0, 0), counts=VertexCounts(facing=300, agreeing=5, behind_occluder=295))
     assert judge([hidden, few], (), SHAPE, 0.0, SETTINGS)[0] == Status.DEGRADED, "it may be behind a hand"
 
