@@ -12,11 +12,7 @@ CALM_REPORTS = 10
 
 
 class Losses:
-    """Counts and reports losses.
-
-    Args:
-        health: of the recorder.
-    """
+    """Counts and reports losses."""
 
     def __init__(self, health: Health) -> None:
         self._health = health

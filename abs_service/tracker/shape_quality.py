@@ -36,11 +36,7 @@ class ShapeQuality:
 
 
 class ShapeComparison:
-    """Compares deformed meshes with the undeformed one.
-
-    Args:
-        mesh: the undeformed mesh.
-    """
+    """Compares deformed meshes with the undeformed one."""
 
     def __init__(self, mesh: Mesh):
         self._edges, self._has_back = mesh.edges, mesh.is_complete

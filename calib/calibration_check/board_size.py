@@ -20,12 +20,7 @@ SHORTEST = 0.02
 
 
 def gross_size(stored: Stored, views: Views) -> float:
-    """Factor by which a board is larger than described, if that is gross and beyond doubt, otherwise 1.
-
-    Args:
-        stored: the calibration.
-        views: new views.
-    """
+    """Factor by which a board is larger than described, if that is gross and beyond doubt, otherwise 1."""
     boards: dict[int, list[tuple[CornerView, Pose]]] = {}
     for view in views.corners:
         if found := pose_candidates(stored.sensors[view.sensor].camera, view):

@@ -64,12 +64,7 @@ class Mistake:
 
 
 def find(stored: Stored, corners: Sequence[CornerView]) -> list[Mistake]:
-    """Mistakes of which each would explain the images, the best first; empty if the images fit, or none does.
-
-    Args:
-        stored: the calibration.
-        corners: new views by its sensors.
-    """
+    """Mistakes of which each would explain the images, the best first; empty if the images fit, or none does."""
     shots = _shared(corners)
     given = _miss(stored, shots)
     there = {view.sensor for views in shots for view in views}

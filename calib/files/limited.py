@@ -36,10 +36,6 @@ def opened(path: Path) -> Iterator[BinaryIO]:
 def read(path: Path, largest: int) -> bytes:
     """The content of a file.
 
-    Args:
-        path: the file.
-        largest: number of bytes that it may have.
-
     Raises:
         OSError: it cannot be read, is no regular file, or is larger.
     """

@@ -14,10 +14,6 @@ from calib.solve.start.start import start
 def calibrate(task: Task, note: Callable[[str], None] = lambda _: None) -> Solution:
     """Solves a calibration task.
 
-    Args:
-        task: sensors and observations.
-        note: called with progress messages.
-
     Raises:
         ViewsError, MixedUpError, SquareSizeError: common mistakes; see `diagnoses`.
         NotConnectedError, ContradictionError: sensors without consistent common views; see `extrinsics_graph`.

@@ -26,9 +26,6 @@ _PASSIVE: Mapping[str, Role] = {**_TRACKS, "IR": PASSIVE}
 class AzureRecording:
     """Images of one recording; depth in millimetres along z.
 
-    Args:
-        path: of the file.
-
     Attributes:
         cameras: `depth` and `color`, as recorded; depth is the rig's frame.
         total: None: the number of images is unknown before reading.

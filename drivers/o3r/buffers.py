@@ -32,9 +32,6 @@ _NEEDED = (ChunkType.DISTANCE, ChunkType.TOF_INFO)
 class O3rBuffers:
     """A file of messages with radial distances, their deviations, amplitudes and confidences.
 
-    Args:
-        path: of the file.
-
     Attributes:
         cameras: the only sensor's, by its name.
         total: number of frames.

@@ -50,9 +50,6 @@ class _BagInfo:
 class RealsenseBag:
     """The streams of the first device in a bag.
 
-    Args:
-        path: of the bag.
-
     Attributes:
         cameras: by head; the rig's frame is that of the reference stream, depth.
         total: number of images.

@@ -19,11 +19,7 @@ class Message:
 
 
 class Bag:
-    """A ROS 1 bag.
-
-    Args:
-        path: of the file.
-    """
+    """A ROS 1 bag."""
 
     def __init__(self, path: Path) -> None:
         self._path = path

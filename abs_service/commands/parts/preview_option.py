@@ -45,12 +45,6 @@ def check(path: Path) -> None:
 def draw(settings: config.ServiceConfig, name: str, path: Path, source: Source) -> str:
     """Draws the preview of one tracker; warnings, or the reason why it finds no object, go to standard error.
 
-    Args:
-        settings: the configuration.
-        name: of the tracker.
-        path: that was asked for.
-        source: observations for the tracker.
-
     Returns:
         A line about the written file.
 

@@ -28,12 +28,7 @@ class Button:
 
 
 class Panel:
-    """The panel beside the scene.
-
-    Args:
-        server: that serves it.
-        buttons: by label.
-    """
+    """The panel beside the scene."""
 
     def __init__(self, server: viser.ViserServer, buttons: Mapping[str, Button]) -> None:
         self._server, gui = server, server.gui

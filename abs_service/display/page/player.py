@@ -18,12 +18,7 @@ ORDER = 0.5
 
 
 class Player:
-    """The controls; what they ask for is done in `tick`, in the thread of the page.
-
-    Args:
-        gui: that they are added to.
-        playback: the recording.
-    """
+    """The controls; what they ask for is done in `tick`, in the thread of the page."""
 
     def __init__(self, gui: viser.GuiApi, playback: Playback) -> None:
         self._playback = playback

@@ -18,12 +18,7 @@ def _note(text: str, notes: Output) -> None:
 
 
 class PlainDisplay:
-    """One line a second.
-
-    Args:
-        out: where the lines go.
-        notes: where notes go.
-    """
+    """One line a second."""
 
     def __init__(self, out: Output, notes: Output) -> None:
         self._out = out
@@ -59,12 +54,7 @@ class PlainDisplay:
 
 
 class JsonDisplay:
-    """One JSON object per estimate and line, flushed; everything else goes to the notes.
-
-    Args:
-        out: where the estimates go.
-        notes: where notes and the summary go.
-    """
+    """One JSON object per estimate and line, flushed; everything else goes to the notes."""
 
     def __init__(self, out: Output, notes: Output) -> None:
         self._out = out

@@ -83,11 +83,7 @@ class Background(Generic[T]):
 
 
 class Output(Background[str]):
-    """Text for a file, as `print` and rich write it.
-
-    Args:
-        write: writes one text.
-    """
+    """Text for a file, as `print` and rich write it."""
 
     @property
     def file(self) -> IO[str]:

@@ -31,12 +31,7 @@ _STATE = {
 
 
 class TableDisplay:
-    """A table that is redrawn several times a second, below the notes; not while the terminal is halted (Ctrl-S).
-
-    Args:
-        console: the terminal.
-        output: that it writes to.
-    """
+    """A table that is redrawn several times a second, below the notes; not while the terminal is halted (Ctrl-S)."""
 
     def __init__(self, console: Console, output: Output) -> None:
         self._console = console

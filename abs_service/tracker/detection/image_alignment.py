@@ -71,13 +71,7 @@ class Displacement(NamedTuple):
 
 
 def alignment_warnings(detection: InitialDetection, images: Mapping[str, Image], rig: Rig) -> tuple[str, ...]:
-    """Doubts about the calibration of the cameras, in plain words.
-
-    Args:
-        detection: the object, with its surroundings.
-        images: of the same moment, by sensor.
-        rig: the sensors.
-    """
+    """Doubts about the calibration of the cameras, in plain words."""
     pictures = {name: image for name, image in images.items() if isinstance(image, (ColorImage, ChannelImage))}
     found = {name: displacement(detection, image, rig.sensors[name].camera) for name, image in pictures.items()}
     return tuple(

@@ -111,14 +111,7 @@ def lining(surface: NDArray[np.bool_], measured: NDArray[np.bool_]) -> int:
 
 
 def doubts(detection: InitialDetection, mesh: Mesh, images: Mapping[str, Image], rig: Rig) -> tuple[str, ...]:
-    """All doubts about an object that was found, the mesh that was made of it, and the cameras that show it.
-
-    Args:
-        detection: the object.
-        mesh: made of it.
-        images: of the same moment, by sensor.
-        rig: the sensors.
-    """
+    """All doubts about an object that was found, the mesh that was made of it, and the cameras that show it."""
     return (
         warnings(detection)
         + noise_warnings(detection)

@@ -13,11 +13,6 @@ from abs_service.tracker.posterior.surfaces import FrameSurfaces
 class Posterior:
     """Likelihood and priors of one object over time.
 
-    Args:
-        model: the deformation model.
-        objective: sum of the sensors' terms.
-        stretch, shape, motion: the priors.
-
     Attributes:
         dimension: of Θ.
         model, objective, stretch, shape, motion: see above.

@@ -35,9 +35,6 @@ class NoiseMonitor:
 
     A deviation that is too small rejects good measurements; one that is too large gives the sensor too little weight
     beside the others, and makes the covariance of Θ depend on what the priors allow.
-
-    Args:
-        health: of the tracker.
     """
 
     def __init__(self, health: Health):

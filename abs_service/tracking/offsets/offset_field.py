@@ -50,9 +50,6 @@ class OffsetField:
     """The equations of a mesh's offsets.
 
     An edge of a vertex with fewer neighbours counts for more, so that the rim is held as firmly as the inside.
-
-    Args:
-        mesh: the mesh.
     """
 
     def __init__(self, mesh: Mesh):

@@ -96,12 +96,7 @@ def _call_cached(kernel: Kernel, *arguments: Any) -> Any:
 
 
 class StandIn:
-    """Takes the calls of a kernel: the compiled one if it is in the cache, else the plain one.
-
-    Args:
-        kernel: the kernel.
-        pool: compiles it.
-    """
+    """Takes the calls of a kernel: the compiled one if it is in the cache, else the plain one."""
 
     def __init__(self, kernel: Kernel, pool: Pool):
         self._kernel = kernel

@@ -60,10 +60,6 @@ def _camera(name: str, sensor: SensorTask, views: Sequence[CornerView], note: Ca
 def fit_camera(name: str, sensor: SensorTask, views: Sequence[CornerView], first: Camera) -> Camera:
     """Camera fitted to the corners of one sensor alone, with free intrinsics, in its own frame.
 
-    Args:
-        name, sensor, views: the sensor and its views.
-        first: initial camera.
-
     Raises:
         NotSolvedError: no view has a valid board pose.
     """

@@ -15,10 +15,6 @@ from drivers.oak.roles import REFERENCES, Role
 def cameras(pictures: Mapping[Role, Picture], poses: Poses) -> dict[str, Camera]:
     """Camera of every head.
 
-    Args:
-        pictures: first image of every stream.
-        poses: extrinsics of the cameras.
-
     Returns:
         By head; the rig's frame is that of the first available of `REFERENCES`.
 

@@ -20,14 +20,7 @@ Input = viser.GuiInputHandle[Any]
 
 
 class DeviceControls:
-    """Inputs for the controls of every device, once the user has asked for them.
-
-    Args:
-        gui: that they are added to.
-        tab: of the page, that they are in.
-        devices: by name.
-        send: sends a command to one of them.
-    """
+    """Inputs for the controls of every device, once the user has asked for them."""
 
     def __init__(self, gui: viser.GuiApi, tab: viser.GuiTabHandle, devices: Sequence[str], send: Send) -> None:
         self._gui, self._tab, self._devices, self._send = gui, tab, devices, send

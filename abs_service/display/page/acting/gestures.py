@@ -49,11 +49,7 @@ Ray = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 
 class Gestures:
-    """Waits for one gesture of any browser; another request replaces it.
-
-    Args:
-        scene: that is pointed at.
-    """
+    """Waits for one gesture of any browser; another request replaces it."""
 
     def __init__(self, scene: viser.SceneApi) -> None:
         self._scene = scene

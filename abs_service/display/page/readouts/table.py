@@ -16,12 +16,7 @@ LOSSES = frozenset({"dropped", "lost", "malformed", "unused", "skipped"})
 
 
 def rows(feed: Feed, tracker: str) -> dict[str, str]:
-    """Numbers in words, by name.
-
-    Args:
-        feed: of the rig.
-        tracker: that is shown.
-    """
+    """Numbers in words, by name."""
     numbers, healths = feed.numbers(tracker), [health for health, _ in feed.healths()]
     skipped = sum(one.skipped for one in numbers)
     found = {"estimates": f"{rate_hz(numbers, feed.now_s):.1f} Hz, {skipped} skipped"}

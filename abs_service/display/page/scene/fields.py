@@ -142,11 +142,7 @@ def nice(value: float) -> float:
 
 
 class ColorScale:
-    """Colours of values; the end of the scale follows them and falls slowly, so that colours do not flicker.
-
-    Args:
-        field: the quantity to show.
-    """
+    """Colours of values; the end of the scale follows them and falls slowly, so that colours do not flicker."""
 
     def __init__(self, field: Field) -> None:
         self._field = field

@@ -42,10 +42,6 @@ def grown_by_color(seeded: Seeded, view: DepthView) -> NDArray[np.bool_]:
     What stands on a table, or before a wall, grows once more, with all the colours that were found, but above the
     plane only: colours of many things are found somewhere on a table.
 
-    Args:
-        seeded: core and surface.
-        view: the depth image, with its colours.
-
     Raises:
         DetectionError: no colour of the core is known.
     """

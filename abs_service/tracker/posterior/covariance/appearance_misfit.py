@@ -48,11 +48,7 @@ class NoDisplacement:
 
 
 class AppearanceMisfit:
-    """That of a mesh whose appearance images show.
-
-    Args:
-        mesh: the mesh.
-    """
+    """That of a mesh whose appearance images show."""
 
     def __init__(self, mesh: Mesh):
         self._mean = mean_around(mesh)

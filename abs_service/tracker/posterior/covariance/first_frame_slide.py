@@ -42,11 +42,7 @@ class NoSlide:
 
 
 class FirstFrameSlide:
-    """That of a mesh that the first frame defines.
-
-    Args:
-        mesh: as it was made.
-    """
+    """That of a mesh that the first frame defines."""
 
     def __init__(self, mesh: Mesh):
         self._made = mesh.vertices.astype(np.float64)

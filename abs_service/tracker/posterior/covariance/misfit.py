@@ -28,11 +28,7 @@ RISE, FALL = 0.2, 0.05
 
 
 class Misfit:
-    """Variance of the vertices that the misfit of the model shows, over time.
-
-    Args:
-        mesh: the mesh.
-    """
+    """Variance of the vertices that the misfit of the model shows, over time."""
 
     def __init__(self, mesh: Mesh):
         self._common = CommonDistance(mesh)
@@ -58,9 +54,6 @@ class Misfit:
 
 class CommonDistance:
     """Distances that neighbouring vertices have in common: noise and outliers stand alone.
-
-    Args:
-        mesh: the mesh.
 
     Attributes:
         mean: matrix (n, n) of the mean over each vertex and its neighbours.

@@ -8,11 +8,7 @@ from abs_service.tracker.models.base import Surface
 
 
 class Tangents:
-    """Orthonormal tangents at the vertices of a mesh, of whatever it is deformed into.
-
-    Args:
-        mesh: with n vertices.
-    """
+    """Orthonormal tangents at the vertices of a mesh, of whatever it is deformed into."""
 
     def __init__(self, mesh: Mesh):
         self._beside = np.arange(len(mesh.vertices))

@@ -15,9 +15,6 @@ NOISE_RATIO = 1.5
 class Innovations:
     """Running means over the last frames; parameters that no measurement determines neither raise nor lower them.
 
-    Args:
-        dimension: number of parameters.
-
     Attributes:
         variance: mean squared innovation [m²/s²].
         repeated: mean product of two successive innovations [m²/s²].

@@ -49,10 +49,6 @@ class CoarseContinuation:
     """Pixels of the object beside the mesh, of every few in a row.
 
     A mesh made from an image ends up to one cell inside the object, so pixels as near as that do not count.
-
-    Args:
-        camera: the camera.
-        mesh: the undeformed mesh.
     """
 
     def __init__(self, camera: Camera, mesh: Mesh):
