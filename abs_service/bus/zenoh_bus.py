@@ -33,12 +33,7 @@ _PRIORITIES = {
 
 
 class ZenohBus:
-    """One rig's topics on a zenoh session; implements `contract.Bus`.
-
-    Args:
-        session: an open session; the bus closes it.
-        rig: name of the rig.
-    """
+    """One rig's topics on a zenoh session; implements `contract.Bus`."""
 
     def __init__(self, session: zenoh.Session, rig: str) -> None:
         self._session = session

@@ -30,11 +30,6 @@ class MetadataPublisher:
     """Publishes the configuration, and calibration, noise model and pose of every sensor whose device is open.
 
     Its methods may be called from any thread: devices are opened by threads of their own.
-
-    Args:
-        bus: of the rig.
-        headers: makes the message headers.
-        described: by the configuration.
     """
 
     def __init__(self, bus: Bus, headers: HeaderFactory, described: Described) -> None:

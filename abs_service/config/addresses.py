@@ -8,11 +8,7 @@ from drivers.contract.device import AddressError
 
 
 def check(uris: Mapping[str, str]) -> Iterator[Problem]:
-    """The problems of addresses that no device can have. Their drivers are imported, no device is opened.
-
-    Args:
-        uris: the addresses by the names of the devices.
-    """
+    """Problems of addresses, by device name, that no device can have. Imports their drivers, and opens none."""
     for name, uri in uris.items():
         try:
             opening.check_address(uri)

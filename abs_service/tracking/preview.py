@@ -81,11 +81,6 @@ class Preview:
 def preview(frame_sets: Iterable[FrameSet], rig: Rig, plan: Plan) -> Preview:
     """Preview of the first frame set in which the object is found.
 
-    Args:
-        frame_sets: in order of time; read only as far as needed.
-        rig: sensors of the tracker.
-        plan: settings of the tracker.
-
     Raises:
         PreviewError: the reference sensor delivers no depth image.
         ObservationError: the frames do not fit the rig.

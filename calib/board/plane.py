@@ -89,12 +89,7 @@ def estimate_sigma(distance: NDArray[np.floating], inside: Mask) -> float:
 
 
 def board_pose(view: CornerView, camera: Camera) -> Pose | None:
-    """Approximate pose `T_rb` of a board from one camera; None if undetermined.
-
-    Args:
-        view: four corners or more.
-        camera: of the view's sensor.
-    """
+    """Approximate pose `T_rb` of a board from one camera; None if undetermined."""
     try:
         rays = camera.directions(view.pixels)
     except LensError:

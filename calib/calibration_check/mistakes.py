@@ -83,13 +83,7 @@ def find(stored: Stored, corners: Sequence[CornerView]) -> list[Mistake]:
 
 
 def likelier(stored: Stored, views: Views, sensor: str) -> str:
-    """Another sensor whose camera fits the corners that a sensor saw by far better than its own; "" if there is none.
-
-    Args:
-        stored: the calibration.
-        views: new views, some of which are of the sensor.
-        sensor: its name.
-    """
+    """Another sensor whose camera fits the corners that a sensor saw by far better; "" if there is none."""
     given, own = stored.sensors[sensor].camera, [view for view in views.corners if view.sensor == sensor]
     misses = {sensor: corner_fit(stored, views, sensor).rms}
     for name, other in stored.sensors.items():

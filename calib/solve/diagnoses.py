@@ -176,10 +176,6 @@ def suspect_square_size(task: Task, state: State) -> bool:
     Distances derived from corners scale with the square size, those of a depth sensor do not. An offset of the
     distances is estimated as well if they vary enough. At the initial state this is only a suspicion;
     `require_square_size` decides.
-
-    Args:
-        task: with the planes of its depth sensors.
-        state: cameras and boards from corners alone.
     """
     scales = [scale for name in task.sensors if (scale := _scale(name, task, state)) is not None]
     return bool(scales) and all(abs(scale - 1) > SCALE_TOLERANCE for scale in scales)

@@ -26,13 +26,7 @@ class Limits:
 
 
 class Kinect:
-    """An open camera.
-
-    Args:
-        sdk: the library.
-        handle: of the device.
-        uri: its address, for errors.
-    """
+    """An open camera."""
 
     def __init__(self, sdk: Any, handle: ctypes.c_void_p, uri: str) -> None:
         self.sdk = sdk

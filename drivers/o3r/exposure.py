@@ -60,10 +60,6 @@ class Exposure:
     def frames(self, calib_id: str, mode: str = "") -> Iterator[Frame]:
         """All images, with the processing unit's times in place of the host's.
 
-        Args:
-            calib_id: of the camera.
-            mode: measuring mode of the head.
-
         Raises:
             ChunkError: an image of an unexpected pixel format.
         """

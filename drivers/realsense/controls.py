@@ -12,13 +12,7 @@ _SYNC: Mapping[str, int] = {"free": 0, "master": 1, "slave": 2}
 
 
 def make(rs: Any, uri: str, sensors: Mapping[int, tuple[Any, Role]]) -> Controls:
-    """Controls of the used sensors; those of the colour sensor have the prefix `color.`.
-
-    Args:
-        rs: pyrealsense2.
-        uri: of the camera, for messages.
-        sensors: by index, each with the role of its first stream.
-    """
+    """Controls of the used sensors; those of the colour sensor have the prefix `color.`."""
     controls: list[Control] = []
     for sensor, role in sensors.values():
         prefix = "color." if role.sensor == "color" else ""

@@ -26,11 +26,7 @@ OnMessage = Callable[[str, bytes, bytes], None]
 
 
 class Link:
-    """One session with a router.
-
-    Args:
-        session: an open session; the link closes it.
-    """
+    """One session with a router."""
 
     def __init__(self, session: zenoh.Session) -> None:
         self._session = session

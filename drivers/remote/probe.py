@@ -53,11 +53,6 @@ def choose_rig(link: Link, address: Address) -> str:
 def probe(link: Link, rig: str, address: Address) -> RemoteRig:
     """Queries the sensors of a rig and observes their streams.
 
-    Args:
-        link: link to the rig.
-        rig: its name.
-        address: requested sensors and observation time.
-
     Raises:
         DeviceError: a requested sensor has no metadata or no frames yet, as while its device is being opened.
     """

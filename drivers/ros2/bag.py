@@ -44,9 +44,6 @@ class _Stream:
 class Ros2Bag:
     """The image topics of a bag; the rig's frame is that of the first depth images.
 
-    Args:
-        path: folder of the bag, or one of its files.
-
     Attributes:
         cameras: by head.
         total: number of images.

@@ -27,11 +27,7 @@ class Topic:
 
 
 class Bag:
-    """A bag: the folder that `ros2 bag record` makes, or one of the MCAP or SQLite files in it.
-
-    Args:
-        path: of the folder or file.
-    """
+    """A bag: the folder that `ros2 bag record` makes, or one of the MCAP or SQLite files in it."""
 
     def __init__(self, path: Path) -> None:
         self._path = path

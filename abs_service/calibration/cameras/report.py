@@ -20,14 +20,7 @@ ASPECT = 0.01
 
 
 def report(title: str, origin: Provenance, solution: Solution, found: Assessment, notes: Sequence[str]) -> Report:
-    """The report of a solved calibration.
-
-    Args:
-        title: title of the page.
-        origin: provenance of the result.
-        solution, found: the result and its assessment.
-        notes: remarks for the user, such as rejected images.
-    """
+    """The report of a solved calibration."""
     verdicts = [Verdict(Level.GOOD if found.trusted else Level.DOUBTFUL, found.verdict)]
     verdicts += [Verdict(Level.DOUBTFUL, reason) for reason in found.reasons[1:]]
     sections = [_cross_validation(found), *(_sensor(name, solution, found) for name in solution.task.sensors)]
@@ -56,15 +49,7 @@ def report(title: str, origin: Provenance, solution: Solution, found: Assessment
 def calibration(
     name: str, origin: Provenance, solution: Solution, trusted: bool, kept: Mapping[str, SensorCalibration]
 ) -> RigCalibration:
-    """Content of the calibration file; values of known sensors that do not concern the camera are kept.
-
-    Args:
-        name: of the rig.
-        origin: provenance of the result.
-        solution: the result.
-        trusted: the verdict.
-        kept: previous calibration, by sensor.
-    """
+    """Content of the calibration file; values of known sensors that do not concern the camera are kept."""
     sensors = {}
     for sensor, state in solution.state.sensors.items():
         before = kept.get(sensor, SensorCalibration(state.camera))

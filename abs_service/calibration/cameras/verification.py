@@ -70,11 +70,6 @@ class Verification:
 def verify(known: RigCalibration, seen: BoardObservations, provenance: Provenance) -> Report:
     """Report on a calibration.
 
-    Args:
-        known: the calibration.
-        seen: new views of a board by its sensors.
-        provenance: provenance of the report.
-
     Raises:
         CalibrationCheckError: no usable view.
         NotSolvedError, UndeterminedError: the views do not determine the board poses.

@@ -27,15 +27,7 @@ def report(
     provenance: Provenance,
     repeated: Sequence[str] = (),
 ) -> Report:
-    """Report of one sensor.
-
-    Args:
-        sensor: its name.
-        found: result of the calibration.
-        consistencies: consistency of the σ that the sensor reports.
-        provenance: provenance of the report.
-        repeated: sentences about sequences that count as one.
-    """
+    """Report of one sensor."""
     sections = [
         Section("Models", (_models(found),)),
         Section("Error components", (_WHAT, _parts(found))),

@@ -85,11 +85,7 @@ class Shot:
 
 
 class Assembler:
-    """Converts frame sets to shots.
-
-    Args:
-        cameras: camera of each sensor, for the conversion of z to radial distances.
-    """
+    """Converts frame sets to shots."""
 
     def __init__(self, cameras: Mapping[str, Camera]) -> None:
         self._cameras = cameras

@@ -220,12 +220,7 @@ directory = "recordings"
 
 
 def write(answers: Answers, file: str) -> str:
-    """The rig file, TOML with comments.
-
-    Args:
-        answers: description of the rig.
-        file: how the file will be called, for its comments.
-    """
+    """The rig file, TOML with comments."""
     device = answers.device
     color = device.color if answers.color else None
     sensors = [device.head, *([color.head] if color else [])]

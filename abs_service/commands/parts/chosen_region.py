@@ -15,13 +15,6 @@ from calib.rig import Rig
 def reinitialize(tracking: TrackingSession, rig: Rig, plan: Plan, tracker: str, choice: Choice) -> str:
     """Makes a tracker look for its object anew; returns the table of the rig file that keeps a choice, else "".
 
-    Args:
-        tracking: the tracker.
-        rig: its sensors.
-        plan: as its rig file has it.
-        tracker: its name.
-        choice: the object, in the depth image of its reference.
-
     Raises:
         RefusedError: a pixel is outside the image, or the region's mask is gone.
     """

@@ -67,11 +67,6 @@ LINE_LENGTH = 46
 def draw(preview: Preview, tracker: str, model: str, path: Path) -> None:
     """Draws a preview in the format of the file's suffix.
 
-    Args:
-        preview: to draw.
-        tracker, model: name of the tracker, type of its deformation model.
-        path: file to write.
-
     Raises:
         ValueError: no such format.
         OSError: the file cannot be written.

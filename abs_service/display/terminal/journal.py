@@ -31,9 +31,6 @@ class JournalDisplay:
     """Writes one entry for every change of a component's level, a tracker's status or a process's state.
 
     Levels and states that come again and again, as those of a process that never works, are written ever more rarely.
-
-    Args:
-        send: writes one entry, given as its fields.
     """
 
     def __init__(self, send: Callable[[Mapping[str, str]], None]) -> None:

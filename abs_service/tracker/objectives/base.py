@@ -37,12 +37,7 @@ class ObservedObjective(Protocol):
         ...
 
     def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> list[Linear]:
-        """Normalised residuals of a population of one, and their derivatives.
-
-        Args:
-            surface: the deformed mesh.
-            sparse_jacobian: derivative of its vertices with respect to theta.
-        """
+        """Normalised residuals of a population of one, and their derivatives."""
         ...
 
     def fits(self, surface: Surface) -> list[SensorFit]:

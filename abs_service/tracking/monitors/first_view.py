@@ -16,12 +16,7 @@ _SAME_M, _SAME_SHAPE = 0.02, 0.02
 
 
 class FirstView:
-    """The object in the image from which its mesh was made.
-
-    Args:
-        detection: the object in that image, and what was around it.
-        mesh: the undeformed mesh that was made from it.
-    """
+    """The object in the image from which its mesh was made."""
 
     def __init__(self, detection: InitialDetection, mesh: Mesh):
         self._detection, self._vertices = detection, mesh.vertices

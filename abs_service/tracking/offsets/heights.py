@@ -36,12 +36,7 @@ class Heights:
 
 
 class HeightSensor:
-    """A depth sensor that measures heights, of every vertex by the pixels that are nearer to it than to others.
-
-    Args:
-        camera, noise: of the depth sensor.
-        mesh: the mesh as the camera saw it first.
-    """
+    """A depth sensor that measures heights, of every vertex by the pixels that are nearer to it than to others."""
 
     def __init__(self, camera: Camera, noise: DepthNoise, mesh: Mesh):
         self._camera, self._noise = camera, noise

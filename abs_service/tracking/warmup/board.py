@@ -28,10 +28,6 @@ _NOISE = GaussianPolynomial(((0.01,), (1e-4,)))
 def load_cached(noises: Mapping[str, Noise], plan: Plan) -> bool:
     """Loads kernels before the cameras are known, as for cameras without distortion; compiles none.
 
-    Args:
-        noises: noise models of the tracker's sensors, by name.
-        plan: settings of the tracker.
-
     Returns:
         False if a kernel was not in the cache.
     """

@@ -110,12 +110,6 @@ class Adjustment:
 def adjust(formulate: Formulate, start: State, groups: int, note: Callable[[str], None]) -> Adjustment:
     """State that minimises the robust cost.
 
-    Args:
-        formulate: builds the equations about a state.
-        start: initial state.
-        groups: number of groups of measurements.
-        note: called with progress messages.
-
     Raises:
         UndeterminedError: the measurements do not determine some parameters.
         NotSolvedError: no convergence, or the initial state is infeasible.

@@ -26,11 +26,7 @@ class ContradictionError(ValueError):
 
 
 def poses(seen: PoseCandidates, reference: str) -> dict[str, Pose]:
-    """Pose `T_0s` of every sensor in the frame of the reference.
-
-    Args:
-        seen: pose candidates of the sensors that detected corners, none of them empty.
-        reference: name of one of them.
+    """Pose `T_0s` of every sensor in the frame of the reference, from candidates, none of them empty.
 
     Raises:
         NotConnectedError: sensors that share no shot with the others; names them.

@@ -105,12 +105,6 @@ def camera(picture: Picture, T_rs: Pose) -> Camera:
 def frame(picture: Picture, role: Role, calib_id: str, filters: tuple[str, ...]) -> Frame:
     """Frame of an image, with device ticks and depthai's host time.
 
-    Args:
-        picture: the image.
-        role: its stream.
-        calib_id: of its camera.
-        filters: filters applied by the device.
-
     Raises:
         PictureError: a format that does not fit the stream, or too few bytes.
     """

@@ -34,9 +34,6 @@ CALIBRATION = "calibration.json"
 class OakRecording:
     """A recording of depthai.
 
-    Args:
-        path: MCAP file, or folder with MCAP files.
-
     Attributes:
         cameras: by head.
         total: number of images.

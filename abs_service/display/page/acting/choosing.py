@@ -37,14 +37,7 @@ Look = Callable[[str], Measured | None]
 
 
 class Choosing:
-    """Waits for a gesture, and asks for a detection of what it chooses.
-
-    Args:
-        gestures: of the scene.
-        look: the depth image in which the pixels are.
-        say: shows text.
-        ask: asks a tracker to detect what is chosen.
-    """
+    """Waits for a gesture, and asks for a detection of what it chooses."""
 
     def __init__(
         self, gestures: Gestures, look: Look, say: Callable[[str], None], ask: Callable[[str, Choice], None]

@@ -31,12 +31,7 @@ def unavailable(feed: Feed) -> str:
 
 
 def ask(send: Record, recording: bool) -> str:
-    """Asks the recorder to record, or to wait, and returns its answer in words.
-
-    Args:
-        send: sends the command.
-        recording: True begins with the seconds before, False ends.
-    """
+    """Asks the recorder to record, or to wait, and returns its answer in words."""
     answer = send(recording)
     if answer is None:
         return "The recorder gives no answer. Does it run?"

@@ -28,13 +28,7 @@ class _Request:
 
 
 class Reinitialization:
-    """Requests one detection at a time, and words its result.
-
-    Args:
-        feed: of the rig.
-        send: sends the command.
-        say: shows text, as Markdown.
-    """
+    """Requests one detection at a time, and words its result."""
 
     def __init__(self, feed: Feed, send: Send, say: Callable[[str], None]) -> None:
         self._feed, self._send, self._say = feed, send, say

@@ -35,11 +35,7 @@ CLUSTERS = 1024
 
 
 class DesignEffects:
-    """Design effect of every source of residuals, as a running mean over the frames.
-
-    Args:
-        mesh: the mesh, for the size of the clusters.
-    """
+    """Design effect of every source of residuals, as a running mean over the frames."""
 
     def __init__(self, mesh: Mesh):
         self._side_m = CLUSTER_SIDE * float(np.sqrt(mesh.area / len(mesh.vertices)))

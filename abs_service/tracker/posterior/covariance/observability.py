@@ -41,11 +41,6 @@ def unobserved_motion(
     With the widest motion prior, the gain G tells how much of a motion the estimate lacks: next to nothing where
     something is measured, everything where nothing is. G⁸ tells the two apart. With a narrow prior, a single frame
     shows little of any motion, and several frames show it.
-
-    Args:
-        motion: covariance of the motion between two frames.
-        optimum: the estimate of the frame.
-        prediction: its motion prior.
     """
     gain = solved(_with_widest(optimum, prediction, 1.0), prediction.minimum_precision)
     gain = gain.astype(np.float32)  # enough for a share that only tells the two apart, in half the time

@@ -31,13 +31,7 @@ class ThetaCovariance:
         self._errors.restart(covariance)
 
     def update(self, optimum: Optimum, prediction: MotionPrediction, recent: RecentMotion) -> NDArray[np.float64]:
-        """Covariance (dim, dim) of the estimate of a frame.
-
-        Args:
-            optimum: the estimate, and the cost around it.
-            prediction: the motion prior of the frame.
-            recent: the object's recent motion.
-        """
+        """Covariance (dim, dim) of the estimate of a frame."""
         inverse, linearized, sensed = optimum.inverse_curvature, optimum.linearized, optimum.sensed
         leverage = leverages(inverse, sensed)
         effects = self._effects.update(inverse, sensed, leverage)
