@@ -11,8 +11,6 @@ from pathlib import Path
 
 import abs_service
 
-_CHUNK = 1 << 20
-
 
 class DataError(Exception):
     """Data of a result that cannot be read."""
@@ -110,8 +108,5 @@ def _quoted(argument: str) -> str:
 
 
 def _sha256(path: Path) -> str:
-    digest = hashlib.sha256()
     with path.open("rb") as file:
-        while chunk := file.read(_CHUNK):
-            digest.update(chunk)
-    return digest.hexdigest()
+        return hashlib.file_digest(file, "sha256").hexdigest()

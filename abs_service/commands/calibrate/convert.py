@@ -124,7 +124,7 @@ def _chosen(contents: list[Content], options: Options) -> Content:
 def _write(out: Path, target: str, cameras: Mapping[str, Camera], arguments: argparse.Namespace) -> tuple[str, ...]:
     """Writes the file; returns descriptions of what the format cannot hold."""
     if target == exchange.OWN:
-        origin = provenance.trace(_command_line(arguments), arguments.inputs)
+        origin = provenance.trace(sys.argv[1:], arguments.inputs)
         sensors = {name: rig_file.SensorCalibration(camera) for name, camera in cameras.items()}
         name = re.sub(r"[^A-Za-z0-9_-]+", "_", out.name.partition(".")[0]) or "rig"
         rig_file.write(rig_file.RigCalibration(name, sensors, origin, "unknown"), out)
@@ -135,12 +135,3 @@ def _write(out: Path, target: str, cameras: Mapping[str, Camera], arguments: arg
     except OSError as error:
         raise ConvertError(f"{out}: cannot be written: {error.strerror}") from error
     return written.lost
-
-
-def _command_line(arguments: argparse.Namespace) -> list[str]:
-    """Command line without options that do not affect the result."""
-    options = [("--from", arguments.source), ("--size", arguments.size)]
-    options += [("--unit", arguments.unit), ("--lens", arguments.lens)]
-    options += [("--sensor", name) for name in arguments.sensor] + [("--rename", pair) for pair in arguments.rename]
-    given = [word for option, value in options if value is not None for word in (option, value)]
-    return ["calibrate", "convert", *map(str, arguments.inputs), str(arguments.out), *given]

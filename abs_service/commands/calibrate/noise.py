@@ -90,7 +90,7 @@ def run(arguments: argparse.Namespace) -> int:
         groups = _groups(arguments)
     paths = [Path(source) for source in arguments.sources if "://" not in source]
     paths += [path for path in (arguments.target, arguments.calibration) if path is not None]
-    trace = provenance.trace(["calibrate", "noise", *_command_line(arguments)], paths)
+    trace = provenance.trace(sys.argv[1:], paths)
     worst = Exit.OK
     for number, (setting, given) in enumerate(groups.items()):
         group, said = repeated.counted_once(given)
@@ -216,17 +216,6 @@ def _say(made: Report, setting: str, written: Sequence[Path], as_json: bool) -> 
             about = f"{verdict.about}: " if verdict.about else ""
             print(f"  {verdict.level!s:8} {about}{verdict.text} {verdict.advice}".rstrip())
     print(f"wrote {', '.join(map(str, written))}", file=sys.stderr if as_json else sys.stdout)
-
-
-def _command_line(arguments: argparse.Namespace) -> list[str]:
-    """Command line of these arguments."""
-    said = list(arguments.sources)
-    if not math.isnan(arguments.distance_m[0]):
-        said += ["--distance-m", *(f"{depth:g}" for depth in arguments.distance_m)]
-    for name in ("target", "calibration", "sensor", "mask", "camera", "out"):
-        if value := getattr(arguments, name):
-            said += [f"--{name}", str(value)]
-    return said + (["--box", *map(str, arguments.box)] if arguments.box else [])
 
 
 def _distance(text: str) -> float:

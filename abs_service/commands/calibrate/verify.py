@@ -78,7 +78,7 @@ def run(arguments: argparse.Namespace) -> int:
     if has_two_ways_up(target) and seen.corners:
         cameras = {name: sensor.camera for name, sensor in known.sensors.items()}
         seen = replace(seen, corners=tuple(numbered_alike(seen.corners, cameras)))
-    origin = provenance.trace(_command_line(arguments), [arguments.calibration, arguments.target, *files])
+    origin = provenance.trace(sys.argv[1:], [arguments.calibration, arguments.target, *files])
     path = arguments.report or arguments.calibration.with_name(f"{arguments.calibration.stem}-verify.html")
     try:
         report = verification.verify(known, seen, origin)
@@ -182,12 +182,3 @@ def _text(report: Report, path: Path) -> str:
         lines.append(f"{verdict.level!s:<9}{about}{verdict.text}")
         lines += [f"{'':<9}{verdict.advice}"] if verdict.advice else []
     return "\n".join([*lines, f"wrote {path}", report.wording.headlines[report.level]])
-
-
-def _command_line(arguments: argparse.Namespace) -> list[str]:
-    images = [word for one in arguments.images for word in ("--images", one)]
-    source = [] if arguments.source is None else [str(arguments.source)]
-    given = ["calibrate", "verify", str(arguments.calibration), *source, *images, "--target", str(arguments.target)]
-    pace = ["--shots", str(arguments.shots)] if live.is_live(arguments.source) else ["--every", f"{arguments.every:g}"]
-    skipped = ["--skip", skipping.text(arguments.skip)] if arguments.skip else []
-    return [*given, *pace, *skipped]
