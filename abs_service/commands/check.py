@@ -26,8 +26,7 @@ from abs_service.bus.security.mutual_tls import TlsError
 from abs_service.commands.parts import disk, preview_option, recorded_rig, rig_process
 from abs_service.commands.parts.checks import data_rates, device_checks, harmless_devices
 from abs_service.commands.parts.checks.device_checks import CheckError
-from abs_service.commands.parts.checks.harmless_devices import HarmlessError
-from abs_service.commands.parts.preview_option import PictureOptionError
+from abs_service.commands.parts.options import OptionError
 from abs_service.config import addresses, plugins
 from abs_service.config.positions import located
 from abs_service.config.problems import Key, Problem
@@ -57,7 +56,7 @@ def run(arguments: argparse.Namespace) -> int:
         toml = limited.text(arguments.config) if arguments.config else ""
         found = describe(rig, str(arguments.config or "demo.toml"), toml, arguments.replay)
         written = _draw_previews(rig, arguments) if arguments.picture else []
-    except (config.ConfigError, CheckError, HarmlessError, PictureOptionError) as error:
+    except (config.ConfigError, CheckError, OptionError) as error:
         if not arguments.json:
             raise
         print(json.dumps({"ok": False, "error": str(error)}, ensure_ascii=False))

@@ -21,6 +21,7 @@ from pathlib import Path
 
 from abs_service.bus.security import roles
 from abs_service.bus.security.mutual_tls import MutualTls
+from abs_service.commands.parts.options import OptionError
 from abs_service.supervision.exit_codes import Exit
 
 AUTHORITY = "authority"
@@ -32,10 +33,6 @@ _LEAF = "basicConstraints = critical, CA:false\nkeyUsage = critical, digitalSign
 #: The names of hosts are in that of the rig alone, so that no other one can pretend to be it.
 _RIG = _LEAF + "\nextendedKeyUsage = serverAuth, clientAuth\nsubjectAltName = {hosts}"
 _CLIENT = _LEAF + "\nextendedKeyUsage = clientAuth"
-
-
-class KeysError(Exception):
-    """Certificates that cannot be made; the message names the option or file."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -57,11 +54,11 @@ def run(arguments: argparse.Namespace) -> int:
     """Makes the folder with all of its certificates; none is left after an error."""
     out, names = arguments.out, arguments.only or roles.NAMES
     if roles.RIG in names and not arguments.host:
-        raise KeysError(f"--host: give the name of the host that listens, for the certificate of {roles.RIG}")
+        raise OptionError(f"--host: give the name of the host that listens, for the certificate of {roles.RIG}")
     if not 1 <= arguments.days <= AUTHORITY_DAYS:
-        raise KeysError(f"--days {arguments.days}: allowed are 1 to {AUTHORITY_DAYS}")
+        raise OptionError(f"--days {arguments.days}: allowed are 1 to {AUTHORITY_DAYS}")
     if out.exists():
-        raise KeysError(f"{out}: exists, and nothing is overwritten; choose another folder")
+        raise OptionError(f"{out}: exists, and nothing is overwritten; choose another folder")
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=".keys-", dir=out.parent) as temporary:
@@ -71,7 +68,7 @@ def run(arguments: argparse.Namespace) -> int:
             ends = [f"  {name}.pem, {name}.key: until {_ends(made, name)}" for name in names]
             os.rename(made, out)
     except OSError as error:
-        raise KeysError(f"{error.filename or out}: {error.strerror}") from None
+        raise OptionError(f"{error.filename or out}: {error.strerror}") from None
     print("\n".join([f"wrote {out}", *ends]))
     return Exit.OK
 
@@ -92,7 +89,7 @@ def _request(folder: Path, file: str, days: int, extensions: str, name: str, sig
     """Makes a key and its certificate.
 
     Raises:
-        KeysError: OpenSSL is not installed, or refuses.
+        OptionError: OpenSSL is not installed, or refuses.
     """
     command = ["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-noenc", "-sha256"]
     command += ["-config", "/dev/stdin", "-extensions", "extensions", "-subj", f"/CN={name}", "-days", str(days)]
@@ -101,9 +98,9 @@ def _request(folder: Path, file: str, days: int, extensions: str, name: str, sig
     try:
         done = subprocess.run(command, input=settings, capture_output=True, text=True, check=False, umask=0o077)
     except FileNotFoundError:
-        raise KeysError("the program openssl (3.0 or newer) makes the certificates, and is not installed") from None
+        raise OptionError("the program openssl (3.0 or newer) makes the certificates, and is not installed") from None
     if done.returncode:
-        raise KeysError(f"{file}.pem: openssl cannot make it: {done.stderr.strip()}")
+        raise OptionError(f"{file}.pem: openssl cannot make it: {done.stderr.strip()}")
     (folder / f"{file}.pem").chmod(0o644)
 
 
@@ -111,14 +108,14 @@ def _alternative(host: str) -> str:
     """A name or address as a subject alternative name.
 
     Raises:
-        KeysError: it is neither.
+        OptionError: it is neither.
     """
     try:
         return f"IP:{ipaddress.ip_address(host)}"
     except ValueError:
         pass
     if not re.fullmatch(r"[A-Za-z0-9-]+(\.[A-Za-z0-9-]+)*", host):
-        raise KeysError(f"--host {host}: neither a name nor an IP address")
+        raise OptionError(f"--host {host}: neither a name nor an IP address")
     return f"DNS:{host}"
 
 

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from abs_service.calibration.files import corner_file
 from abs_service.calibration.files.rig_file import Covariance
 from abs_service.commands.calibrate.inputs import calibrations, camera_files
+from abs_service.commands.parts.options import OptionError, assignments, positive, size
 from abs_service.config.problems import allowed_instead
 from abs_service.supervision.exit_codes import Exit
 from calib.camera import Camera
@@ -33,10 +34,6 @@ from calib.solve.validation.projection_difference import DifferenceError, Differ
 STEP = 2
 
 
-class CompareError(Exception):
-    """Calibrations that cannot be compared, or options that do not fit them."""
-
-
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the arguments of `abs-service calibrate compare`."""
     parser.add_argument("one", metavar="ONE", type=Path, help="calibration")
@@ -45,27 +42,25 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--pair", metavar="A=B", action="append", default=[], help="camera A of ONE is B of OTHER; repeatable"
     )
     parser.add_argument("--corners", metavar="FILE", type=Path, help="detections of boards (.corners.npz) of ONE")
-    parser.add_argument("--distance", metavar="M", type=float, default=1.0, help="of what is seen (default: 1 m)")
+    parser.add_argument("--distance", metavar="M", type=positive, default=1.0, help="of what is seen (default: 1 m)")
     parser.add_argument("--lens", choices=[opencv.BROWN_CONRADY, opencv.FISHEYE], help="kind, if a file leaves it open")
-    parser.add_argument("--size", metavar="WxH", help="size of the images, if a file does not say it")
+    parser.add_argument("--size", metavar="WxH", type=size, help="size of the images, if a file does not say it")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Compares, and prints a map of every camera."""
-    if not 0 < arguments.distance < np.inf:
-        raise CompareError(f"--distance {arguments.distance:g}: must be a number of metres above 0")
-    hints = Hints(size=camera_files.size(arguments.size), lens=arguments.lens or "")
+    hints = Hints(size=arguments.size, lens=arguments.lens or "")
     one, other = (camera_files.read(path, hints, unit="m").cameras for path in (arguments.one, arguments.other))
     corners = _corners(arguments.corners)
     found: dict[str, Any] = {}
     for name, its_name in _pairs(arguments, one, other).items():
         if arguments.corners and name not in corners:
-            raise CompareError(f"{arguments.corners}: has no corners of {name}, only of {', '.join(corners)}")
+            raise OptionError(f"{arguments.corners}: has no corners of {name}, only of {', '.join(corners)}")
         try:
             difference = projection_difference(one[name], other[its_name], arguments.distance, corners.get(name))
         except DifferenceError as error:
-            raise CompareError(f"{name}: {error}") from error
+            raise OptionError(f"{name}: {error}") from error
         stated = [(arguments.one, name, one[name]), (arguments.other, its_name, other[its_name])]
         by_chance = _chance(stated, arguments.distance, corners.get(name))
         found[name] = _described(difference, by_chance, arguments.corners is not None)
@@ -78,18 +73,18 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _pairs(arguments: argparse.Namespace, one: Mapping[str, Camera], other: Mapping[str, Camera]) -> Mapping[str, str]:
     """Names of the same camera in both."""
-    given = camera_files.pairs("--pair A=B", arguments.pair)
+    given = assignments("--pair A=B", arguments.pair)
     for name, its_name in given.items():
         for path, chosen, known in ((arguments.one, name, one), (arguments.other, its_name, other)):
             if chosen not in known:
-                raise CompareError(f"--pair {name}={its_name}: {path}: {allowed_instead(chosen, known)}")
+                raise OptionError(f"--pair {name}={its_name}: {path}: {allowed_instead(chosen, known)}")
     if given:
         return given
     if len(one) == len(other) == 1:
         return {next(iter(one)): next(iter(other))}
     if same := [name for name in one if name in other]:
         return {name: name for name in same}
-    raise CompareError(
+    raise OptionError(
         f"no camera has the same name in both: {', '.join(one)} and {', '.join(other)}; say which is which with --pair"
     )
 

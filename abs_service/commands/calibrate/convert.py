@@ -19,12 +19,12 @@ import json
 import re
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 from abs_service.bus import keys
 from abs_service.calibration.files import exchange, rig_file
 from abs_service.commands.calibrate.inputs import camera_files
+from abs_service.commands.parts.options import OptionError, assignments, size
 from abs_service.config.problems import allowed_instead
 from abs_service.report import provenance
 from abs_service.supervision.exit_codes import Exit
@@ -32,30 +32,6 @@ from calib.camera import Camera
 from calib.formats import opencv, plausibility
 from calib.formats.content import Content, Hints
 from calib.formats.resizing import resized
-
-
-class ConvertError(Exception):
-    """Options that do not fit the files."""
-
-
-@dataclass(frozen=True)
-class Options:
-    """Command-line options.
-
-    Attributes:
-        source, target: formats; None to detect them from the files.
-        sensors: sensors to write, by their new names; all if empty.
-        names: new names by old ones.
-        unit: of translations; None if it is the format's.
-        hints: values that the input omits; `hints.size` is also the size to convert cameras to.
-    """
-
-    source: str | None
-    target: str | None
-    sensors: tuple[str, ...]
-    names: Mapping[str, str]
-    unit: str | None
-    hints: Hints
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -66,7 +42,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--to", dest="target", choices=[exchange.OWN, *exchange.WRITERS], help="format of OUT")
     parser.add_argument("--sensor", metavar="NAME", action="append", default=[], help="write only this one; repeatable")
     parser.add_argument("--rename", metavar="OLD=NEW", action="append", default=[], help="call it so; repeatable")
-    parser.add_argument("--size", metavar="WxH", help="size of the images, if IN does not say it or they have another")
+    parser.add_argument(
+        "--size", metavar="WxH", type=size, help="size of the images, if IN does not say it or they have another"
+    )
     help_text = "unit of translations, if IN does not have it (default: its format's, or m)"
     parser.add_argument("--unit", choices=list(camera_files.UNITS), help=help_text)
     parser.add_argument("--lens", choices=[opencv.BROWN_CONRADY, opencv.FISHEYE], help="kind, if IN leaves it open")
@@ -77,14 +55,11 @@ def run(arguments: argparse.Namespace) -> int:
     """Converts, and reports losses."""
     out = arguments.out
     if out.exists():
-        raise ConvertError(f"{out}: exists already; choose another name or remove it")
-    hints = Hints(size=camera_files.size(arguments.size), lens=arguments.lens or "")
-    names = camera_files.pairs("--rename OLD=NEW", arguments.rename)
-    sensors = tuple(arguments.sensor)
-    options = Options(arguments.source, arguments.target, sensors, names, arguments.unit, hints)
-    read = camera_files.read_all(arguments.inputs, options.hints, options.source, options.unit)
-    content = _chosen(read, options)
-    target = options.target or exchange.of_name(out)
+        raise OptionError(f"{out}: exists already; choose another name or remove it")
+    hints = Hints(size=arguments.size, lens=arguments.lens or "")
+    read = camera_files.read_all(arguments.inputs, hints, arguments.source, arguments.unit)
+    content = _chosen(read, arguments)
+    target = arguments.target or exchange.of_name(out)
     lost = [*content.lost, *_write(out, target, content.cameras, arguments)]
     if arguments.json:
         print(json.dumps({"wrote": str(out), "format": target, "sensors": list(content.cameras), "lost": lost}))
@@ -98,27 +73,29 @@ def run(arguments: argparse.Namespace) -> int:
     return Exit.OK
 
 
-def _chosen(contents: list[Content], options: Options) -> Content:
+def _chosen(contents: list[Content], arguments: argparse.Namespace) -> Content:
     """Selected cameras of all files under their new names and in the requested size."""
+    names = assignments("--rename OLD=NEW", arguments.rename)
     cameras: dict[str, Camera] = {}
     lost: list[str] = []
     for content in contents:
         lost += content.lost
         for name, camera in content.cameras.items():
-            new = keys.check_name(options.names.get(name, re.sub(r"[^A-Za-z0-9_-]+", "_", name)))
+            new = keys.check_name(names.get(name, re.sub(r"[^A-Za-z0-9_-]+", "_", name)))
             if new in cameras:
-                raise ConvertError(f'two cameras are called "{new}"; give one another name with --rename')
+                raise OptionError(f'two cameras are called "{new}"; give one another name with --rename')
             cameras[new] = camera
     there = [name for content in contents for name in content.cameras]
-    unknown = [name for name in options.names if name not in there]
+    unknown = [name for name in names if name not in there]
     if unknown:
-        raise ConvertError(f"--rename {unknown[0]}: no such sensor, {allowed_instead(unknown[0], there)}")
-    unknown = [name for name in options.sensors if name not in cameras]
+        raise OptionError(f"--rename {unknown[0]}: no such sensor, {allowed_instead(unknown[0], there)}")
+    unknown = [name for name in arguments.sensor if name not in cameras]
     if unknown:
-        raise ConvertError(f"--sensor {unknown[0]}: no such sensor, {allowed_instead(unknown[0], cameras)}")
-    wanted = options.sensors or tuple(cameras)
-    size = options.hints.size
-    return Content({name: resized(cameras[name], *size) if size else cameras[name] for name in wanted}, tuple(lost))
+        raise OptionError(f"--sensor {unknown[0]}: no such sensor, {allowed_instead(unknown[0], cameras)}")
+    chosen = {name: cameras[name] for name in arguments.sensor or cameras}
+    if arguments.size:
+        chosen = {name: resized(camera, *arguments.size) for name, camera in chosen.items()}
+    return Content(chosen, tuple(lost))
 
 
 def _write(out: Path, target: str, cameras: Mapping[str, Camera], arguments: argparse.Namespace) -> tuple[str, ...]:
@@ -133,5 +110,5 @@ def _write(out: Path, target: str, cameras: Mapping[str, Camera], arguments: arg
     try:
         out.write_text(written.text, encoding="utf-8")
     except OSError as error:
-        raise ConvertError(f"{out}: cannot be written: {error.strerror}") from error
+        raise OptionError(f"{out}: cannot be written: {error.strerror}") from error
     return written.lost

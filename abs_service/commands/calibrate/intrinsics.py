@@ -17,7 +17,8 @@ from dataclasses import replace
 
 from abs_service.commands.calibrate import solving
 from abs_service.commands.calibrate.inputs import material
-from abs_service.commands.calibrate.inputs.material import Material, SolveOptionError
+from abs_service.commands.calibrate.inputs.material import Material
+from abs_service.commands.parts.options import OptionError
 from abs_service.config.problems import allowed_instead
 from calib.solve.bundle.tasks import Task
 
@@ -54,5 +55,5 @@ def _sensor(wanted: str | None, found: Material) -> str:
         return there[0]
     if wanted not in there:
         why = "boards were seen by several" if wanted is None else "no sensor that saw the board"
-        raise SolveOptionError(f"--sensor {wanted or 'NAME'}: {why}, {allowed_instead(wanted or '', there)}")
+        raise OptionError(f"--sensor {wanted or 'NAME'}: {why}, {allowed_instead(wanted or '', there)}")
     return wanted

@@ -39,6 +39,7 @@ from abs_service.calibration.noise import board_poses, measurement, repeated, re
 from abs_service.calibration.shots import sequences
 from abs_service.commands.calibrate.inputs import calibrations
 from abs_service.commands.images import camera_file
+from abs_service.commands.parts.options import OptionError, number
 from abs_service.config import plugins
 from abs_service.report import page, provenance
 from abs_service.report.content import Level, Report, to_json
@@ -58,15 +59,12 @@ SEED = 0
 DEPTH_SCALE = 0.001
 
 
-class NoiseOptionError(Exception):
-    """Incompatible options."""
-
-
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the arguments of `abs-service calibrate noise`."""
     parser.add_argument("sources", metavar="SOURCE", nargs="+", help="recording, folder of images or device address")
     parser.add_argument(
-        "--distance-m", metavar="M", nargs="+", type=_distance, default=[math.nan],
+        "--distance-m", metavar="M", nargs="+", default=[math.nan],
+        type=number(0.01, 1000, "a distance in metres, such as 1.2"),
         help="from the sensor to the target along the optical axis: one for all sources, or one for each",
     )  # fmt: skip
     parser.add_argument("--target", metavar="FILE", type=Path, help="board that tells its own distance, TOML")
@@ -92,7 +90,7 @@ def run(arguments: argparse.Namespace) -> int:
     paths += [path for path in (arguments.target, arguments.calibration) if path is not None]
     trace = provenance.trace(sys.argv[1:], paths)
     worst = Exit.OK
-    for number, (setting, given) in enumerate(groups.items()):
+    for index, (setting, given) in enumerate(groups.items()):
         group, said = repeated.counted_once(given)
         with console.status("learning") as status:
             found = measurement.calibrate(
@@ -103,7 +101,7 @@ def run(arguments: argparse.Namespace) -> int:
                 status.update,
             )
         sensor = group[0][0].sensor
-        out = _out(arguments.out, sensor, number)
+        out = _out(arguments.out, sensor, index)
         made = report.report(
             sensor, found, tuple(c for one, _ in group for c in sigma_consistency.of_sequence(one)), trace, said
         )
@@ -118,7 +116,7 @@ def _groups(arguments: argparse.Namespace) -> dict[str, list[tuple[sequences.Seq
     """Sequences of all sources by exposure setting, each with its target."""
     depths = _depths(arguments.distance_m, len(arguments.sources))
     if arguments.target is not None and not math.isnan(depths[0]):
-        raise NoiseOptionError("--target, --distance-m: give only one of them; a board tells its own distance")
+        raise OptionError("--target, --distance-m: give only one of them; a board tells its own distance")
     target = None if arguments.target is None else target_file.read(arguments.target)
     cameras = _cameras(arguments.calibration)
     groups: dict[str, list[tuple[sequences.Sequence, float | StaticBoard]]] = {}
@@ -132,7 +130,7 @@ def _groups(arguments: argparse.Namespace) -> dict[str, list[tuple[sequences.Seq
 
 def _depths(given: Sequence[float], sources: int) -> list[float]:
     if len(given) not in (1, sources):
-        raise NoiseOptionError(f"--distance-m: {len(given)} distances for {sources} sources; give one, or one for each")
+        raise OptionError(f"--distance-m: {len(given)} distances for {sources} sources; give one, or one for each")
     return list(given) if len(given) == sources else list(given) * sources
 
 
@@ -143,14 +141,14 @@ def _cameras(path: Path | None) -> dict[str, Camera]:
 
 def _read(source: str, arguments: argparse.Namespace) -> list[sequences.Sequence]:
     if arguments.frames < 2:
-        raise NoiseOptionError(f"--frames {arguments.frames}: must be 2 at least")
+        raise OptionError(f"--frames {arguments.frames}: must be 2 at least")
     path = Path(source)
     if "://" in source:
         return sequences.of_device(source, arguments.sensor, arguments.frames, time.monotonic_ns)
     if not path.is_dir():
         return sequences.of_recording(path, arguments.sensor, arguments.frames)
     if arguments.camera is None:
-        raise NoiseOptionError(f"{source}: --camera has to say which camera took the images of a folder")
+        raise OptionError(f"{source}: --camera has to say which camera took the images of a folder")
     depth = camera_file.load(arguments.camera).depth
     images = DepthImages(
         by_number(path, arguments.depth, 30.0, alone=True), depth.camera(), depth.depth_scale or DEPTH_SCALE,
@@ -171,10 +169,10 @@ def _region(arguments: argparse.Namespace, shape: Sequence[int]) -> NDArray[np.b
     if arguments.mask is not None:
         mask = load_mask(arguments.mask, "--mask")
         if mask.shape != (height, width):
-            raise NoiseOptionError(f"--mask {arguments.mask}: must be an image of {width} × {height} pixels")
+            raise OptionError(f"--mask {arguments.mask}: must be an image of {width} × {height} pixels")
         region &= mask
     if not region.any():
-        raise NoiseOptionError(f"--box, --mask: they leave nothing of the image of {width} × {height} pixels")
+        raise OptionError(f"--box, --mask: they leave nothing of the image of {width} × {height} pixels")
     return region
 
 
@@ -195,15 +193,15 @@ def _write_model(found: measurement.NoiseCalibration, sensor: str, out: Path, le
             text += "\n" + toml_text.table(("sensors", sensor, "no_return"), plugins.plain(found.missing.law))
         toml.write_text(text, encoding="utf-8")
     except OSError as error:
-        raise NoiseOptionError(f"--out {out}: cannot be written: {error.strerror}") from error
+        raise OptionError(f"--out {out}: cannot be written: {error.strerror}") from error
     return [toml, *written]
 
 
-def _out(given: Path | None, sensor: str, number: int) -> Path:
+def _out(given: Path | None, sensor: str, index: int) -> Path:
     """Output path without suffix, numbered from the second exposure setting on."""
     out = given or Path(f"noise-{sensor}")
     # The suffix is appended and never replaced: noise-1.2 is a name.
-    name = f"{out.name}-{number + 1}" if number else out.name
+    name = f"{out.name}-{index + 1}" if index else out.name
     return out.with_name(f"{name}.x")
 
 
@@ -216,13 +214,3 @@ def _say(made: Report, setting: str, written: Sequence[Path], as_json: bool) -> 
             about = f"{verdict.about}: " if verdict.about else ""
             print(f"  {verdict.level!s:8} {about}{verdict.text} {verdict.advice}".rstrip())
     print(f"wrote {', '.join(map(str, written))}", file=sys.stderr if as_json else sys.stdout)
-
-
-def _distance(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not 0.01 <= value <= 1000:
-        raise argparse.ArgumentTypeError(f"{text!r} must be a distance in metres, such as 1.2")
-    return value

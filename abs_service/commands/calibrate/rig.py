@@ -25,7 +25,8 @@ from collections.abc import Iterable
 from abs_service.calibration.files import target_file
 from abs_service.commands.calibrate import solving
 from abs_service.commands.calibrate.inputs import material
-from abs_service.commands.calibrate.inputs.material import Material, SolveOptionError
+from abs_service.commands.calibrate.inputs.material import Material
+from abs_service.commands.parts.options import OptionError, assignments
 from abs_service.config.problems import allowed_instead
 from calib.board.target import has_two_ways_up
 from calib.solve.bundle.tasks import Task
@@ -60,7 +61,7 @@ def _solve(arguments: argparse.Namespace) -> int:
     """Solves the rig."""
     found = material.material(arguments)
     there = [name for name in found.seen.sizes if any(view.sensor == name for view in _views(found))]
-    terms = material.named(arguments.depth_terms, "--depth-terms")
+    terms = assignments("--depth-terms NAME=TERMS", arguments.depth_terms)
     for option, names in (
         ("--keep", arguments.keep),
         ("--fixed-pose", arguments.fixed_pose),
@@ -71,7 +72,7 @@ def _solve(arguments: argparse.Namespace) -> int:
         _check_names(option, names, there)
     for name, term in terms.items():
         if term not in TERMS:
-            raise SolveOptionError(f"--depth-terms {name}={term}: {allowed_instead(term, TERMS)}")
+            raise OptionError(f"--depth-terms {name}={term}: {allowed_instead(term, TERMS)}")
     with_corners = {view.sensor for view in found.seen.corners}
     sensors = {
         name: solving.sensor_task(
@@ -98,7 +99,7 @@ def _views(found: Material) -> list:
 def _check_names(option: str, names: Iterable[str], there: list[str]) -> None:
     for name in names:
         if name not in there:
-            raise SolveOptionError(f"{option} {name}: no sensor that saw the board, {allowed_instead(name, there)}")
+            raise OptionError(f"{option} {name}: no sensor that saw the board, {allowed_instead(name, there)}")
 
 
 def _reference(found: Material, there: list[str], free_running: list[str]) -> str:
@@ -106,5 +107,5 @@ def _reference(found: Material, there: list[str], free_running: list[str]) -> st
     measured = [view.sensor for view in found.seen.planes]
     able = [name for name in there if name not in free_running]
     if not able:
-        raise SolveOptionError("--free-running: at least one sensor has to keep the time")
+        raise OptionError("--free-running: at least one sensor has to keep the time")
     return next((name for name in able if name in measured), able[0])

@@ -7,14 +7,15 @@ import math
 import re
 import sys
 from collections.abc import Collection, Iterable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
 from abs_service.calibration.cameras import report
 from abs_service.calibration.files import rig_file
 from abs_service.commands.calibrate.inputs import skipping
-from abs_service.commands.calibrate.inputs.material import Material, SolveOptionError, UnusableImagesError, named, say
+from abs_service.commands.calibrate.inputs.material import Material, UnusableImagesError, say
+from abs_service.commands.parts.options import OptionError, assignments, positive
 from abs_service.config.problems import allowed_instead
 from abs_service.report import page, provenance
 from abs_service.report.content import Level, Report, Verdict
@@ -66,12 +67,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--shots", metavar="N", type=int, default=30, help="different views to wait for, live (%(default)d)"
     )
     parser.add_argument(
-        "--distance", metavar="M", type=_positive, help="of what will be looked at (default: where the boards were)"
+        "--distance", metavar="M", type=positive, help="of what will be looked at (default: where the boards were)"
     )
     parser.add_argument(
         "--needed",
         metavar="PX",
-        type=_positive,
+        type=positive,
         default=1.0,
         help="how well projections have to be known (%(default)g)",
     )
@@ -101,34 +102,26 @@ def _add_sources(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--target", metavar="FILE", type=Path, required=True, help="description of the board, TOML")
 
 
-def _positive(text: str) -> float:
-    """A number above 0, of an option."""
-    with suppress(ValueError):
-        if 0 < float(text) < math.inf:
-            return float(text)
-    raise argparse.ArgumentTypeError(f"{text!r} must be a number above 0")
-
-
 def sensor_task(name: str, arguments: argparse.Namespace, found: Material, keeps: bool, **terms: object) -> SensorTask:
     """Task of one sensor, from its image size, previous calibration and options.
 
     Raises:
-        SolveOptionError: fixed intrinsics that are unknown, or no such kind of lens.
+        OptionError: fixed intrinsics that are unknown, or no such kind of lens.
     """
     size = found.seen.sizes[name]
     factory = (replace(found.known[name].camera),) if name in found.known else ()
-    lenses = named(arguments.lens, "--lens")
+    lenses = assignments("--lens NAME=KIND", arguments.lens)
     for other in lenses:
         if other not in found.seen.sizes:
             allowed = allowed_instead(other, found.seen.sizes)
-            raise SolveOptionError(f"--lens {other}={lenses[other]}: no sensor that saw the board, {allowed}")
+            raise OptionError(f"--lens {other}={lenses[other]}: no sensor that saw the board, {allowed}")
     kind = lenses.get(name, kind_of(factory[0].lens).name if factory else "brown-conrady")
     if kind not in KINDS:
-        raise SolveOptionError(f"--lens {name}={kind}: {allowed_instead(kind, KINDS)}")
+        raise OptionError(f"--lens {name}={kind}: {allowed_instead(kind, KINDS)}")
     if factory and name in lenses and kind_of(factory[0].lens).make is not KINDS[kind].make and not keeps:
         factory = ()  # of another lens family: no initial values
     if keeps and not factory:
-        raise SolveOptionError(f"{name}: nothing is known of its intrinsics, so they cannot be kept; see --start")
+        raise OptionError(f"{name}: nothing is known of its intrinsics, so they cannot be kept; see --start")
     fixed = _fixed(name, arguments.fix, KINDS[kind], found.seen.sizes)
     return SensorTask(*size, KINDS[kind], factory, keeps, fixed=fixed, **terms)  # pyright: ignore[reportArgumentType]
 
@@ -139,10 +132,10 @@ def _fixed(name: str, options: Iterable[str], kind: LensKind, sensors: Collectio
     for text in options:
         whose, _, parameters = text.rpartition("=")
         if whose and whose not in sensors:
-            raise SolveOptionError(f"--fix {text}: no sensor that saw the board, {allowed_instead(whose, sensors)}")
+            raise OptionError(f"--fix {text}: no sensor that saw the board, {allowed_instead(whose, sensors)}")
         for parameter in parameters.split(",") if whose in ("", name) else ():
             if parameter not in kind.fixable:
-                raise SolveOptionError(f"--fix {text}: {allowed_instead(parameter, kind.fixable)}")
+                raise OptionError(f"--fix {text}: {allowed_instead(parameter, kind.fixable)}")
             found[parameter] = None
     return tuple(found)
 
@@ -150,7 +143,7 @@ def _fixed(name: str, options: Iterable[str], kind: LensKind, sensors: Collectio
 def finish(title: str, task: Task, arguments: argparse.Namespace, found: Material) -> int:
     """Solves, cross-validates, writes calibration and report, and prints the verdict."""
     if unknown := sorted(arguments.half - {*task.shots}):
-        raise SolveOptionError(f"--half {skipping.text(arguments.half)}: no shot {unknown[0]} shows the board")
+        raise OptionError(f"--half {skipping.text(arguments.half)}: no shot {unknown[0]} shows the board")
     solution = calibrate(task, say)
     distance = arguments.distance or _middle_distance(solution.task.reference, solution)
     assessment = with_kept(

@@ -21,6 +21,7 @@ from dataclasses import fields, replace
 from pathlib import Path
 
 from abs_service.calibration.files import board_sheet, target_file
+from abs_service.commands.parts.options import OptionError
 from abs_service.supervision.exit_codes import Exit
 from calib.board.april_grid import AprilGrid
 from calib.board.target import AsymmetricCircles, Charuco, Chessboard, Circles, Target, outline
@@ -51,10 +52,6 @@ _BOARD = {
 }
 
 
-class TargetOptionError(ValueError):
-    """Invalid options for a board, or one that does not fit on the paper."""
-
-
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the arguments of `abs-service calibrate target`."""
     parser.add_argument(
@@ -83,7 +80,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Writes the page and the description."""
     if arguments.out.suffix not in (".pdf", ".svg"):
-        raise TargetOptionError(f"--out = {arguments.out}: must end in .pdf or .svg")
+        raise OptionError(f"--out = {arguments.out}: must end in .pdf or .svg")
     target = _target(arguments)
     width, height = sorted(arguments.paper, reverse=_is_wide(target))
     page = board_sheet.lay_out(target, width, height, _words(target))
@@ -106,7 +103,7 @@ def _target(arguments: argparse.Namespace) -> Target:
     given = {name: getattr(arguments, name) for name in (*_BOARD, "dictionary") if getattr(arguments, name) is not None}
     for name, value in given.items():
         if name not in allowed:
-            raise TargetOptionError(f"--{_option(name)} = {value}: means nothing for {arguments.kind}")
+            raise OptionError(f"--{_option(name)} = {value}: means nothing for {arguments.kind}")
     changed = {name: value * 1e-3 if isinstance(value, float) else value for name, value in given.items()}
     # Markers, discs and gaps scale with squares, spacing and tags unless given explicitly.
     for part, whole in (("marker", "square"), ("diameter", "spacing"), ("gap", "tag")):
@@ -116,7 +113,7 @@ def _target(arguments: argparse.Namespace) -> Target:
         return replace(default, **changed)
     except TargetError as error:
         name = str(error).partition(":")[0]
-        raise TargetOptionError(f"--{_option(name)}: {str(error).partition(': ')[2]}") from error
+        raise OptionError(f"--{_option(name)}: {str(error).partition(': ')[2]}") from error
 
 
 def _option(name: str) -> str:

@@ -30,6 +30,7 @@ from abs_service.calibration.shots.shots import Shot
 from abs_service.commands.calibrate.inputs import calibrations, live, skipping
 from abs_service.commands.calibrate.inputs.material import UnusableImagesError
 from abs_service.commands.parts import rig_process
+from abs_service.commands.parts.options import OptionError, assignments
 from abs_service.config.problems import allowed_instead
 from abs_service.report import page, provenance
 from abs_service.report.content import Level, Report, Verdict, to_json
@@ -37,10 +38,6 @@ from calib.board.target import Target, has_two_ways_up
 from calib.camera import Camera
 from calib.solve.start.half_turns import numbered_alike
 from drivers.replay import Recording
-
-
-class VerifyOptionError(Exception):
-    """Incompatible options."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -95,16 +92,14 @@ def run(arguments: argparse.Namespace) -> int:
 def _look(arguments: argparse.Namespace, target: Target, known: RigCalibration) -> tuple[BoardObservations, list[Path]]:
     """Observations of the board, and their source files."""
     if (arguments.source is None) == (not arguments.images):
-        raise VerifyOptionError("give either a recording or a rig as SOURCE, or --images NAME=GLOB for each sensor")
+        raise OptionError("give either a recording or a rig as SOURCE, or --images NAME=GLOB for each sensor")
     cameras = {name: sensor.camera for name, sensor in known.sensors.items()}
     if arguments.images:
-        patterns = dict(one.partition("=")[::2] for one in arguments.images)
-        if not all(patterns.values()):
-            raise VerifyOptionError(f"--images {' '.join(arguments.images)}: each must be NAME=GLOB")
+        patterns = assignments("--images NAME=GLOB", arguments.images)
         for name, pattern in patterns.items():
             if name not in cameras:
                 reason = f"{arguments.calibration} has no such sensor, {allowed_instead(name, cameras)}"
-                raise VerifyOptionError(f"--images {name}={pattern}: {reason}")
+                raise OptionError(f"--images {name}={pattern}: {reason}")
         folders = [*dict.fromkeys(Path(pattern).parent for pattern in patterns.values())]
         return _see_all(arguments, target, FolderShots(patterns), cameras), folders
     if corner_file.is_corner_file(arguments.source):
@@ -120,7 +115,7 @@ def _saved(arguments: argparse.Namespace, target: Target, cameras: Mapping[str, 
     seen = corner_file.read(arguments.source, target)
     for name, size in seen.sizes.items():
         if name in cameras and size != (stored := (cameras[name].width, cameras[name].height)):
-            raise VerifyOptionError(
+            raise OptionError(
                 f"{arguments.source}: images of {name} have {size[0]} × {size[1]} pixels, but its camera in "
                 f"{arguments.calibration} is for {stored[0]} × {stored[1]}"
             )
@@ -148,12 +143,12 @@ def _see_all(
 def _see_live(arguments: argparse.Namespace, target: Target, cameras: Mapping[str, Camera]) -> BoardObservations:
     """Observations in distinct shots of running devices, until sufficient or interrupted by a signal."""
     if arguments.shots < 1:
-        raise VerifyOptionError(f"--shots {arguments.shots}: must be 1 at least")
+        raise OptionError(f"--shots {arguments.shots}: must be 1 at least")
     stop = rig_process.stop_on_signals()
     seen = BoardObservations()
     with live.streaming(arguments.source, cameras, stop.is_set) as (shots, there):
         if not set(there) & set(cameras):
-            raise VerifyOptionError(
+            raise OptionError(
                 f"{arguments.source}: {', '.join(there)}: none of its sensors is one of "
                 f"{arguments.calibration}: {', '.join(cameras)}"
             )

@@ -43,7 +43,6 @@ colour images:
 """
 
 import argparse
-import math
 import shlex
 import sys
 from collections.abc import Mapping, Sequence
@@ -51,6 +50,7 @@ from pathlib import Path
 
 from abs_service.commands.images import camera_file, frame_numbers, import_file, open3d_folder
 from abs_service.commands.images.camera_file import CameraFile
+from abs_service.commands.parts.options import OptionError, number
 from abs_service.supervision.exit_codes import Exit
 from calib.files import limited, nested
 from drivers.contract.frame import Geometry
@@ -78,10 +78,6 @@ OPTIONS = {
 RATE_HZ = 30.0
 
 
-class ImportOptionError(Exception):
-    """Options that do not go together, or a file that they name and that cannot be used."""
-
-
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the arguments of `abs-service import`."""
     parser.add_argument("path", type=Path, metavar="PATH", help="folder with the images, or file")
@@ -97,7 +93,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--mask", metavar="GLOB", help="images, black or transparent where depth is left out (pairs)")
     parser.add_argument(
         "--rate",
-        type=_rate,
+        type=number(0.001, 10_000, "a number from 0.001 to 10000"),
         metavar="HZ",
         help=f"exposures per second (pairs, open3d: {RATE_HZ:g}; sens: default is the file's time stamps)",
     )
@@ -117,13 +113,13 @@ def run(arguments: argparse.Namespace) -> int:
     rig_toml = _rig(arguments.rig)
     foreign_recording = _foreign_recording(arguments)
     if arguments.out.exists():
-        raise ImportOptionError(f"{arguments.out}: exists already; remove it or choose another name")
+        raise OptionError(f"{arguments.out}: exists already; remove it or choose another name")
     partial = arguments.out.with_name(f"{arguments.out.name}.partial")
     try:
         counts = import_file.write(partial, arguments.path.resolve().stem, foreign_recording, rig_toml)
         partial.rename(arguments.out)
     except OSError as error:
-        raise ImportOptionError(f"{arguments.out}: cannot be written: {error.strerror}") from error
+        raise OptionError(f"{arguments.out}: cannot be written: {error.strerror}") from error
     finally:
         partial.unlink(missing_ok=True)
     names = (
@@ -140,7 +136,7 @@ def _check_options(arguments: argparse.Namespace) -> None:
     for option in OPTIONS["pairs"]:
         if option not in own and getattr(arguments, option) not in (None, frame_numbers.ALL):
             allowed = ", ".join(f"--{name}" for name in own) or "no options but --out and --rig"
-            raise ImportOptionError(f"--{option}: layout {arguments.layout} takes {allowed}")
+            raise OptionError(f"--{option}: layout {arguments.layout} takes {allowed}")
 
 
 def _foreign_recording(arguments: argparse.Namespace) -> ForeignRecording:
@@ -167,7 +163,7 @@ def _cameras(arguments: argparse.Namespace) -> CameraFile:
         return camera_file.TUM
     if arguments.layout == "open3d":
         return open3d_folder.load(arguments.path)
-    raise ImportOptionError("--camera: layout pairs needs a camera file; `abs-service import --help` shows one")
+    raise OptionError("--camera: layout pairs needs a camera file; `abs-service import --help` shows one")
 
 
 def _rig(path: Path | None) -> bytes:
@@ -178,9 +174,9 @@ def _rig(path: Path | None) -> bytes:
         text = limited.text(path)
         nested.toml(text)
     except OSError as error:
-        raise ImportOptionError(f"{path}: cannot be read: {error.strerror}") from error
+        raise OptionError(f"{path}: cannot be read: {error.strerror}") from error
     except ValueError as error:
-        raise ImportOptionError(f"{path}: not TOML: {error}") from error
+        raise OptionError(f"{path}: not TOML: {error}") from error
     return text.encode()
 
 
@@ -206,7 +202,7 @@ def _streams(arguments: argparse.Namespace, cameras: CameraFile) -> Mapping[str,
     }
     if cameras.color is None:
         if arguments.color is not None:
-            raise ImportOptionError(f"--color: {arguments.camera} has no table color that describes the colour camera")
+            raise OptionError(f"--color: {arguments.camera} has no table color that describes the colour camera")
     else:
         colors = by_number(folder, color_names, rate) if numbered else by_list(folder, "rgb.txt")
         if numbered:
@@ -226,13 +222,3 @@ def _masks(depth: Sequence[ImageFile], folder: Path, pattern: str | None, rate_h
         if file.seq not in masks:
             raise ImageFolderError(f"{file.path}: no mask that matches {pattern!r} has the number {file.seq}")
     return masks
-
-
-def _rate(text: str) -> float:
-    try:
-        rate = float(text)
-    except ValueError:
-        rate = math.nan
-    if not 0.001 <= rate <= 10_000:
-        raise argparse.ArgumentTypeError(f"{text!r} must be a number from 0.001 to 10000")
-    return rate

@@ -17,6 +17,7 @@ from pathlib import Path
 from abs_service.bus import keys
 from abs_service.commands.new import recorded, rig_text
 from abs_service.commands.new.rig_text import BEHIND, DEVICES, OBJECTS, Answers, Device
+from abs_service.commands.parts.options import OptionError
 from abs_service.config.problems import allowed_instead
 from abs_service.supervision.exit_codes import Exit
 from drivers import opening
@@ -28,10 +29,6 @@ DISCOVERY_S = 2.0
 RECORDED = {"recording": "nothing: a recording, such as `abs-service import` makes"}
 #: Sides of the simulated sheet [m].
 SIMULATED_SIZE = (0.3, 0.2)
-
-
-class NewFileError(Exception):
-    """A rig file that cannot be written, or an answer that is missing or impossible."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -65,7 +62,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Asks for missing options, and writes the file."""
     file: Path = arguments.file
     if file.exists() and not arguments.force:
-        raise NewFileError(f"{file}: exists already; choose another name, or replace it with --force")
+        raise OptionError(f"{file}: exists already; choose another name, or replace it with --force")
     name = keys.check_name(arguments.name or file.name.partition(".")[0])
     if sys.stdin.isatty() and sys.stdout.isatty():
         found = opening.discover(DISCOVERY_S) if arguments.device is None else []
@@ -75,7 +72,7 @@ def run(arguments: argparse.Namespace) -> int:
     try:
         file.write_text(rig_text.write(answers, str(file)), encoding="utf-8")
     except OSError as error:
-        raise NewFileError(f"{file}: cannot be written: {error.strerror}") from None
+        raise OptionError(f"{file}: cannot be written: {error.strerror}") from None
     if answers.device.note:
         print(answers.device.note)
     print(f"wrote {file}; next:", *rig_text.commands(answers.device, str(file)), sep="\n  ")
@@ -96,7 +93,7 @@ def answered(arguments: argparse.Namespace, name: str, found: list[Found], ask: 
         ask: asks a question.
 
     Raises:
-        NewFileError: an answer that is impossible.
+        OptionError: an answer that is impossible.
         RecordingError: a recording that cannot be used.
     """
     device, uri = _device(arguments, found, ask)
@@ -107,11 +104,11 @@ def answered(arguments: argparse.Namespace, name: str, found: list[Found], ask: 
         if not all(0 < side < 100 for side in size):
             sides = f"{size[0]:g} {size[1]:g}"
             smaller = f"; did you mean {size[0] / 1000:g} {size[1] / 1000:g}?" if min(size) >= 1 else ""
-            raise NewFileError(f"--size {sides}: sides are lengths in metres, above 0 and less than 100{smaller}")
+            raise OptionError(f"--size {sides}: sides are lengths in metres, above 0 and less than 100{smaller}")
     color = arguments.color
     if device.color is None:
         if color:
-            raise NewFileError(f"--color: {device.text} has no colour camera")
+            raise OptionError(f"--color: {device.text} has no colour camera")
     elif color is None:
         color = ask("color", "Is its colour camera used, too?", {"yes": "print and edges", "no": "distances"}) == "yes"
     behind = arguments.behind or ask("behind", "What is behind the object?", BEHIND)
@@ -124,7 +121,7 @@ def _device(arguments: argparse.Namespace, found: list[Found], ask: Ask) -> tupl
     kind, uri = arguments.device, arguments.uri or ""
     if arguments.recording is not None:
         if kind or uri:
-            raise NewFileError("--recording: the file takes the place of a device; leave out --device and --uri")
+            raise OptionError("--recording: the file takes the place of a device; leave out --device and --uri")
         return recorded.device(arguments.recording), ""
     if kind is None:
         attached = {one.info.uri: one.info.model for one in found if device_of(one)}
@@ -137,7 +134,7 @@ def _device(arguments: argparse.Namespace, found: list[Found], ask: Ask) -> tupl
     scheme = DEVICES[kind].uri.partition(":")[0]
     if uri:
         if not uri.startswith(f"{scheme}:"):
-            raise NewFileError(f"--uri {uri}: the address of a device {kind} begins with {scheme}://")
+            raise OptionError(f"--uri {uri}: the address of a device {kind} begins with {scheme}://")
         opening.check_address(uri)
     return DEVICES[kind], uri
 
@@ -156,7 +153,7 @@ def _size(text: str) -> tuple[float, float]:
     try:
         width, height = map(float, text.replace(",", " ").split())
     except ValueError:
-        raise NewFileError(f'"{text}": the size is two numbers in metres, such as 0.297 0.21') from None
+        raise OptionError(f'"{text}": the size is two numbers in metres, such as 0.297 0.21') from None
     return width, height
 
 
@@ -164,7 +161,7 @@ def _answered_by_options(arguments: argparse.Namespace, name: str) -> Answers:
     """The description by the options alone.
 
     Raises:
-        NewFileError: also if options are missing; names all of them.
+        OptionError: also if options are missing; names all of them.
     """
     missing: list[str] = []
     described = {
@@ -179,7 +176,7 @@ def _answered_by_options(arguments: argparse.Namespace, name: str) -> Answers:
 
     answers = answered(arguments, name, [], note)
     if missing:
-        raise NewFileError("\n  ".join(["options are missing, and nobody is there to be asked:", *missing]))
+        raise OptionError("\n  ".join(["options are missing, and nobody is there to be asked:", *missing]))
     return answers
 
 

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from abs_service import config, wiring
+from abs_service.commands.parts.options import OptionError
 from abs_service.display.pictures import preview_picture
 from abs_service.tracking.preview import PreviewError, preview
 from calib.rig import Rig
@@ -16,10 +17,6 @@ SUFFIXES = (".png", ".svg", ".pdf")
 
 #: The rig of a tracker, and its frame sets in order of time.
 Source = tuple[Rig, Iterable[FrameSet]]
-
-
-class PictureOptionError(Exception):
-    """A picture that cannot be drawn or written."""
 
 
 def add_argument(parser: argparse.ArgumentParser) -> None:
@@ -36,10 +33,10 @@ def check(path: Path) -> None:
     """Refuses a path without the suffix of a format.
 
     Raises:
-        PictureOptionError: its suffix is none of `SUFFIXES`.
+        OptionError: its suffix is none of `SUFFIXES`.
     """
     if path.suffix not in SUFFIXES:
-        raise PictureOptionError(f"--picture {path}: its suffix must be one of {', '.join(SUFFIXES)}")
+        raise OptionError(f"--picture {path}: its suffix must be one of {', '.join(SUFFIXES)}")
 
 
 def draw(settings: config.ServiceConfig, name: str, path: Path, source: Source) -> str:
@@ -49,16 +46,16 @@ def draw(settings: config.ServiceConfig, name: str, path: Path, source: Source) 
         A line about the written file.
 
     Raises:
-        PictureOptionError: there is no depth image, or the file cannot be written.
+        OptionError: there is no depth image, or the file cannot be written.
     """
     own = path if len(settings.trackers) == 1 else path.with_name(f"{path.stem}-{name}{path.suffix}")
     try:
         seen = preview(source[1], source[0], wiring.plan(settings, name))
         preview_picture.draw(seen, name, wiring.model_name(settings, name), own)
     except PreviewError as error:
-        raise PictureOptionError(f"--picture {own}: {error}") from None
+        raise OptionError(f"--picture {own}: {error}") from None
     except OSError as error:
-        raise PictureOptionError(f"--picture {own}: cannot be written: {error.strerror}") from None
+        raise OptionError(f"--picture {own}: cannot be written: {error.strerror}") from None
     if seen.found is None:
         print(f"abs-service: note: {name} finds nothing to track: {seen.reason}", file=sys.stderr)
     for doubt in seen.warnings:

@@ -1,6 +1,7 @@
 """Common parts of the processes of a rig: arguments, bus session, signals."""
 
 import argparse
+import math
 import os
 import signal
 import threading
@@ -17,6 +18,7 @@ from abs_service.bus.security.mutual_tls import TlsError
 from abs_service.bus.session import SessionMode
 from abs_service.bus.zenoh_bus import ZenohBus
 from abs_service.commands.parts.log import library_output, logs
+from abs_service.commands.parts.options import number
 from abs_service.supervision.process_setup import process_tuning
 from abs_service.wire.checked_bus import CheckedBus
 
@@ -31,18 +33,8 @@ class SecurityError(Exception):
 
 
 def seconds(text: str) -> float:
-    """Reads a time from 0 to `LONGEST_S` [s]; the type of an argument.
-
-    Raises:
-        argparse.ArgumentTypeError: it is none.
-    """
-    try:
-        value = float(text)
-    except ValueError:
-        value = -1.0
-    if not value >= 0:
-        raise argparse.ArgumentTypeError(f"{text!r} must be a number of seconds, 0 or more")
-    return min(value, LONGEST_S)
+    """Type of an argument: a time of 0 or more, cut at `LONGEST_S` [s]."""
+    return min(number(0.0, math.inf, "a number of seconds, 0 or more")(text), LONGEST_S)
 
 
 def add_config(parser: argparse.ArgumentParser, what: str = "TOML file of the rig") -> None:

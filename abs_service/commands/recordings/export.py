@@ -23,6 +23,7 @@ from abs_service.api.checks import ArgumentError
 from abs_service.api.estimate import Estimate
 from abs_service.api.recording import Recording
 from abs_service.bus import keys
+from abs_service.commands.parts.options import number
 from abs_service.commands.parts.progress import bars
 from abs_service.export import animation, arrays, series, table, viewers
 from abs_service.export.errors import ExportError
@@ -57,7 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--view-hz",
         metavar="HZ",
-        type=float,
+        type=number(0, 1000, "a rate from 0 to 1000 Hz"),
         default=VIEW_HZ,
         help=f"largest rate of meshes and points for viewers (default: {VIEW_HZ:g}; 0: none)",
     )
@@ -72,8 +73,6 @@ def run(arguments: argparse.Namespace) -> int:
     package, extra = _EXTRAS.get(path.suffix, ("", ""))
     if package and find_spec(package) is None:
         raise ExportError(f"--out {path} needs {package}: .venv/bin/pip install -e '.[{extra}]' in the clone")
-    if not 0 <= arguments.view_hz <= 1000:
-        raise ExportError(f"--view-hz {arguments.view_hz:g}: must be 0 to 1000")
     if path.exists():
         raise ExportError(f"{path} is there already; name another file with --out")
     try:

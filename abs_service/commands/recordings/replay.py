@@ -28,7 +28,8 @@ from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.commands import run as run_command
 from abs_service.commands.parts import preview_option, progress
 from abs_service.commands.parts.log import logs
-from abs_service.commands.parts.recorded_rig import ReplayOptionError, draw_previews, recorded_rig
+from abs_service.commands.parts.options import OptionError
+from abs_service.commands.parts.recorded_rig import draw_previews, recorded_rig
 from abs_service.commands.parts.rig_in_memory import in_memory
 from abs_service.commands.recordings.image_copies import image_copies
 from abs_service.commands.running import outcome
@@ -66,11 +67,11 @@ def run(arguments: argparse.Namespace) -> int:
             print(line, file=sys.stderr if arguments.json else sys.stdout, flush=True)
     if arguments.speed is not None:
         if arguments.images:
-            raise ReplayOptionError("--images: with --speed, --out FOLDER records the images; leave out --images")
+            raise OptionError("--images: with --speed, --out FOLDER records the images; leave out --images")
         return _live(settings, arguments)
     out = arguments.out or free_path(arguments.recording)
     if out.exists():
-        raise ReplayOptionError(f"--out {out}: exists already; choose another name or remove it")
+        raise OptionError(f"--out {out}: exists already; choose another name or remove it")
     with _writing(out, config.to_toml(settings)) as file, progress.bars(disable=arguments.json) as bars:
         headers = _headers(settings, recording)
         trackers = {name: _tracker(settings, name, recording, headers, file) for name in settings.trackers}
@@ -105,18 +106,16 @@ def configuration(recording: Recording, path: Path | None) -> config.ServiceConf
     """The configuration to replay with.
 
     Raises:
-        ReplayOptionError: none is given and the recording holds none, or it has no tracker.
+        OptionError: none is given and the recording holds none, or it has no tracker.
     """
     if path is None and not recording.config:
         writes = f"`abs-service new rig.toml --recording {recording.path}` writes one"
-        raise ReplayOptionError(
-            f"{recording.path}: no configuration is in this recording; name one with --config; {writes}"
-        )
+        raise OptionError(f"{recording.path}: no configuration is in this recording; name one with --config; {writes}")
     source = f"{recording.path} (rig.toml)"
     base = recording.path.resolve().parent
     settings = config.load(path) if path else config.loads(recording.config, source, base)
     if not settings.trackers:
-        raise ReplayOptionError(f"{path or source}: trackers: there is none, so there is nothing to do")
+        raise OptionError(f"{path or source}: trackers: there is none, so there is nothing to do")
     return settings
 
 
@@ -174,7 +173,7 @@ def _writing(path: Path, toml: str) -> Iterator[McapFile]:
     try:
         stream = active.open("wb")
     except OSError as error:
-        raise ReplayOptionError(f"--out {path}: cannot be written: {error.strerror}") from None
+        raise OptionError(f"--out {path}: cannot be written: {error.strerror}") from None
     try:
         with stream:
             file = McapFile(stream)

@@ -15,6 +15,7 @@ from pathlib import Path
 
 from abs_service import config, wiring
 from abs_service.commands.parts import progress, recorded_rig
+from abs_service.commands.parts.options import OptionError, positive
 from abs_service.commands.recordings import replay
 from abs_service.display.pictures.stiffness_plot import draw
 from abs_service.supervision.exit_codes import Exit
@@ -30,14 +31,10 @@ FREE_FALL = 9.80665
 SUFFIXES = (".png", ".svg", ".pdf")
 
 
-class StiffnessOptionError(Exception):
-    """Options that do not fit the recording."""
-
-
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the arguments of `abs-service stiffness`."""
     parser.add_argument("recording", metavar="FILE", type=Path, help="recording to track")
-    parser.add_argument("--weight", metavar="KG_M2", type=float, required=True, help="mass of the strip per area")
+    parser.add_argument("--weight", metavar="KG_M2", type=positive, required=True, help="mass of the strip per area")
     parser.add_argument("--config", metavar="RIG", type=Path, help="TOML file (default: the one in the recording)")
     parser.add_argument("--tracker", metavar="NAME", help="tracker (default: the one with a gravity model)")
     parser.add_argument("--plot", metavar="PATH", type=Path, help="picture to draw (default: FILE-stiffness.png)")
@@ -46,14 +43,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Estimates, prints and draws."""
-    if not arguments.weight > 0:
-        raise StiffnessOptionError(f"--weight {arguments.weight:g}: must be more than 0 kg/m²")
     path = arguments.recording
     plot = arguments.plot or path.with_name(f"{path.stem}-stiffness.png")
     if plot.suffix not in SUFFIXES:
-        raise StiffnessOptionError(f"--plot {plot}: its suffix must be one of {', '.join(SUFFIXES)}")
+        raise OptionError(f"--plot {plot}: its suffix must be one of {', '.join(SUFFIXES)}")
     if not plot.parent.is_dir():  # before minutes of tracking, not after
-        raise StiffnessOptionError(f"--plot {plot}: {plot.parent} is no folder")
+        raise OptionError(f"--plot {plot}: {plot.parent} is no folder")
     recording = Recording(path)
     for note in replay.notes(recording):
         print(f"abs-service: note: {note}", file=sys.stderr)
@@ -68,7 +63,7 @@ def run(arguments: argparse.Namespace) -> int:
     try:
         draw(strip.profiles(found), title, plot)
     except OSError as error:
-        raise StiffnessOptionError(f"--plot {plot}: {error.strerror}") from error
+        raise OptionError(f"--plot {plot}: {error.strerror}") from error
     lines = _json(found, bending, strip, plot) if arguments.json else _text(found, bending, strip, plot)
     print(lines)
     return Exit.OK
@@ -86,9 +81,9 @@ def _tracker(settings: config.ServiceConfig, wanted: str | None, path: Path) -> 
     """The tracker with a gravity model."""
     able = [name for name, table in settings.trackers.items() if isinstance(table.model, gravity.Settings)]
     if wanted is not None and wanted not in able:
-        raise StiffnessOptionError(f"--tracker {wanted}: must be a tracker with a gravity model, one of {able}")
+        raise OptionError(f"--tracker {wanted}: must be a tracker with a gravity model, one of {able}")
     if not able:
-        raise StiffnessOptionError(
+        raise OptionError(
             f"{path}: no tracker has a gravity model; name a configuration that has one with --config, "
             f'in which model = {{ type = "gravity" }}'
         )

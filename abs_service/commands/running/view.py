@@ -14,16 +14,13 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from abs_service.commands.parts import rig_process
+from abs_service.commands.parts.options import OptionError
 from abs_service.supervision.exit_codes import Exit
 
 PORT = 8080
 
 #: Endings of recordings, finished or not.
 RECORDINGS = (".mcap", ".active")
-
-
-class ViewError(Exception):
-    """The page cannot be served."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -40,10 +37,10 @@ def check() -> None:
     """Refuses to go on without viser.
 
     Raises:
-        ViewError: it is not installed.
+        OptionError: it is not installed.
     """
     if find_spec("viser") is None:
-        raise ViewError("the page needs viser: .venv/bin/pip install -e '.[view]' in the clone")
+        raise OptionError("the page needs viser: .venv/bin/pip install -e '.[view]' in the clone")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -54,11 +51,11 @@ def run(arguments: argparse.Namespace) -> int:
     files = [one for one in (arguments.config, *arguments.others) if one is not None]
     recordings = [one for one in files if one.suffix in RECORDINGS]
     if recordings and (arguments.connect or arguments.listen):
-        raise ViewError(f"{recordings[0]}: a recording is read from its file; leave out --connect and --listen")
+        raise OptionError(f"{recordings[0]}: a recording is read from its file; leave out --connect and --listen")
     if recordings and arguments.others:
-        raise ViewError(f"{recordings[0]}: a recording is shown alone")
+        raise OptionError(f"{recordings[0]}: a recording is shown alone")
     if arguments.others and (arguments.connect or arguments.listen):
-        raise ViewError("each of several rigs has the endpoint of its file; leave out --connect and --listen")
+        raise OptionError("each of several rigs has the endpoint of its file; leave out --connect and --listen")
     if recordings:
         pages.play(recordings[0], arguments.port)
     else:

@@ -71,7 +71,7 @@ def test_options_that_do_not_fit_are_answered_with_what_would(
     common = ["--target", str(board), "--out", str(tmp_path / "x.calibration.toml")]
     for arguments, message in (
         (["calibrate", "rig", *common], "give either a recording or rig as SOURCE, or --images"),
-        (["calibrate", "rig", "--images", "color", *common], "--images color: must be NAME=VALUE"),
+        (["calibrate", "rig", "--images", "color", *common], "--images color: must be NAME=GLOB"),
         (["calibrate", "intrinsics", str(tmp_path / "no.mcap"), *common], "no.mcap"),
         (["calibrate", "intrinsics", "--images", f"color={tmp_path}/*.png", *common], "color"),
     ):

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from abs_service.calibration.files import exchange
 from abs_service.commands.calibrate.inputs import calibrations
+from abs_service.commands.parts.options import OptionError
 from calib.camera import Camera
 from calib.files import limited
 from calib.formats import opencv, plausibility
@@ -14,10 +15,6 @@ from calib.formats.content import Content, Hints
 
 #: Metres per unit, as values of `--unit`.
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
-
-
-class CamerasError(Exception):
-    """A calibration that cannot be read, or that no camera has."""
 
 
 def read_all(paths: Sequence[Path], hints: Hints, source: str | None, unit: str | None) -> list[Content]:
@@ -39,12 +36,12 @@ def read(path: Path, hints: Hints, source: str | None = None, unit: str | None =
         unit: of its translations, one of `UNITS`; None if it is the format's.
 
     Raises:
-        CamerasError: it cannot be read, or what it says cannot be.
+        OptionError: it cannot be read, or what it says cannot be.
     """
     text = _text(path)
     name = source or exchange.of_content(path, text)
     if hints.lens and name != "opencv":
-        raise CamerasError(f"--lens {hints.lens}: {path} says itself which lens it has")
+        raise OptionError(f"--lens {hints.lens}: {path} says itself which lens it has")
     if name == exchange.OWN:
         return _own(path)
     stem = re.sub(r"[^A-Za-z0-9_-]+", "_", path.stem).strip("_-") or "camera"
@@ -58,41 +55,9 @@ def _text(path: Path) -> str:
     try:
         return limited.text(path)
     except OSError as error:
-        raise CamerasError(f"{path}: cannot be read: {error.strerror}") from error
+        raise OptionError(f"{path}: cannot be read: {error.strerror}") from error
     except UnicodeDecodeError as error:
-        raise CamerasError(f"{path}: all formats are UTF-8 text, byte {error.start} is not") from error
-
-
-def size(given: str | None) -> tuple[int, int] | None:
-    """Width and height [px] as given on the command line, such as 640x480; None if they are not.
-
-    Raises:
-        CamerasError: it is written otherwise.
-    """
-    if given is None:
-        return None
-    match = re.fullmatch(r"([1-9]\d{0,4})x([1-9]\d{0,4})", given)
-    if match is None:
-        raise CamerasError(f"--size {given}: must be width and height in pixels, such as 640x480")
-    return int(match[1]), int(match[2])
-
-
-def pairs(option: str, given: Sequence[str]) -> dict[str, str]:
-    """Second names by first ones, of an option that may be repeated.
-
-    Args:
-        option: its name and form, such as `--rename OLD=NEW`.
-        given: its values.
-
-    Raises:
-        CamerasError: a value of another form.
-    """
-    name, form = option.split()
-    split = [one.partition("=") for one in given]
-    wrong = [one for one, (first, _, second) in zip(given, split) if not (first and second)]
-    if wrong:
-        raise CamerasError(f"{name} {wrong[0]}: must be {form}")
-    return {first: second for first, _, second in split}
+        raise OptionError(f"{path}: all formats are UTF-8 text, byte {error.start} is not") from error
 
 
 def _scaled(one: Camera, unit: float) -> Camera:
@@ -105,10 +70,10 @@ def _scaled(one: Camera, unit: float) -> Camera:
 def _check(path: Path, cameras: Mapping[str, Camera], unit: str | None) -> None:
     """Refuses what no camera of a rig is, unless the unit was given."""
     for doubt in plausibility.doubts(cameras):
-        raise CamerasError(f"{path}: {doubt}")
+        raise OptionError(f"{path}: {doubt}")
     for pair, how in plausibility.baselines(cameras).items():
         if how.length > plausibility.LARGEST_BASELINE_M and unit is None:
-            raise CamerasError(
+            raise OptionError(
                 f"{path}: {pair} are {how.length:.4g} m apart, if lengths are in metres; say what they are in with "
                 f"--unit, one of {', '.join(UNITS)}"
             )

@@ -14,16 +14,13 @@ from abs_service.calibration.shots.corner_extraction import BoardObservations
 from abs_service.calibration.shots.shot_sources import FolderShots, RecordingShots
 from abs_service.calibration.shots.shots import Shot
 from abs_service.commands.calibrate.inputs import calibrations, live, skipping
+from abs_service.commands.parts.options import OptionError, assignments
 from calib.board import coverage
 from calib.board.distinct import counts_of, distinct_poses
 from calib.board.target import Target
 from calib.camera import Camera
 from calib.solve.weights import shared
 from drivers.replay.recording import Recording
-
-
-class SolveOptionError(ValueError):
-    """Options that do not fit the images."""
 
 
 class UnusableImagesError(ValueError):
@@ -49,15 +46,15 @@ def material(arguments: argparse.Namespace) -> Material:
     """Detects the board in all images, with progress on the terminal.
 
     Raises:
-        SolveOptionError, SkipError: incompatible options.
+        OptionError: incompatible options.
         UnusableImagesError: no board, or too few views; the message says why.
         TargetFileError, ShotsError, RecordingError, ConfigError: files that cannot be used.
         ViewsAlikeError, MirroredSensorError, SameImagesError: the views do not allow a calibration.
     """
     if arguments.out.exists():
-        raise SolveOptionError(f"--out {arguments.out}: exists already; choose another name or remove it")
+        raise OptionError(f"--out {arguments.out}: exists already; choose another name or remove it")
     if (arguments.source is None or mrcal_corners.is_vnl(arguments.source)) == (not arguments.images):
-        raise SolveOptionError("give either a recording or rig as SOURCE, or --images NAME=GLOB for each sensor")
+        raise OptionError("give either a recording or rig as SOURCE, or --images NAME=GLOB for each sensor")
     target = target_file.read(arguments.target)
     known = dict(calibrations.load(arguments.start).sensors) if arguments.start else {}
     source: Path | None = arguments.source
@@ -93,14 +90,17 @@ def _saved(arguments: argparse.Namespace, target: Target, known: Mapping[str, Se
     """Detections of a file; those of mrcal need names of the pictures and sizes of the images."""
     if corner_file.is_corner_file(arguments.source):
         return corner_file.read(arguments.source, target)
-    patterns, given = named(arguments.images, "--images"), named(arguments.size, "--size")
+    patterns, given = (
+        assignments("--images NAME=GLOB", arguments.images),
+        assignments("--size NAME=WxH", arguments.size),
+    )
     sizes = {name: (each.camera.width, each.camera.height) for name, each in known.items() if name in patterns}
     for name in patterns:
         width, _, height = given.get(name, "").partition("x")
         if width.isdecimal() and height.isdecimal():
             sizes[name] = (int(width), int(height))
         if name not in sizes:
-            raise SolveOptionError(f"--size {name}=WxH: {arguments.source} does not say how large its images are")
+            raise OptionError(f"--size {name}=WxH: {arguments.source} does not say how large its images are")
     return mrcal_corners.read(arguments.source, target, patterns, sizes)
 
 
@@ -127,7 +127,7 @@ def _shots(
 ) -> tuple[Iterable[Shot], Mapping[str, Camera], tuple[Path, ...]]:
     """Shots, known cameras, and source files."""
     if arguments.images:
-        patterns = named(arguments.images, "--images")
+        patterns = assignments("--images NAME=GLOB", arguments.images)
         folders = dict.fromkeys(Path(pattern).parent for pattern in patterns.values())
         return FolderShots(patterns), cameras, tuple(folders)
     if not live.is_live(arguments.source):
@@ -136,21 +136,6 @@ def _shots(
         return RecordingShots(recording, arguments.every, cameras=known), known, (arguments.source,)
     shots, known = stack.enter_context(live.streaming(arguments.source, cameras))
     return shots, known, (arguments.source,)
-
-
-def named(options: Iterable[str], option: str) -> dict[str, str]:
-    """`NAME=VALUE` options as a table.
-
-    Raises:
-        SolveOptionError: one is not of this form.
-    """
-    found = {}
-    for text in options:
-        name, equals, value = text.partition("=")
-        if not (name and equals and value):
-            raise SolveOptionError(f"{option} {text}: must be NAME=VALUE")
-        found[name] = value
-    return found
 
 
 def say(text: str) -> None:

@@ -7,10 +7,7 @@ from pathlib import Path
 from abs_service.calibration.shots.corner_extraction import BoardObservations
 from abs_service.calibration.shots.shots import Shot
 from abs_service.commands.calibrate.inputs import live
-
-
-class SkipError(ValueError):
-    """Shots to leave out that are none, or that there are not."""
+from abs_service.commands.parts.options import OptionError
 
 
 def add_argument(parser: argparse.ArgumentParser) -> None:
@@ -44,10 +41,10 @@ def kept(shots: Iterable[Shot], skipped: Set[int], source: Path | None) -> Itera
     """Shots without those to leave out.
 
     Raises:
-        SkipError: one of them does not exist, or the shots are of running devices.
+        OptionError: one of them does not exist, or the shots are of running devices.
     """
     if skipped and live.is_live(source):
-        raise SkipError(f"--skip {text(skipped)}: shots of running devices have no numbers that last")
+        raise OptionError(f"--skip {text(skipped)}: shots of running devices have no numbers that last")
     seen = []
     for shot in shots:
         seen.append(shot.number)
@@ -55,14 +52,14 @@ def kept(shots: Iterable[Shot], skipped: Set[int], source: Path | None) -> Itera
             yield shot
     if unknown := sorted(skipped - {*seen}):
         there = f"they are numbered from {min(seen)} to {max(seen)}" if seen else "there are none"
-        raise SkipError(f"--skip {text(skipped)}: there is no shot {unknown[0]}; {there}")
+        raise OptionError(f"--skip {text(skipped)}: there is no shot {unknown[0]}; {there}")
 
 
 def kept_of(seen: BoardObservations, skipped: Set[int]) -> BoardObservations:
     """Saved detections without those of the shots to leave out.
 
     Raises:
-        SkipError: one of them does not exist.
+        OptionError: one of them does not exist.
     """
     numbers = sorted({view.shot for view in (*seen.corners, *seen.planes)})
     return seen.of_shots([shot.number for shot in kept([Shot(number, {}) for number in numbers], skipped, None)])

@@ -8,6 +8,7 @@ from queue import Empty, SimpleQueue
 
 from abs_service import config, wiring
 from abs_service.commands.parts import rig_devices
+from abs_service.commands.parts.options import OptionError
 from abs_service.pairing.synchroniser import Synchroniser
 from calib.rig import Rig
 from drivers import opening
@@ -24,23 +25,19 @@ TAKEN_S = 10.0
 SILENCE_S = 60.0
 
 
-class HarmlessError(Exception):
-    """A device that may be real hardware."""
-
-
 @contextmanager
 def opened(settings: config.ServiceConfig, tracker: str) -> Iterator[tuple[Rig, Iterator[FrameSet]]]:
     """The rig of a tracker and its frame sets, from opened devices; closes them.
 
     Raises:
-        HarmlessError: one of the tracker's devices may be real hardware.
+        OptionError: one of the tracker's devices may be real hardware.
         DeviceError: a device cannot be opened or cannot stream.
         HeadError: the configuration names a head that its device does not have.
     """
     names = dict.fromkeys(settings.sensors[sensor].device for sensor in settings.trackers[tracker].sensors)
     for name in names:
         if (uri := settings.devices[name].uri).partition(":")[0] not in HARMLESS:
-            raise HarmlessError(
+            raise OptionError(
                 f"devices.{name} is {uri}, and only {' and '.join(sorted(HARMLESS))} devices are opened here; record "
                 f"a few frames with `abs-service run --duration 2`, and take the picture with `abs-service replay`"
             )

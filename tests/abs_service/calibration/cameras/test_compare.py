@@ -31,7 +31,10 @@ def compare(capsys):
     """Runs the command; gives the exit code and what was printed."""
 
     def compare(*arguments: object) -> tuple[int, str, str]:
-        code = cli.main(["calibrate", "compare", *map(str, arguments)])
+        try:
+            code = cli.main(["calibrate", "compare", *map(str, arguments)])
+        except SystemExit as end:  # by argparse
+            code = int(end.code or 0)
         return code, *capsys.readouterr()
 
     return compare
@@ -80,9 +83,9 @@ def test_cameras_are_matched_by_name_or_as_told(compare, tmp_path: Path):
     ("options", "said"),
     [
         (("--pair", "z=b"), "--pair z=b"),
-        (("--distance", "0"), "--distance 0: must be a number of metres above 0"),
+        (("--distance", "0"), "--distance: '0' must be a number above 0"),
         (("--corners", "none.corners.npz"), "none.corners.npz: cannot be read"),
-        (("--size", "640"), "--size 640: must be width and height"),
+        (("--size", "640"), "--size: '640' must be width and height"),
     ],
 )
 def test_options_that_do_not_fit_are_named(compare, tmp_path: Path, options: tuple[str, ...], said: str):

@@ -40,7 +40,10 @@ def convert(capsys):
     """Runs the command; gives the exit code and what was printed."""
 
     def convert(*arguments: object) -> tuple[int, str, str]:
-        code = cli.main(["calibrate", "convert", *map(str, arguments)])
+        try:
+            code = cli.main(["calibrate", "convert", *map(str, arguments)])
+        except SystemExit as end:  # by argparse
+            code = int(end.code or 0)
         return code, *capsys.readouterr()
 
     return convert

@@ -60,7 +60,6 @@ def test_the_text_has_stiffness_and_uncertainty(recording, capsys, monkeypatch):
 @pytest.mark.parametrize(
     ("options", "problem"),
     [
-        (["--weight", "-1"], "--weight -1: must be more than 0 kg/m²"),
         (["--weight", "0.3", "--plot", "x.doc"], "--plot x.doc: its suffix must be one of .png, .svg, .pdf"),
         (["--weight", "0.3", "--tracker", "sheet"], "--tracker sheet: must be a tracker with a gravity model, one of"),
         (["--weight", "0.3", "--plot", "no/folder/x.png"], "--plot no/folder/x.png: no/folder is no folder"),
@@ -73,6 +72,12 @@ def test_the_text_has_stiffness_and_uncertainty(recording, capsys, monkeypatch):
 def test_impossible_options_are_reported(recording, capsys, options, problem):
     assert cli.main(["stiffness", str(recording), *options]) == Exit.USER
     assert problem in capsys.readouterr().err
+
+
+def test_a_weight_is_above_0(capsys):
+    with pytest.raises(SystemExit, match="2"):
+        cli.main(["stiffness", "x.mcap", "--weight", "-1"])
+    assert "argument --weight: '-1' must be a number above 0" in capsys.readouterr().err
 
 
 def test_too_short_a_recording_is_refused(tmp_path, capsys):

@@ -1,0 +1,57 @@
+"""Values of command-line options: their types, and the error for those that do not fit."""
+
+import argparse
+import math
+import re
+from collections.abc import Callable, Iterable
+
+
+class OptionError(Exception):
+    """Options that do not go together, or do not fit the files that they name; says which, and what is allowed."""
+
+
+def number(minimum: float, maximum: float, what: str) -> Callable[[str], float]:
+    """Type of an argument: a number from `minimum` to `maximum`, described by `what` in the message about others."""
+
+    def read(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not minimum <= value <= maximum:
+            raise argparse.ArgumentTypeError(f"{text!r} must be {what}")
+        return value
+
+    return read
+
+
+#: Type of an argument: a number that is neither 0 nor infinite.
+positive = number(math.ulp(0.0), math.nextafter(math.inf, 0.0), "a number above 0")
+
+
+def assignments(option: str, given: Iterable[str]) -> dict[str, str]:
+    """Values of an option that may be repeated, by what stands before their `=`.
+
+    Args:
+        option: its name and form, such as `--rename OLD=NEW`.
+        given: what was given.
+
+    Raises:
+        OptionError: something of another form.
+    """
+    name, form = option.split()
+    found = {}
+    for text in given:
+        key, _, value = text.partition("=")
+        if not (key and value):
+            raise OptionError(f"{name} {text}: must be {form}")
+        found[key] = value
+    return found
+
+
+def size(text: str) -> tuple[int, int]:
+    """Type of an argument: width and height [px], such as 640x480."""
+    match = re.fullmatch(r"([1-9]\d{0,4})x([1-9]\d{0,4})", text)
+    if match is None:
+        raise argparse.ArgumentTypeError(f"{text!r} must be width and height in pixels, such as 640x480")
+    return int(match[1]), int(match[2])
