@@ -1,13 +1,12 @@
 """Addresses of Azure Kinects: `azure://`, `azure://000123456789?depth=wfov_2x2binned&color=1080p&fps=15`."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 from drivers.azure.calibration import COLOR_MODES, DEPTH_MODES
-from drivers.contract.address import query, serial
+from drivers.contract.address import name, values
+from drivers.contract.address_values import one_of, switch
 from drivers.contract.device import AddressError
 
-_DEFAULTS = {"depth": "nfov_unbinned", "amplitude": "1", "color": "720p", "format": "mjpg", "fps": ""}
 #: Rates in the order of the SDK's numbers [Hz].
 RATES_HZ = (5, 15, 30)
 #: Formats of colours in the order of the SDK's numbers. The camera has the first three, the SDK computes the last.
@@ -16,6 +15,14 @@ FORMATS = ("MJPG", "NV12", "YUY2", "BGRA")
 _SLOW = ("WFOV_UNBINNED", "3072P")
 #: Formats that the camera has in the smallest size only.
 _SMALL = ("NV12", "YUY2")
+
+_KEYS = {
+    "depth": one_of("0", *map(str.lower, DEPTH_MODES)),
+    "color": one_of("0", *map(str.lower, COLOR_MODES)),
+    "amplitude": switch,
+    "format": one_of(*map(str.lower, FORMATS)),
+    "fps": one_of(*map(str, RATES_HZ)),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,24 +59,15 @@ def parse(uri: str) -> Address:
     Raises:
         AddressError: unknown key, invalid value, or modes that do not go together; names the allowed values.
     """
-    values, number = query(uri, _DEFAULTS), serial(uri)
-    depth = _one_of(uri, "depth", values["depth"], ["0", *map(str.lower, DEPTH_MODES)])
-    color = _one_of(uri, "color", values["color"], ["0", *map(str.lower, COLOR_MODES)])
-    amplitude = _one_of(uri, "amplitude", values["amplitude"], "01") == "1"
-    form = _one_of(uri, "format", values["format"], [*map(str.lower, FORMATS)])
+    given = {"depth": "nfov_unbinned", "color": "720p", "amplitude": True, "format": "mjpg", **values(uri, _KEYS)}
+    depth, color = ("" if given[key] == "0" else given[key].upper() for key in ("depth", "color"))
+    form = given["format"].upper()
     slow = next((mode for mode in (depth, color) if mode in _SLOW), "")
-    rate = _one_of(uri, "fps", values["fps"] or ("15" if slow else "30"), [*map(str, RATES_HZ)])
-    if slow and rate == "30":
+    rate_hz = int(given.get("fps", "15" if slow else "30"))
+    if slow and rate_hz == 30:
         raise AddressError(f"{uri}: fps = 30 is too fast for {slow.lower()}, which has 5 and 15")
     if form in _SMALL and color not in ("", "720P"):
         raise AddressError(f"{uri}: format = {form.lower()!r} is for color=720p; the others have mjpg and bgra")
     if not depth and not color:
         raise AddressError(f"{uri}: depth = '0' and color = '0' leave nothing")
-    return Address(uri, number, depth, amplitude, color, form, int(rate))
-
-
-def _one_of(uri: str, key: str, text: str, allowed: Sequence[str]) -> str:
-    """The value in capitals; "" for "0" of a mode."""
-    if text not in allowed:
-        raise AddressError(f"{uri}: {key} = {text!r} must be one of {', '.join(allowed)}")
-    return "" if text == "0" else text.upper()
+    return Address(uri, name(uri), depth, given["amplitude"], color, form, rate_hz)

@@ -1,32 +1,50 @@
-"""Parts of addresses that several drivers share."""
+"""Parts of addresses `scheme://SERIAL?key=value&…`; `address_values` has the parsers of values."""
 
-from collections.abc import Mapping
-from urllib.parse import parse_qsl, urlsplit
+from collections.abc import Callable, Mapping
+from typing import Any
+from urllib.parse import SplitResult, parse_qsl, urlsplit
 
 from drivers.contract.errors import AddressError
 
 
-def serial(uri: str) -> str:
-    """The serial number of an address, "" for the only device.
+def split(uri: str) -> SplitResult:
+    """The parts of an address.
 
     Raises:
-        AddressError: something else before the '?'.
+        AddressError: it has none, such as `oak://[`.
     """
-    parts = urlsplit(uri)
+    try:
+        return urlsplit(uri)
+    except ValueError as error:
+        raise AddressError(f"{uri}: {error}") from error
+
+
+def name(uri: str, what: str = "a serial number") -> str:
+    """What stands before the '?' of an address: `what` of the device, "" for the only one.
+
+    Raises:
+        AddressError: something else stands there.
+    """
+    parts = split(uri)
     if parts.path.strip("/"):
-        raise AddressError(f"{uri}: a serial number is all that may stand before the '?'")
+        raise AddressError(f"{uri}: {what} is all that may stand before the '?'")
     return parts.netloc
 
 
-def query(uri: str, defaults: Mapping[str, str]) -> dict[str, str]:
-    """Values of all keys of an address: those behind its '?', and defaults.
+def values(uri: str, parsers: Mapping[str, Callable[[str], Any]]) -> dict[str, Any]:
+    """Values of the keys behind the '?' of an address.
 
     Raises:
-        AddressError: a key without a default; names the allowed ones.
+        AddressError: an unknown key, one that is given twice, or a value that is not allowed; names what is.
     """
-    values = dict(defaults)
-    for key, value in parse_qsl(urlsplit(uri).query, keep_blank_values=True):
-        if key not in values:
-            raise AddressError(f"{uri}: unknown key {key!r}; allowed are {', '.join(sorted(values))}")
-        values[key] = value
-    return values
+    found: dict[str, Any] = {}
+    for key, text in parse_qsl(split(uri).query, keep_blank_values=True):
+        if key not in parsers:
+            raise AddressError(f"{uri}: unknown key {key!r}; allowed are {', '.join(sorted(parsers))}")
+        if key in found:
+            raise AddressError(f"{uri}: {key} is given twice")
+        try:
+            found[key] = parsers[key](text)
+        except ValueError as error:
+            raise AddressError(f"{uri}: {key} = {text!r} must be {error}") from None
+    return found

@@ -2,10 +2,8 @@
 
 from dataclasses import dataclass
 
-from drivers.contract.address import query, serial
-from drivers.contract.device import AddressError
-
-_DEFAULTS = {"components": "Range,Intensity,Confidence", "format": "", "focal": ""}
+from drivers.contract.address import name, values
+from drivers.contract.address_values import number
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,9 +20,9 @@ class Address:
 
     uri: str
     serial: str
-    components: tuple[str, ...]
-    pixel_format: str
-    focal_px: float | None
+    components: tuple[str, ...] = ("Range", "Intensity", "Confidence")
+    pixel_format: str = ""
+    focal_px: float | None = None
 
 
 def parse(uri: str) -> Address:
@@ -33,20 +31,14 @@ def parse(uri: str) -> Address:
     Raises:
         AddressError: unknown key or invalid value; names both and the allowed values.
     """
-    values, number = query(uri, _DEFAULTS), serial(uri)
-    components = tuple(values["components"].split(","))
-    if "Range" not in components:
-        raise AddressError(f"{uri}: components = {values['components']!r} must contain Range")
-    return Address(uri, number, components, values["format"], _focal(uri, values["focal"]))
+    return Address(uri, name(uri), **{_FIELDS[key]: value for key, value in values(uri, _KEYS).items()})
 
 
-def _focal(uri: str, text: str) -> float | None:
-    if not text:
-        return None
-    try:
-        focal_px = float(text)
-    except ValueError:
-        focal_px = 0.0
-    if not 1 <= focal_px <= 1e5:
-        raise AddressError(f"{uri}: focal = {text!r} must be a number of pixels from 1 to 100000")
-    return focal_px
+def _components(text: str) -> tuple[str, ...]:
+    if "Range" not in (components := tuple(text.split(","))):
+        raise ValueError("names of components with commas in between, one of them Range")
+    return components
+
+
+_KEYS = {"components": _components, "format": str, "focal": number(float, 1, 1e5)}
+_FIELDS = {"components": "components", "format": "pixel_format", "focal": "focal_px"}

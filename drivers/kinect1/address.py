@@ -1,9 +1,8 @@
 """Addresses `kinect1://serial?streams=depth,color`."""
 
 from dataclasses import dataclass
-from urllib.parse import parse_qsl, urlsplit
 
-from drivers.contract.device import AddressError
+from drivers.contract.address import name, values
 from drivers.kinect1.camera import Stream
 
 
@@ -32,26 +31,15 @@ def parse(uri: str) -> Address:
     Raises:
         AddressError: unknown key or invalid value; names the allowed values.
     """
-    try:
-        parts = urlsplit(uri)
-    except ValueError as error:
-        raise AddressError(f"{uri}: {error}") from error
-    given = parse_qsl(parts.query, keep_blank_values=True)
-    if parts.path not in {"", "/"}:
-        raise AddressError(f"{uri}: nothing may follow the serial number but ?streams=…, not {parts.path!r}")
-    if unknown := sorted({key for key, _ in given} - {"streams"}):
-        raise AddressError(f"{uri}: unknown key {unknown[0]!r}; allowed is 'streams'")
-    if len(given) > 1:
-        raise AddressError(f"{uri}: streams is given twice")
-    return Address(parts.netloc, *(_streams(uri, text) for _, text in given))
+    return Address(name(uri), **values(uri, {"streams": _streams}))
 
 
-def _streams(uri: str, text: str) -> tuple[Stream, ...]:
+def _streams(text: str) -> tuple[Stream, ...]:
     names = text.split(",")
     known = set(names) <= set(Stream)
     if not known or len(set(names)) < len(names) or {Stream.COLOR, Stream.IR} <= set(names):
-        raise AddressError(
-            f"{uri}: streams = {text!r} must be some of depth, color and ir with commas in between, each once; "
+        raise ValueError(
+            "some of depth, color and ir with commas in between, each once; "
             "color and ir share a pipe, so only one of the two"
         )
-    return tuple(Stream(name) for name in names)
+    return tuple(map(Stream, names))

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 from ipaddress import IPv4Address
-from urllib.parse import parse_qsl, urlsplit
 
+from drivers.contract.address import name, split, values
 from drivers.contract.device import AddressError
 
 #: TCP port of the processing unit's configuration interface (XML-RPC).
@@ -34,16 +34,11 @@ def parse(uri: str) -> Address:
     Raises:
         AddressError: unknown key, or an invalid host or port; names the allowed values.
     """
-    parts = urlsplit(uri)
-    values = dict(parse_qsl(parts.query, keep_blank_values=True))
-    if unknown := values.keys() - {"head"}:
-        raise AddressError(f"{uri}: unknown key {min(unknown)!r}; allowed is head")
-    if parts.path.strip("/"):
-        raise AddressError(f"{uri}: an IPv4 address is all that may stand before the '?'")
+    unit, parts = name(uri, "an IPv4 address"), split(uri)
     try:
         host, port = parts.hostname or "", parts.port or XMLRPC_PORT
         if host:
             IPv4Address(host)  # ifm3d looks up no names
     except ValueError as error:
-        raise AddressError(f"{uri}: {parts.netloc!r} must be an IPv4 address, such as 192.168.0.69") from error
-    return Address(uri, host, port, values.get("head", ""))
+        raise AddressError(f"{uri}: {unit!r} must be an IPv4 address, such as 192.168.0.69") from error
+    return Address(uri, host, port, **values(uri, {"head": str}))

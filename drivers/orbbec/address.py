@@ -1,17 +1,11 @@
 """Addresses of Orbbec cameras: `orbbec://`, `orbbec://CL8FC3100XX?depth=640x576`, `orbbec://?recording=FILE.bag`."""
 
 import ipaddress
-import re
 from dataclasses import dataclass
 from pathlib import Path
-from urllib.parse import urlsplit
 
-from drivers.contract.address import query
-from drivers.contract.device import AddressError
-
-_DEFAULTS = {"depth": "1", "ir": "1", "color": "1", "confidence": "0", "recording": ""}
-_MODE = re.compile(r"([1-9]\d{1,3})x([1-9]\d{1,3})(?:@([1-9]\d{0,2}))?")
-_ALLOWED = "0 (none), 1 (the camera's default), or a width and a height [px], such as 640x576, with a rate 640x576@30"
+from drivers.contract.address import name, values
+from drivers.contract.address_values import file, mode
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,11 +32,11 @@ class Address:
     uri: str
     serial: str
     host: str
-    depth: Mode | None
-    ir: Mode | None
-    color: Mode | None
-    confidence: Mode | None
-    recording: Path | None
+    depth: Mode | None = Mode()
+    ir: Mode | None = Mode()
+    color: Mode | None = Mode()
+    confidence: Mode | None = None
+    recording: Path | None = None
 
 
 def parse(uri: str) -> Address:
@@ -51,21 +45,9 @@ def parse(uri: str) -> Address:
     Raises:
         AddressError: unknown key or invalid value; names both and the allowed values.
     """
-    parts = urlsplit(uri)
-    values = query(uri, _DEFAULTS)
-    if parts.path.strip("/"):
-        raise AddressError(f"{uri}: a serial number or an IP address is all that may stand before the '?'")
-    host = parts.netloc if _is_ip(parts.netloc) else ""
-    return Address(
-        uri=uri,
-        serial="" if host else parts.netloc,
-        host=host,
-        depth=_mode(uri, "depth", values["depth"]),
-        ir=_mode(uri, "ir", values["ir"]),
-        color=_mode(uri, "color", values["color"]),
-        confidence=_mode(uri, "confidence", values["confidence"]),
-        recording=Path(values["recording"]) if values["recording"] else None,
-    )
+    device = name(uri, "a serial number or an IP address")
+    host = device if _is_ip(device) else ""
+    return Address(uri, "" if host else device, host, **values(uri, _KEYS))
 
 
 def _is_ip(text: str) -> bool:
@@ -76,10 +58,10 @@ def _is_ip(text: str) -> bool:
     return True
 
 
-def _mode(uri: str, key: str, text: str) -> Mode | None:
-    if text in {"0", "1"}:
+def _mode(text: str) -> Mode | None:
+    if text in ("0", "1"):
         return Mode() if text == "1" else None
-    match = _MODE.fullmatch(text)
-    if match is None:
-        raise AddressError(f"{uri}: {key} = {text!r} must be {_ALLOWED}")
-    return Mode(int(match[1]), int(match[2]), int(match[3] or 0))
+    return Mode(*mode(text, "0 (none), 1 (the camera's default), or "))
+
+
+_KEYS = {**dict.fromkeys(("depth", "ir", "color", "confidence"), _mode), "recording": file}

@@ -1,15 +1,10 @@
 """Addresses of RealSense cameras: `realsense://`, `realsense://728612070259?fps=60`, `realsense://?recording=FILE.db3`."""
 
-import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from drivers.contract.address import query, serial
-from drivers.contract.device import AddressError
-
-_DEFAULTS = {"depth": "640x480", "color": "640x480", "fps": "30", "ir": "1", "confidence": "1", "recording": ""}
-_RATE = r"[1-9]\d{0,2}"
-_MODE = re.compile(rf"([1-9]\d{{1,3}})x([1-9]\d{{1,3}})(?:@({_RATE}))?")
+from drivers.contract.address import name, values
+from drivers.contract.address_values import file, mode, number
 
 #: Width and height [px], and images per second.
 Mode = tuple[int, int, int]
@@ -42,32 +37,33 @@ def parse(uri: str) -> Address:
     Raises:
         AddressError: unknown key or invalid value; names both and the allowed values.
     """
-    values, number = query(uri, _DEFAULTS), serial(uri)
-    if not re.fullmatch(_RATE, values["fps"]):
-        raise AddressError(f"{uri}: fps = {values['fps']!r} must be a whole number from 1 to 999")
-    fps = int(values["fps"])
-    depth = _mode(uri, "depth", values["depth"], fps)
-    return Address(
-        uri=uri,
-        serial=number,
-        depth=depth,
-        color=None if values["color"] == "0" else _mode(uri, "color", values["color"], fps),
-        ir=_beside(uri, "ir", values["ir"], depth),
-        confidence=_beside(uri, "confidence", values["confidence"], depth),
-        recording=Path(values["recording"]) if values["recording"] else None,
-    )
+    given = {"depth": (640, 480, 0), "color": (640, 480, 0), "ir": True, "confidence": True, **values(uri, _KEYS)}
+    fps = given.get("fps", 30)
+    width, height, rate_hz = given["depth"]
+    depth = width, height, rate_hz or fps
+    ir, confidence = (depth if given[key] is True else _at(given[key], depth[2]) for key in ("ir", "confidence"))
+    return Address(uri, name(uri), depth, _at(given["color"], fps), ir, confidence, given.get("recording"))
 
 
-def _beside(uri: str, key: str, text: str, depth: Mode) -> Mode | None:
-    """Mode of a stream that is as depth unless the address says otherwise."""
-    if text in {"0", "1"}:
-        return depth if text == "1" else None
-    return _mode(uri, key, text, depth[2], "0, 1 (as depth) or ")
+def _at(wanted: Mode | None, rate_hz: int) -> Mode | None:
+    """A mode with this rate, unless it has one of its own."""
+    return wanted and (*wanted[:2], wanted[2] or rate_hz)
 
 
-def _mode(uri: str, key: str, text: str, fps: int, others: str = "") -> Mode:
-    match = _MODE.fullmatch(text)
-    if match is None:
-        what = "a width and a height [px], such as 640x480, with a rate of its own 640x480@60"
-        raise AddressError(f"{uri}: {key} = {text!r} must be {others}{what}")
-    return int(match[1]), int(match[2]), int(match[3] or fps)
+def _color(text: str) -> Mode | None:
+    return None if text == "0" else mode(text)
+
+
+def _beside(text: str) -> Mode | bool | None:
+    """Mode of a stream beside depth; True if it is as that of depth."""
+    return {"0": None, "1": True}[text] if text in ("0", "1") else mode(text, "0, 1 (as depth) or ")
+
+
+_KEYS = {
+    "depth": mode,
+    "color": _color,
+    "fps": number(int, 1, 999),
+    "ir": _beside,
+    "confidence": _beside,
+    "recording": file,
+}

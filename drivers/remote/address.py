@@ -1,14 +1,12 @@
 """Addresses `remote://HOST:PORT/RIG?key=value`."""
 
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from urllib.parse import parse_qsl, urlsplit
 
+from drivers.contract.address import split, values
+from drivers.contract.address_values import number, one_of, switch
 from drivers.contract.device import AddressError
 
 DEFAULT_PORT = 7447
-PROTOCOLS = ("tcp", "tls", "quic", "udp", "ws")
-_LEARN_S = (0.1, 60.0)
 
 
 @dataclass(frozen=True)
@@ -18,7 +16,7 @@ class Address:
     Attributes:
         host, port: endpoint of the zenoh router.
         rig: name of the rig, "" for the only one.
-        protocol: one of `PROTOCOLS`.
+        protocol: zenoh's, such as `tcp` and `tls`.
         shared_memory: True if images on one host use shared memory.
         learn_s: time in which streams are observed before opening [s].
         sensors: names of the requested sensors, () for all in the rig's configuration.
@@ -55,7 +53,7 @@ def parse(uri: str) -> Address:
     Raises:
         AddressError: invalid host, port, rig or key; names it and the allowed values.
     """
-    parts = urlsplit(uri)
+    parts = split(uri)
     rig = parts.path.strip("/")
     try:
         port = DEFAULT_PORT if parts.port is None else parts.port
@@ -63,38 +61,8 @@ def parse(uri: str) -> Address:
         raise AddressError(f"{uri}: the port must be a number from 1 to 65535") from None
     if set(rig) & set("/*$?#"):
         raise AddressError(f"{uri}: {rig!r} is no name of a rig; write remote://HOST:PORT/RIG")
-    read = {}
-    for key, text in parse_qsl(parts.query, keep_blank_values=True):
-        if key not in _KEYS:
-            raise AddressError(f"{uri}: unknown key {key!r}; allowed are {sorted(_KEYS)}")
-        name, reader = _KEYS[key]
-        try:
-            read[name] = reader(text)
-        except ValueError as error:
-            raise AddressError(f"{uri}: {key} = {text!r} must be {error}") from None
-    return Address(parts.hostname or Address.host, port, rig, **read)
-
-
-def _protocol(text: str) -> str:
-    if text not in PROTOCOLS:
-        raise ValueError(f"one of {', '.join(PROTOCOLS)}")
-    return text
-
-
-def _switch(text: str) -> bool:
-    if text not in {"0", "1"}:
-        raise ValueError("0 or 1")
-    return text == "1"
-
-
-def _seconds(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = float("nan")
-    if not _LEARN_S[0] <= value <= _LEARN_S[1]:
-        raise ValueError(f"a number from {_LEARN_S[0]:g} to {_LEARN_S[1]:g}")
-    return value
+    given = {_FIELDS.get(key, key): value for key, value in values(uri, _KEYS).items()}
+    return Address(parts.hostname or Address.host, port, rig, **given)
 
 
 def _names(text: str) -> tuple[str, ...]:
@@ -104,12 +72,13 @@ def _names(text: str) -> tuple[str, ...]:
     return names
 
 
-_KEYS: Mapping[str, tuple[str, Callable[[str], object]]] = {
-    "protocol": ("protocol", _protocol),
-    "shared_memory": ("shared_memory", _switch),
-    "learn": ("learn_s", _seconds),
-    "sensors": ("sensors", _names),
+_KEYS = {
+    "protocol": one_of("tcp", "tls", "quic", "udp", "ws"),
+    "shared_memory": switch,
+    "learn": number(float, 0.1, 60),
+    "sensors": _names,
 }
+_FIELDS = {"learn": "learn_s"}
 
 
 def _bracketed(host: str) -> str:

@@ -3,8 +3,10 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from urllib.parse import parse_qsl, unquote, urlsplit
+from urllib.parse import unquote
 
+from drivers.contract.address import split, values
+from drivers.contract.address_values import number, switch
 from drivers.contract.device import AddressError, Device
 from drivers.contract.discovery import Found
 from drivers.replay.contents import RecordingError
@@ -13,8 +15,7 @@ from drivers.replay.recording import Recording
 
 __all__ = ["Recording", "RecordingError", "ReplayDevice", "check_address", "discover", "open_device"]
 
-_SPEEDS = (0.01, 100.0)
-_DELAYS_S = (0.0, 3600.0)
+_KEYS = {"speed": number(float, 0.01, 100), "loop": switch, "delay": number(float, 0, 3600)}
 
 
 def open_device(uri: str, clock: Callable[[], int]) -> Device:
@@ -50,29 +51,11 @@ def check_address(uri: str) -> Address:
     Raises:
         AddressError: unknown key or invalid value; names both and the allowed values.
     """
-    parts = urlsplit(uri)
-    values = {"speed": "1", "loop": "0", "delay": "0"}
-    for key, value in parse_qsl(parts.query, keep_blank_values=True):
-        if key not in values:
-            raise AddressError(f"{uri}: unknown key {key!r}; allowed are {sorted(values)}")
-        values[key] = value
-    if values["loop"] not in {"0", "1"}:
-        raise AddressError(f"{uri}: loop = {values['loop']!r} must be 0 or 1")
-    speed = _number(uri, "speed", values["speed"], _SPEEDS)
-    delay_s = _number(uri, "delay", values["delay"], _DELAYS_S)
-    return Address(Path(unquote(parts.netloc + parts.path)), speed, values["loop"] == "1", delay_s)
+    parts, given = split(uri), values(uri, _KEYS)
+    path = Path(unquote(parts.netloc + parts.path))
+    return Address(path, given.get("speed", 1.0), given.get("loop", False), given.get("delay", 0.0))
 
 
 def discover(timeout_s: float) -> list[Found]:
     """Empty: recordings are not discovered."""
     return []
-
-
-def _number(uri: str, key: str, value: str, limits: tuple[float, float]) -> float:
-    try:
-        number = float(value)
-    except ValueError:
-        number = float("nan")
-    if not limits[0] <= number <= limits[1]:
-        raise AddressError(f"{uri}: {key} = {value!r} must be a number from {limits[0]:g} to {limits[1]:g}")
-    return number

@@ -4,12 +4,13 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
-from urllib.parse import parse_qsl, urlsplit
 
 from calib.lenses.by_name import lens_of
 from calib.lenses.lens import COEFFICIENTS, LensError, LensModel
+from drivers.contract import address
+from drivers.contract import address_values as values
 from drivers.contract.device import AddressError
-from drivers.simulated import faults, values
+from drivers.simulated import faults
 from drivers.simulated.faults import FaultSchedule
 from drivers.simulated.scene.excursion import Excursion
 from drivers.simulated.scenes import SCENES, SceneSettings
@@ -50,7 +51,7 @@ KEYS: Mapping[str, Callable[[str], Any]] = {
     "order": values.one_of(*ORDERS),
     "blur": values.number(float, 0, 10),
     "crosstalk": values.number(float, 0, 0.5),
-    **dict.fromkeys(OPTICS, values.size),
+    **dict.fromkeys(OPTICS, values.size(16, 2048)),
 }
 
 #: Scenes with a surface to track.
@@ -208,21 +209,13 @@ def parse(uri: str) -> Address:
         AddressError: unknown scene or key, a key that does not apply to the scene or is given twice, or a value outside
             its range; names all three.
     """
-    parts = urlsplit(uri)
-    name = parts.netloc + parts.path
-    if name not in SCENES:
-        raise AddressError(f"{uri}: scene {name!r} is none of {sorted(SCENES)}")
-    read: dict[str, Any] = {}
-    for key, text in parse_qsl(parts.query, keep_blank_values=True):
-        if key in read:
-            raise AddressError(f"{uri}: {key} is given twice")
-        if key not in KEYS:
-            raise AddressError(f"{uri}: unknown key {key!r}; allowed are {sorted(KEYS)}")
-        if name not in SCENES_OF.get(key, SCENES):
-            raise AddressError(f"{uri}: {key} means nothing in {name!r}, only in {sorted(SCENES_OF[key])}")
-        try:
-            read[key] = KEYS[key](text)
-        except ValueError as error:
-            raise AddressError(f"{uri}: {key} = {text!r} must be {error}") from None
-    sizes = {key: read.pop(key) for key in OPTICS if key in read}
-    return Address(name, sizes=sizes, **{"blur": SHARP.get(name, 0.0), **read})
+    parts = address.split(uri)
+    scene = parts.netloc + parts.path
+    if scene not in SCENES:
+        raise AddressError(f"{uri}: scene {scene!r} is none of {sorted(SCENES)}")
+    given = address.values(uri, KEYS)
+    for key in given:
+        if scene not in SCENES_OF.get(key, SCENES):
+            raise AddressError(f"{uri}: {key} means nothing in {scene!r}, only in {sorted(SCENES_OF[key])}")
+    sizes = {key: given.pop(key) for key in OPTICS if key in given}
+    return Address(scene, sizes=sizes, **{"blur": SHARP.get(scene, 0.0), **given})

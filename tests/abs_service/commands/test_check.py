@@ -111,7 +111,7 @@ def test_a_mistake_for_scripts(checked):
             "devices.sim.controls: gain: no such control, allowed: none",
         ),
         ("simulated://sheet?seed=1&sensors=tof", "replay://none.mcap", "check with --replay FILE"),
-        ("simulated://sheet?seed=1&sensors=tof", "kinect1://?stream=ir", "unknown key 'stream'; allowed is"),
+        ("simulated://sheet?seed=1&sensors=tof", "kinect1://?stream=ir", "unknown key 'stream'; allowed are"),
         ('"rigid" }', '"rigid" }\nregion = { type = "mask", file = "no.png" }', "trackers.sheet.region: file = "),
         (
             'noise = { type = "gaussian_polynomial", sigma = [[0.005]] }',

@@ -22,8 +22,8 @@ from tests.drivers.genicam.node_map import BLAZE, node_map
     ("uri", "message"),
     [
         ("genicam://1/2", "a serial number is all"),
-        ("genicam://?components=Intensity", "must contain Range"),
-        ("genicam://?focal=0", "focal = '0' must be a number of pixels"),
+        ("genicam://?components=Intensity", "must be names of components .* one of them Range"),
+        ("genicam://?focal=0", "focal = '0' must be a number from 1 to 100000"),
         ("genicam://?size=1", "allowed are components, focal, format"),
     ],
 )

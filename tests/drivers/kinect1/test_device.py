@@ -201,7 +201,7 @@ def test_two_cameras_are_selected_by_serial_number(fake: FakeDevice) -> None:
         ("kinect1://?streams=", "some of"),
         ("kinect1://?rate=30", "unknown key 'rate'"),
         ("kinect1://?streams=ir&streams=depth", "twice"),
-        ("kinect1://A/b", "nothing may follow"),
+        ("kinect1://A/b", "all that may stand before"),
     ],
 )
 def test_invalid_addresses_name_what_is_allowed(uri: str, complaint: str) -> None:

@@ -36,7 +36,7 @@ def test_an_address_names_unit_and_head(uri: str, address: Address) -> None:
         ("o3r://unit.local", "'unit.local' must be an IPv4 address, such as 192.168.0.69"),
         ("o3r://192.168.0.69:http", "must be an IPv4 address"),
         ("o3r://192.168.0.69/port0", "an IPv4 address is all that may stand before"),
-        ("o3r://192.168.0.69?port=0", "unknown key 'port'; allowed is head"),
+        ("o3r://192.168.0.69?port=0", "unknown key 'port'; allowed are head"),
     ],
 )
 def test_a_wrong_address_is_refused_with_what_is_allowed(uri: str, complaint: str) -> None:

@@ -222,7 +222,7 @@ def test_no_device_raises_at_once_without_network_traffic() -> None:
         ("oak://?mode=lidar", "mode = 'lidar' must be one of auto, tof, stereo"),
         ("oak://?fps=1000", "fps = '1000' must be a number from 1 to 120"),
         ("oak://?dots=bright", "dots = 'bright' must be a number from 0 to 1"),
-        ("oak://?size=big", "size = 'big' must be a width and a height"),
+        ("oak://?size=big", "size = 'big' must be WIDTHxHEIGHT"),
         ("oak://1844/x", "all that may stand before"),
         ("oak://?recording=nowhere", "nowhere"),
     ],

@@ -1,13 +1,13 @@
-"""Parsers of an address's values; they raise a ValueError that names the allowed values."""
+"""Parsers of an address's values; each raises a ValueError that completes "KEY = TEXT must be …"."""
 
 import re
 from collections.abc import Callable, Iterable
+from pathlib import Path
 from typing import TypeVar
 
 Number = TypeVar("Number", int, float)
 
-#: Minimum and maximum width and height of images [px].
-_MIN_SIZE, _MAX_SIZE = 16, 2048
+_MODE = re.compile(r"([1-9]\d{1,3})x([1-9]\d{1,3})(?:@([1-9]\d{0,2}))?")
 
 
 def number(kind: type[Number], low: float, high: float) -> Callable[[str], Number]:
@@ -30,7 +30,7 @@ def one_of(*words: str) -> Callable[[str], str]:
 
     def read(text: str) -> str:
         if text not in words:
-            raise ValueError(f"one of {sorted(words)}")
+            raise ValueError(f"one of {', '.join(words)}")
         return text
 
     return read
@@ -82,10 +82,39 @@ def interval(low: float, high: float) -> Callable[[str], tuple[float, float]]:
     return read
 
 
-def size(text: str) -> tuple[int, int]:
-    """Parses width and height of an image [px], such as 640x480."""
-    match = re.fullmatch(r"(\d{1,4})x(\d{1,4})", text)
-    width, height = (int(number) for number in match.groups()) if match else (0, 0)
-    if not (_MIN_SIZE <= width <= _MAX_SIZE and _MIN_SIZE <= height <= _MAX_SIZE):
-        raise ValueError(f"WIDTHxHEIGHT, each from {_MIN_SIZE} to {_MAX_SIZE}")
-    return width, height
+def size(low: int, high: int) -> Callable[[str], tuple[int, int]]:
+    """Parser of width and height of an image, each from `low` to `high` [px], such as 640x480."""
+
+    def read(text: str) -> tuple[int, int]:
+        match = re.fullmatch(r"(\d{1,4})x(\d{1,4})", text)
+        width, height = (int(match[1]), int(match[2])) if match else (0, 0)
+        if not (low <= width <= high and low <= height <= high):
+            raise ValueError(f"WIDTHxHEIGHT, each from {low} to {high} [px]")
+        return width, height
+
+    return read
+
+
+def mode(text: str, others: str = "") -> tuple[int, int, int]:
+    """Parses width, height [px] and rate [Hz] of a stream, such as 640x480@60; the rate is 0 without one.
+
+    Args:
+        text: the value.
+        others: values that are allowed beside these, for the message.
+    """
+    match = _MODE.fullmatch(text)
+    if match is None:
+        raise ValueError(f"{others}a width and a height [px], such as 640x480, with a rate of its own 640x480@60")
+    return int(match[1]), int(match[2]), int(match[3] or 0)
+
+
+def switch(text: str) -> bool:
+    """Parses 0 or 1."""
+    if text not in ("0", "1"):
+        raise ValueError("0 or 1")
+    return text == "1"
+
+
+def file(text: str) -> Path | None:
+    """Parses a path; None if there is none."""
+    return Path(text) if text else None
