@@ -137,7 +137,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     parser = command_parser(name, module)
     logs.add_arguments(parser)
-    context = argparse.Namespace(commands=COMMANDS, modules=MODULES, reconfigured=reconfigured)
+    line = (*name.split(), *given)
+    context = argparse.Namespace(commands=COMMANDS, modules=MODULES, reconfigured=reconfigured, command_line=line)
     arguments = parser.parse_args(given, context)
     try:
         logs.set_up(arguments, name, given)

@@ -95,19 +95,22 @@ class Truth:
 
 
 class Sink(Protocol):
-    """Receiver of a device's callbacks. No method blocks or raises; a device may call them from any of its threads."""
+    """Receiver of a device's callbacks. No method blocks or raises; a device may call them from any of its threads.
+
+    A class that inherits from it ignores what it does not override.
+    """
 
     def on_frame(self, frame: Frame) -> None:
         """Called with each frame."""
-        ...
+        return
 
     def on_truth(self, truth: Truth) -> None:
         """Called with the ground truth of each exposure of a simulated device."""
-        ...
+        return
 
     def on_state(self, state: DeviceState, reason: str) -> None:
         """Called on each change of state, with the reason in plain words."""
-        ...
+        return
 
     def on_warning(self, condition: str, message: str) -> None:
         """Called when a condition needs attention while the device streams; an empty `message` clears it.
@@ -116,7 +119,7 @@ class Sink(Protocol):
             condition: name of the condition: "usb speed", "temperature".
             message: the problem and its remedy, in plain words.
         """
-        ...
+        return
 
 
 class Device(Protocol):

@@ -142,10 +142,8 @@ class Kinect1Device:
                 for transfer in reader.read(_READ_TIMEOUT_S):
                     if stop.is_set():
                         return
-                    for stamped in decoders[transfer.endpoint].decode(transfer, self._gate.epoch):
-                        if stamped.stepped:
-                            self._gate.begin_epoch()
-                        self._gate.deliver(stamped.frame)
+                    for frame, stamp in decoders[transfer.endpoint].decode(transfer):
+                        self._gate.deliver_stamped([frame], stamp, transfer.t_ns)
                         delivered += 1
                 count()
                 losses.update(delivered, sum(counted.values()))

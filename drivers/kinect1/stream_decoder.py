@@ -2,14 +2,13 @@
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from calib.camera import Camera
 from drivers.contract.capabilities import ClockInfo, StreamInfo
-from drivers.contract.clock import DeviceClock, stream_gauges
+from drivers.contract.clock import DeviceClock, Stamp, stream_gauges
 from drivers.contract.frame import Frame, Geometry, Kind, Reference
 from drivers.kinect1 import unpacking
 from drivers.kinect1.assembly import LONGEST_GAP, Assembler, RawImage
@@ -37,14 +36,6 @@ def camera_of(stream: Stream, plane: ReferencePlane) -> Camera:
     Depth has 480 rows and is computed from infra-red images of 488, so they have different camera models.
     """
     return plane.color_camera() if stream == Stream.COLOR else plane.depth_camera(stream.form.height)
-
-
-@dataclass(frozen=True, eq=False)
-class StampedFrame:
-    """A frame, and True if a step of the device's clock preceded it."""
-
-    frame: Frame
-    stepped: bool
 
 
 class StreamDecoder:
@@ -84,38 +75,34 @@ class StreamDecoder:
             f"{self.info.stream}.incomplete_images": float(self._incomplete),
         }
 
-    def decode(self, transfer: Transfer, epoch: int) -> Iterator[StampedFrame]:
-        """Frames that a transfer completes."""
+    def decode(self, transfer: Transfer) -> Iterator[tuple[Frame, Stamp]]:
+        """Frames that a transfer completes, without host times, and the stamps with these."""
         for image in self._assembler.feed(transfer.packets, transfer.lengths):
             # The timestamp is that of the first packet; the last one arrives a period later.
             stamp = self._clock.stamp(image.ticks, transfer.arrival_ns(image.row))
             is_depth = self._stream == Stream.DEPTH
             self._incomplete += bool(image.gone)
-            yield StampedFrame(
-                Frame(
-                    sensor=self.info.sensor,
-                    stream=self.info.stream,
-                    kind=self.info.kind,
-                    data=self._pixels(image),
-                    encoding=self.info.encoding,
-                    t_host_ns=stamp.t_host_ns,
-                    t_arrival_ns=transfer.t_ns,
-                    seq=image.seq,
-                    epoch=epoch + stamp.stepped,
-                    scale=DEPTH_SCALE if is_depth else 1.0,
-                    geometry=Geometry.Z if is_depth else Geometry.NONE,
-                    invalid=0 if is_depth else None,
-                    t_device_ticks=image.ticks,
-                    tick_hz=TICK_HZ,
-                    clock_domain=self.info.clock.domain,
-                    t_sigma_ns=stamp.t_sigma_ns,
-                    t_reference=Reference.END,
-                    exposure_s=self._exposure_s(),
-                    calib_id=self._calib_id,
-                    incomplete=bool(image.gone),
-                ),
-                stamp.stepped,
+            frame = Frame(
+                sensor=self.info.sensor,
+                stream=self.info.stream,
+                kind=self.info.kind,
+                data=self._pixels(image),
+                encoding=self.info.encoding,
+                t_host_ns=0,
+                t_arrival_ns=0,
+                seq=image.seq,
+                scale=DEPTH_SCALE if is_depth else 1.0,
+                geometry=Geometry.Z if is_depth else Geometry.NONE,
+                invalid=0 if is_depth else None,
+                t_device_ticks=image.ticks,
+                tick_hz=TICK_HZ,
+                clock_domain=self.info.clock.domain,
+                t_reference=Reference.END,
+                exposure_s=self._exposure_s(),
+                calib_id=self._calib_id,
+                incomplete=bool(image.gone),
             )
+            yield frame, stamp
 
     def _pixels(self, image: RawImage) -> NDArray[np.generic]:
         form = self._stream.form

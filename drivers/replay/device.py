@@ -200,7 +200,7 @@ class _Timeline:
 
 def _streams(recording: Recording, speed: float) -> tuple[StreamInfo, ...]:
     """Stream properties, from the first frame of each stream."""
-    first = dict(_first_frames(recording))
+    first = recording.first_frames()
     for sensor, stream in recording.counts:
         if (sensor, stream) not in first:
             raise RecordingError(f"{recording.path}: {sensor}/{stream} has no frame that can be read")
@@ -221,13 +221,3 @@ def _streams(recording: Recording, speed: float) -> tuple[StreamInfo, ...]:
         )
         for frame in (first[key] for key in recording.counts)
     )
-
-
-def _first_frames(recording: Recording) -> Iterator[tuple[tuple[str, str], Frame]]:
-    missing = set(recording.counts)
-    for item in recording.frames():
-        if isinstance(item, Frame) and item.key in missing:
-            missing.discard(item.key)
-            yield item.key, item
-        if not missing:
-            return

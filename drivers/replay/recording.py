@@ -106,6 +106,16 @@ class Recording:
         if first and not count:
             raise RecordingError(first)
 
+    def first_frames(self) -> dict[tuple[str, str], Frame]:
+        """The first frame of every stream that has one that can be read, by (sensor, stream); raises as `frames`."""
+        found: dict[tuple[str, str], Frame] = {}
+        for item in self.frames():
+            if isinstance(item, Frame):
+                found.setdefault(item.key, item)
+            if len(found) == len(self.counts):
+                break
+        return found
+
     def _wall_offset(self) -> int:
         for _, message in messages(self.path, self.contents, {codec.INFO_SCHEMA}):
             with suppress(DecodeError):  # counted when frames are read

@@ -67,7 +67,7 @@ class LineGuide:
 
     def __init__(self, console: Console) -> None:
         self._console = console
-        self._command_line = ""
+        self._latest = ""
 
     def __enter__(self) -> Self:
         """See `Guide`."""
@@ -81,9 +81,9 @@ class LineGuide:
         next_ = "; ".join(missing.text for missing in collector.missing_views[:1]) or "enough"
         reasons = "; ".join(f"{sensor}: {why}" for sensor, why in collector.latest.items() if why)
         line = f"kept {collector.kept}. Next: {next_}" if is_kept else reasons
-        if line and (is_kept or line != self._command_line):
+        if line and (is_kept or line != self._latest):
             self._console.print(line, highlight=False, markup=False, soft_wrap=True)
-        self._command_line = line
+        self._latest = line
 
 
 def draw(collector: Collector) -> RenderableType:

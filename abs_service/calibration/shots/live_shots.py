@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from abs_service.calibration.shots.shots import USED, Assembler, Shot, ShotsError
 from abs_service.pairing.synchroniser import Synchroniser
 from calib.camera import Camera
-from drivers.contract.device import Device, DeviceState, Truth
+from drivers.contract.device import Device, DeviceState, Sink
 from drivers.contract.frame import Frame, FrameSet
 
 #: Capacity of the frame queue; the oldest frames are dropped.
@@ -117,7 +117,7 @@ class LiveShots:
                 raise ShotsError(f"device {name} failed: {inbox.reason}")
 
 
-class _Inbox:
+class _Inbox(Sink):
     """Frame sink that keeps the newest frames, under their rig names."""
 
     def __init__(self, heads: Mapping[str, str]) -> None:
@@ -144,12 +144,6 @@ class _Inbox:
             self._frames.append(replace(frame, sensor=self._heads[frame.sensor]))
             self._arrived.set()
 
-    def on_truth(self, truth: Truth) -> None:
-        pass
-
     def on_state(self, state: DeviceState, reason: str) -> None:
         self.state, self.reason = state, reason
         self._arrived.set()
-
-    def on_warning(self, condition: str, message: str) -> None:
-        pass

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from abs_service.calibration.shots.frame_averaging import FrameAverager
 from abs_service.calibration.shots.shots import SensorShot
 from calib.camera import Camera
-from drivers.contract.device import Device, DeviceState, Truth
+from drivers.contract.device import Device, DeviceState, Sink
 from drivers.contract.frame import Frame, Geometry, Kind
 from drivers.opening import open_device
 from drivers.replay import Recording
@@ -190,7 +190,7 @@ class _Gathered:
         return np.stack([frames[n].si() for n in numbers]) if all(n in frames for n in numbers) else otherwise
 
 
-class _Collected:
+class _Collected(Sink):
     """Frame sink with a maximum number of frames."""
 
     def __init__(self, most: int) -> None:
@@ -203,14 +203,8 @@ class _Collected:
         self.frames.append(frame)
         self._more.release()
 
-    def on_truth(self, truth: Truth) -> None:
-        pass
-
     def on_state(self, state: DeviceState, reason: str) -> None:
         self.reason = reason
-
-    def on_warning(self, condition: str, message: str) -> None:
-        pass
 
     def wait(self) -> None:
         """Waits for the maximum number of frames, or a timeout."""

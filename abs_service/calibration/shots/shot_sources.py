@@ -43,7 +43,7 @@ class RecordingShots:
         return thinned(self._sets(), Assembler(self.cameras or self.recording.cameras), self.every_s)
 
     def _sets(self) -> Iterator[FrameSet]:
-        kinds = {frame.key: frame.kind for frame in self._first_frames()}
+        kinds = {key: frame.kind for key, frame in self.recording.first_frames().items()}
         used = [key for key, kind in kinds.items() if kind in USED]
         if not used:
             raise ShotsError(f"{self.recording.path}: no image in it shows a board: {', '.join(map('/'.join, kinds))}")
@@ -52,15 +52,6 @@ class RecordingShots:
         synchroniser = Synchroniser(reference, used, self.tolerance_ns)
         frames = (item for item in self.recording.frames(used) if isinstance(item, Frame))
         yield from synchroniser.group(frames)
-
-    def _first_frames(self) -> Iterator[Frame]:
-        missing = set(self.recording.counts)
-        for item in self.recording.frames():
-            if isinstance(item, Frame) and item.key in missing:
-                missing.discard(item.key)
-                yield item
-            if not missing:
-                return
 
 
 @dataclass(frozen=True)

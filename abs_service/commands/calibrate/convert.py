@@ -101,7 +101,7 @@ def _chosen(contents: list[Content], arguments: argparse.Namespace) -> Content:
 def _write(out: Path, target: str, cameras: Mapping[str, Camera], arguments: argparse.Namespace) -> tuple[str, ...]:
     """Writes the file; returns descriptions of what the format cannot hold."""
     if target == exchange.OWN:
-        origin = provenance.trace(sys.argv[1:], arguments.inputs)
+        origin = provenance.trace(arguments.command_line, arguments.inputs)
         sensors = {name: rig_file.SensorCalibration(camera) for name, camera in cameras.items()}
         name = re.sub(r"[^A-Za-z0-9_-]+", "_", out.name.partition(".")[0]) or "rig"
         rig_file.write(rig_file.RigCalibration(name, sensors, origin, "unknown"), out)

@@ -88,7 +88,7 @@ def run(arguments: argparse.Namespace) -> int:
         groups = _groups(arguments)
     paths = [Path(source) for source in arguments.sources if "://" not in source]
     paths += [path for path in (arguments.target, arguments.calibration) if path is not None]
-    trace = provenance.trace(sys.argv[1:], paths)
+    trace = provenance.trace(arguments.command_line, paths)
     worst = Exit.OK
     for index, (setting, given) in enumerate(groups.items()):
         group, said = repeated.counted_once(given)

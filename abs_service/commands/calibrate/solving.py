@@ -5,7 +5,6 @@ import itertools
 import json
 import math
 import re
-import sys
 from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -37,7 +36,7 @@ def reported(title: str, arguments: argparse.Namespace) -> Iterator[None]:
     except Exception as error:
         if isinstance(error, UnusableImagesError) or type(error).__module__.startswith("calib."):
             data = [path for path in (arguments.source, arguments.target) if path is not None and path.exists()]
-            origin = provenance.trace(sys.argv[1:], data)
+            origin = provenance.trace(arguments.command_line, data)
             made = Report(title, origin, (Verdict(Level.BAD, f"{error}."),), ())
             say(f"wrote {', '.join(map(str, page.write(made, arguments.out)))}")
         raise
@@ -150,7 +149,7 @@ def finish(title: str, task: Task, arguments: argparse.Namespace, found: Materia
         assess(solution, distance, arguments.needed, say, arguments.half), solution, arguments.needed
     )
     data = [path for path in (*found.data, arguments.target) if path.exists()]
-    origin = provenance.trace(sys.argv[1:], data)
+    origin = provenance.trace(arguments.command_line, data)
     name = re.sub(r"[^A-Za-z0-9_-]+", "_", arguments.out.name.partition(".")[0]) or "rig"
     made = report.calibration(name, origin, solution, assessment.trusted, found.known)
     notes = [f"{sensor}, shot {shot}: {error}" for (shot, sensor), error in found.seen.rejected.items()]

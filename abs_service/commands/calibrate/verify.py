@@ -75,7 +75,7 @@ def run(arguments: argparse.Namespace) -> int:
     if has_two_ways_up(target) and seen.corners:
         cameras = {name: sensor.camera for name, sensor in known.sensors.items()}
         seen = replace(seen, corners=tuple(numbered_alike(seen.corners, cameras)))
-    origin = provenance.trace(sys.argv[1:], [arguments.calibration, arguments.target, *files])
+    origin = provenance.trace(arguments.command_line, [arguments.calibration, arguments.target, *files])
     path = arguments.report or arguments.calibration.with_name(f"{arguments.calibration.stem}-verify.html")
     try:
         report = verification.verify(known, seen, origin)

@@ -13,8 +13,8 @@ import usb.core
 import usb.util
 
 from drivers.contract.device import DeviceInfo
-from drivers.contract.discovery import Availability, Found
-from drivers.kinect1 import udev
+from drivers.contract.discovery import UDEV_REMEDY, Availability, Found
+from drivers.kinect1 import usb_numbers
 
 #: Factory of pyusb backends.
 BackendFactory = Callable[[], Any]
@@ -58,10 +58,10 @@ def fresh_backend() -> Any:
 
 def list_attached(backend: Any) -> list[AttachedCamera]:
     """All cameras on the bus; none is left open. Never raises."""
-    devices: list[Any] = list(usb.core.find(find_all=True, idVendor=udev.VENDOR, backend=backend) or ())
+    devices: list[Any] = list(usb.core.find(find_all=True, idVendor=usb_numbers.VENDOR, backend=backend) or ())
     result = []
     for device in devices:
-        if device.idProduct in udev.CAMERAS:
+        if device.idProduct in usb_numbers.CAMERAS:
             result.append(AttachedCamera(_probe(device, devices), device))
             usb.util.dispose_resources(device)
     return result
@@ -81,7 +81,7 @@ def _probe(device: Any, neighbours: list[Any]) -> Found:
         remedy = "it needs USB 2 with 480 Mbit/s: use another port or cable"
     info = DeviceInfo(
         uri=f"kinect1://{serial}",
-        model=udev.CAMERAS[device.idProduct],
+        model=usb_numbers.CAMERAS[device.idProduct],
         serial=serial,
         firmware=f"{device.bcdDevice >> 8:x}.{device.bcdDevice & 0xFF:02x}",
         link=_LINKS.get(device.speed or 0, ""),
@@ -95,7 +95,7 @@ def _serial(device: Any, neighbours: list[Any]) -> str:
     if serial.strip("0"):
         return serial
     for other in neighbours:
-        if other.idProduct in udev.AUDIO and _hub(other) == _hub(device):
+        if other.idProduct in usb_numbers.AUDIO and _hub(other) == _hub(device):
             with suppress(usb.core.USBError):
                 serial = _read_serial(other)
             usb.util.dispose_resources(other)
@@ -139,7 +139,7 @@ def _try_to_claim(device: Any) -> None:
 def _availability(error: usb.core.USBError) -> tuple[Availability, str, str]:
     match error.errno:
         case errno.EACCES | errno.EPERM:
-            return Availability.NO_PERMISSION, "you may not open it", udev.PERMISSION_REMEDY
+            return Availability.NO_PERMISSION, "you may not open it", UDEV_REMEDY
         case errno.EBUSY:
             return Availability.BUSY, "another program uses it", "end that program"
     return Availability.FAULTY, f"it does not answer ({error.strerror})", "plug it in again and check its power supply"

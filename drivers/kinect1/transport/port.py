@@ -10,7 +10,8 @@ import usb.core
 import usb.util
 
 from drivers.contract.device import DeviceError
-from drivers.kinect1 import udev
+from drivers.contract.discovery import UDEV_REMEDY
+from drivers.kinect1 import usb_numbers
 from drivers.kinect1.transport.transfer import DisconnectedError, Reader
 
 #: Factory of readers of a device's streams.
@@ -133,7 +134,7 @@ class Port:
                 raise
             raise DeviceError(
                 f"the kernel's webcam driver holds the camera and does not let go ({error.strerror}):  "
-                f"{udev.KERNEL_REMEDY}"
+                f"{usb_numbers.KERNEL_REMEDY}"
             ) from error
 
     def _setting(self) -> int:
@@ -164,7 +165,7 @@ def translate(error: usb.core.USBError) -> DeviceError:
         case errno.ENODEV | errno.ENOENT | errno.ESHUTDOWN:
             return DisconnectedError("the camera was unplugged")
         case errno.EACCES | errno.EPERM:
-            return DeviceError(f"you may not open the camera; {udev.PERMISSION_REMEDY}")
+            return DeviceError(f"you may not open the camera; {UDEV_REMEDY}")
         case errno.EBUSY:
             return DeviceError("another program uses the camera; end it")
         case errno.ETIMEDOUT:

@@ -5,7 +5,7 @@ import math
 import subprocess
 import sys
 import time
-from pathlib import Path
+from importlib import resources
 from unittest import mock
 
 import numpy as np
@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from drivers.contract.device import AddressError, ControlError, DeviceError
 from drivers.contract.discovery import Availability
 from drivers.contract.frame import Geometry, Kind
-from drivers.kinect1 import udev
+from drivers.kinect1 import usb_numbers
 from drivers.kinect1.address import Address, parse
 from drivers.kinect1.camera import Stream
 from drivers.kinect1.device import Kinect1Device
@@ -134,13 +134,12 @@ def test_a_kernel_driver_that_cannot_be_detached_is_named(fake: FakeDevice) -> N
     assert fake.opened == 0
 
 
-def test_without_permission_the_message_has_the_udev_rule_and_its_path(fake: FakeDevice) -> None:
+def test_without_permission_the_message_says_how_to_install_the_udev_rules(fake: FakeDevice) -> None:
     fake.refusal = errno.EACCES
     (found,) = find(lambda: FakeBackend([fake]))
     assert found.availability == Availability.NO_PERMISSION
-    with pytest.raises(DeviceError, match=r"/etc/udev/rules\.d/60-abs-service\.rules") as caught:
+    with pytest.raises(DeviceError, match=r"abs-service devices --udev .* /etc/udev/rules\.d/60-abs-service\.rules"):
         opened(fake)
-    assert 'ATTR{idProduct}=="02ae"' in str(caught.value)
 
 
 def test_a_camera_in_use_cannot_be_opened(fake: FakeDevice) -> None:
@@ -245,6 +244,7 @@ def test_pyusb_is_imported_lazily() -> None:
     )
 
 
-def test_the_shipped_udev_rules_are_those_of_the_message() -> None:
-    shipped = (Path(__file__).parents[3] / "docker" / Path(udev.PATH).name).read_text(encoding="utf-8")
-    assert udev.RULES in shipped
+def test_the_shipped_udev_rules_name_the_camera_and_its_audio_part() -> None:
+    shipped = resources.files("drivers.contract").joinpath("60-abs-service.rules").read_text(encoding="utf-8")
+    for product in (*usb_numbers.CAMERAS, *usb_numbers.AUDIO):
+        assert f'ATTR{{idVendor}}=="{usb_numbers.VENDOR:04x}", ATTR{{idProduct}}=="{product:04x}"' in shipped

@@ -23,7 +23,7 @@ def test_depth_images_with_lost_packets_are_delivered_with_no_return_where_they_
     frames = []
     for first in range(0, 20 * 8000, 64):
         packets, lengths = shown.microframes(first, 64)
-        frames += [one.frame for one in decoder.decode(Transfer(0x82, packets, lengths, first * 125_000), 0)]
+        frames += [frame for frame, _ in decoder.decode(Transfer(0x82, packets, lengths, first * 125_000))]
     incomplete = [frame for frame in frames if frame.incomplete]
     for frame in frames:
         lost = frame.data != truth[frame.t_device_ticks // DEPTH.period_ticks % 3]

@@ -12,7 +12,7 @@ from abs_service.commands.parts.options import OptionError
 from abs_service.pairing.synchroniser import Synchroniser
 from calib.rig import Rig
 from drivers import opening
-from drivers.contract.device import Device, DeviceState, Truth
+from drivers.contract.device import Device, DeviceState, Sink
 from drivers.contract.frame import Frame, FrameSet
 
 #: Drivers that touch no hardware, so that opening a device is the best check of its address.
@@ -76,7 +76,7 @@ def _frame_sets(
     yield from synchroniser.flush()
 
 
-class _Sink:
+class _Sink(Sink):
     """Puts frames under their rig names into a queue, and None at the end."""
 
     def __init__(self, heads: Mapping[str, str], arrived: "SimpleQueue[Frame | None]") -> None:
@@ -87,12 +87,6 @@ class _Sink:
         if frame.sensor in self._heads:
             self._arrived.put(replace(frame, sensor=self._heads[frame.sensor]))
 
-    def on_truth(self, truth: Truth) -> None:
-        pass
-
     def on_state(self, state: DeviceState, reason: str) -> None:
         if state.is_over:
             self._arrived.put(None)
-
-    def on_warning(self, condition: str, message: str) -> None:
-        pass
