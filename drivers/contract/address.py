@@ -20,7 +20,7 @@ def split(uri: str) -> SplitResult:
 
 
 def name(uri: str, what: str = "a serial number") -> str:
-    """What stands before the '?' of an address: `what` of the device, "" for the only one.
+    """The part before the '?' of an address: `what` of the device, "" for the only one.
 
     Raises:
         AddressError: something else stands there.

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from calib import pose
 from calib.camera import Camera
 from calib.warp.mesh import MeshWarp
-from calib.warp.splat import SplatWarp
+from evaluation.inputs.warping.splat import SplatWarp
 from evaluation.scenes.solids import Ball, Plane, Solid, image, seen_by
 
 SOURCE = Camera(640, 576, 504.0, 504.2, 320.4, 326.1)

@@ -9,7 +9,7 @@ from calib import pose
 from calib.camera import Camera
 from calib.warp import errors
 from calib.warp.mesh import LARGEST_STEP_M
-from calib.warp.splat import WIDTH, SplatWarp
+from evaluation.inputs.warping.splat import WIDTH, SplatWarp
 from tests.calib.warp.scenes import BOARD, SOURCE, VIEWS, WALL, image, seen_by
 
 ANY_VIEW = pytest.mark.parametrize("view", VIEWS.values(), ids=VIEWS)
