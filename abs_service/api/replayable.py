@@ -9,11 +9,7 @@ from drivers.contract.frame import Frame
 
 @runtime_checkable
 class Replayable(Protocol):
-    """Images in the order of their times, as a `Recording` has them.
-
-    Attributes:
-        path: of the file, for messages.
-    """
+    """Images in the order of their times, as a `Recording` has them."""
 
     path: Path
 

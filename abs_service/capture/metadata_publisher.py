@@ -15,12 +15,7 @@ from calib.camera import Camera
 
 @dataclass(frozen=True)
 class Described:
-    """Sensors as a configuration describes them.
-
-    Attributes:
-        toml: the whole configuration.
-        noises: by sensor; see `sensor_metadata.sensor_model`.
-    """
+    """Sensors as a configuration describes them."""
 
     toml: str
     noises: Mapping[str, Mapping[str, Any]]

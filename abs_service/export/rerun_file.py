@@ -40,7 +40,7 @@ def write(
     view_hz: float,
     advance: Callable[[], None],
 ) -> tuple[int, tuple[str, ...]]:
-    """Writes an RRD file; see `RerunFile`.
+    """Writes an RRD file; returns the number of images and estimates, and what is a picture only. See `RerunFile`.
 
     Args:
         recording: its images and cameras, if there are any.
@@ -48,9 +48,6 @@ def write(
         path: of the file.
         view_hz: largest rate of the points of a sensor [Hz]; 0 for none.
         advance: called for each image and estimate.
-
-    Returns:
-        Number of images and estimates, and what could not be converted.
 
     Raises:
         RecordingError: a part of the recording is damaged.

@@ -33,9 +33,6 @@ class ViewerCopy:
         cameras: of the recording, by sensor.
         contents: of the recording.
         view_hz: largest rate of the meshes and points [Hz]; 0 for none.
-
-    Attributes:
-        written: number of messages written.
     """
 
     def __init__(self, file: McapFile, cameras: Mapping[str, Camera], contents: Contents, view_hz: float):

@@ -19,7 +19,7 @@ from drivers.replay.contents import DAMAGE, Contents, RecordingError, read_chunk
 def export(
     source: Path, contents: Contents, target: BinaryIO, view_hz: float, advance: Callable[[], None]
 ) -> tuple[int, tuple[str, ...]]:
-    """Copies a recording for viewers; see `ViewerCopy`.
+    """Copies a recording; returns the number of messages and what stays as it was. See `ViewerCopy`.
 
     Args:
         source: a finished recording.
@@ -27,9 +27,6 @@ def export(
         target: where the copy is written.
         view_hz: largest rate of the meshes and points that are added [Hz]; 0 for none.
         advance: called for each message that was read.
-
-    Returns:
-        Number of messages written, and what could not be converted.
 
     Raises:
         ExportError: the recording is damaged, unfinished, or holds what is no message of ours.

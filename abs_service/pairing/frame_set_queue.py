@@ -59,9 +59,6 @@ class FrameSetQueue:
         common_clock: brings their times to one clock.
         synchroniser: makes sets of them.
         clock: CLOCK_MONOTONIC [ns].
-
-    Attributes:
-        skipped: frame sets passed over.
     """
 
     def __init__(

@@ -34,9 +34,6 @@ class DepthImage:
         distance: radial distances (height, width) [m], NaN without return.
         amplitude: amplitudes (height, width) in the sensor's unit, or in their place what the sensor's noise model is
             about: its own deviations [m] (`calib.noise.measured`); NaN where there is none.
-
-    Attributes:
-        shape: height and width.
     """
 
     def __init__(self, distance: NDArray[np.float32], amplitude: NDArray[np.float32]):

@@ -21,14 +21,7 @@ class ReportFileError(Exception):
 
 
 def write(report: Report, path: Path) -> tuple[Path, Path]:
-    """Writes a report as an HTML page, and as JSON beside it.
-
-    Args:
-        report: the report.
-        path: of the page; the name of the JSON file ends in `.json` instead.
-
-    Returns:
-        Both paths.
+    """Writes a report as an HTML page, and as JSON beside it, whose name ends in `.json`; returns both paths.
 
     Raises:
         ReportFileError: one of them cannot be written.

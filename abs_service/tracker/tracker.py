@@ -42,9 +42,6 @@ class Tracker:
         limits: thresholds of the status.
         registration_m: standard deviation of the pose of a template's mesh; 0 if the first frame defines it [m].
         centers: centres of the imaging sensors, each (3,) [m].
-
-    Attributes:
-        model: the deformation model.
     """
 
     def __init__(

@@ -37,9 +37,6 @@ class OfflineTracker:
         headers: writes the headers.
         file: takes the messages.
         clock: measures the time of a search [ns]; nothing depends on it.
-
-    Attributes:
-        log: its estimates so far.
     """
 
     def __init__(

@@ -45,12 +45,7 @@ class SameImagesError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class MissingView:
-    """Instruction for a missing view.
-
-    Attributes:
-        sensor: the sensor that needs it.
-        text: sentence for the person holding the board.
-    """
+    """Instruction for a missing view."""
 
     sensor: str
     text: str

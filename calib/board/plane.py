@@ -46,16 +46,13 @@ def plane_view(
     distance: NDArray[np.floating],
     sigma: NDArray[np.floating],
 ) -> PlaneView | None:
-    """Distances that a sensor measured on a board.
+    """Distances that a sensor measured on a board, at most `MAX_PIXELS`; None with fewer than `MIN_PIXELS`.
 
     Args:
         sensor, shot, t_s: see `PlaneView`.
         inside: pixels (height, width) on the board: `region` and `white_pixels`.
         distance: radial distances (height, width) [m], NaN without return.
         sigma: their deviations (height, width) [m]; NaN is replaced by the scatter of neighbouring distances.
-
-    Returns:
-        The view, subsampled to `MAX_PIXELS`; None with fewer than `MIN_PIXELS` distances.
     """
     rows, columns = np.nonzero(inside & np.isfinite(distance))
     if len(rows) < MIN_PIXELS:

@@ -10,12 +10,7 @@ from calib.noise.base import DepthNoise, Pixels
 
 @dataclass(frozen=True)
 class Scaled:
-    """μ of a law, and σ = factor · σ of the law.
-
-    Attributes:
-        law: the noise model.
-        factor: on its deviation, more than 0.
-    """
+    """μ of a law, and σ = factor · σ of the law."""
 
     law: DepthNoise
     factor: float

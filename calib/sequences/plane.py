@@ -26,7 +26,7 @@ def find(
     tolerance: NDArray[np.floating],
     generator: np.random.Generator,
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Largest plane in an image.
+    """Largest plane q (3,) [1/m] in an image, and its connected pixels (height, width).
 
     Args:
         distance: radial (height, width) [m].
@@ -34,9 +34,6 @@ def find(
         where: mask of candidate pixels (height, width).
         tolerance: largest distance of a pixel from its plane (height, width) [m].
         generator: draws the triples of pixels.
-
-    Returns:
-        Plane q (3,) [1/m], and its connected pixels (height, width).
 
     Raises:
         NoiseError: there is no plane.

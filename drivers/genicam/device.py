@@ -22,14 +22,7 @@ _NUMBERS = 65535
 
 @dataclass(frozen=True, slots=True, eq=False)
 class First:
-    """The first exposure after opening, from which the streams follow.
-
-    Attributes:
-        shot: its images.
-        distances: their meaning.
-        camera: of all of them.
-        rate_hz: images per second.
-    """
+    """The first exposure after opening, from which the streams follow."""
 
     shot: Shot
     distances: Distances

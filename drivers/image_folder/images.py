@@ -86,12 +86,7 @@ class DepthImages:
 
 @dataclass(frozen=True)
 class ColorImages:
-    """Stream `color` of sensor `color`: 8-bit images; grey images get three equal channels, alpha is ignored.
-
-    Attributes:
-        files: the images.
-        camera: camera of the images.
-    """
+    """Stream `color` of sensor `color`: 8-bit images; grey images get three equal channels, alpha is ignored."""
 
     files: Sequence[ImageFile]
     camera: Camera
@@ -118,11 +113,7 @@ class ColorImages:
 
 @dataclass(frozen=True)
 class ImageFolder:
-    """The images of a folder.
-
-    Attributes:
-        streams: by sensor name.
-    """
+    """The images of a folder."""
 
     streams: Mapping[str, Images]
 

@@ -32,10 +32,6 @@ _NEEDED = (ChunkType.DISTANCE, ChunkType.TOF_INFO)
 class O3rBuffers:
     """A file of messages with radial distances, their deviations, amplitudes and confidences.
 
-    Attributes:
-        cameras: the only sensor's, by its name.
-        total: number of frames.
-
     Raises:
         ForeignRecordingError: unreadable or malformed file, or a message without distances or calibration.
     """

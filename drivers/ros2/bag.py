@@ -44,10 +44,6 @@ class _Stream:
 class Ros2Bag:
     """The image topics of a bag; the rig's frame is that of the first depth images.
 
-    Attributes:
-        cameras: by head.
-        total: number of images.
-
     Raises:
         ForeignRecordingError: unreadable bag, no calibrated depth images, cameras that are not connected by static
             transforms, or `rosbags` is not installed.

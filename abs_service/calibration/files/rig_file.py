@@ -89,15 +89,7 @@ class Covariance:
 
 @dataclass(frozen=True)
 class RigCalibration:
-    """Complete content of a calibration file.
-
-    Attributes:
-        name: of the rig.
-        sensors: by name.
-        provenance: origin of the calibration.
-        verdict: of the command that made it; unknown without a verdict.
-        covariance: of the parameters; empty if unknown.
-    """
+    """Complete content of a calibration file."""
 
     name: str
     sensors: Mapping[str, SensorCalibration]
@@ -107,10 +99,7 @@ class RigCalibration:
 
 
 def write(calibration: RigCalibration, path: Path) -> list[Path]:
-    """Writes a calibration file, with its covariances beside it if there are any.
-
-    Returns:
-        Paths of the written files.
+    """Writes a calibration file, with its covariances beside it if there are any; returns the paths of both.
 
     Raises:
         RigFileError: a file cannot be written.

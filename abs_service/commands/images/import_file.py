@@ -15,16 +15,7 @@ from drivers.encoding.mcap_file import McapFile
 
 
 def write(path: Path, rig: str, recording: ForeignRecording, rig_toml: bytes) -> Mapping[tuple[str, str], int]:
-    """Writes a recording.
-
-    Args:
-        path: file to write; one that exists is replaced.
-        rig: name of the rig.
-        recording: its content.
-        rig_toml: configuration to attach, empty for none.
-
-    Returns:
-        Number of images by (sensor, stream).
+    """Writes a recording, in place of one that exists; returns the number of images by (sensor, stream).
 
     Raises:
         ForeignRecordingError: it cannot be read, or there is nothing in it.

@@ -40,10 +40,7 @@ def check(path: Path) -> None:
 
 
 def draw(settings: config.ServiceConfig, name: str, path: Path, source: Source) -> str:
-    """Draws the preview of one tracker; warnings, or the reason why it finds no object, go to standard error.
-
-    Returns:
-        A line about the written file.
+    """Draws one tracker's preview and returns a line about the file; why it finds no object goes to standard error.
 
     Raises:
         OptionError: there is no depth image, or the file cannot be written.

@@ -154,15 +154,12 @@ def recover_again_and_again(
 
 
 def recover_leftovers(settings: RecorderSettings, health: Health, begun_s: float) -> bool:
-    """Recovers unfinished files of earlier recorders; reports the result in health and log.
+    """Recovers unfinished files of earlier recorders, as health and log tell; True if none is to be tried again.
 
     Args:
         settings: of the recorder.
         health: of the recorder.
         begun_s: Unix time [s]; what has been written since may be a file that somebody has not locked yet.
-
-    Returns:
-        Whether there is nothing to be tried again.
     """
     lacking = ""
     remove_interrupted(settings.directory)

@@ -102,13 +102,10 @@ class Retention:
         return Growth(rate, sum(file.size for file in self.files()), self.retain_s, self.retain_bytes)
 
     def apply(self, ages: Callable[[Iterable[Kept]], dict[str, int]]) -> tuple[list[Path], list[OSError]]:
-        """Deletes the files beyond the limits.
+        """Deletes the files beyond the limits; returns them, and why others could not be deleted.
 
         Args:
             ages: ages of files [ns].
-
-        Returns:
-            The deleted files, and why others could not be deleted.
         """
         deleted: list[Path] = []
         failures: list[OSError] = []

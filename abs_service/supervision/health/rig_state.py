@@ -40,11 +40,6 @@ class RigState:
     Args:
         trackers: their names.
         clock: monotonic time [ns].
-
-    Attributes:
-        trackers: log of each tracker.
-        received: health by component.
-        malformed: messages that could not be parsed.
     """
 
     def __init__(self, trackers: Iterable[str], clock: Callable[[], int]) -> None:

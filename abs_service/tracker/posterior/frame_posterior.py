@@ -19,15 +19,7 @@ from abs_service.tracker.terms.base import SensorFit
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FramePosterior:
-    """The cost of theta for one observation; a function of theta alone, in whatever order it is asked.
-
-    Attributes:
-        model: the deformation model.
-        objective: the measurements.
-        stretch, shape: priors that hold for all frames.
-        motion: the motion prior of this frame.
-        surfaces: the meshes that this frame deforms.
-    """
+    """The cost of theta for one observation; a function of theta alone, in whatever order it is asked."""
 
     model: DeformationModel
     objective: ObservedObjective

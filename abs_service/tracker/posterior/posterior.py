@@ -1,5 +1,7 @@
 """Likelihood and priors of one object over time (eq. 16); each frame has a posterior of its own."""
 
+from dataclasses import dataclass
+
 from abs_service.pairing.observation import Observation
 from abs_service.tracker.models.base import DeformationModel
 from abs_service.tracker.objectives.base import Objective
@@ -10,28 +12,20 @@ from abs_service.tracker.posterior.priors.stretch_prior import StretchPrior
 from abs_service.tracker.posterior.surfaces import FrameSurfaces
 
 
+@dataclass(frozen=True, slots=True, eq=False)
 class Posterior:
-    """Likelihood and priors of one object over time.
+    """Likelihood and priors of one object over time."""
 
-    Attributes:
-        dimension: of Θ.
-        model, objective, stretch, shape, motion: see above.
-    """
+    model: DeformationModel
+    objective: Objective
+    stretch: StretchPrior
+    shape: ShapePrior
+    motion: MotionPrior
 
-    def __init__(
-        self,
-        model: DeformationModel,
-        objective: Objective,
-        stretch: StretchPrior,
-        shape: ShapePrior,
-        motion: MotionPrior,
-    ):
-        self.dimension = len(model.rest)
-        self.model = model
-        self.objective = objective
-        self.stretch = stretch
-        self.shape = shape
-        self.motion = motion
+    @property
+    def dimension(self) -> int:
+        """Number of parameters."""
+        return len(self.model.rest)
 
     def observe(self, observation: Observation) -> FramePosterior:
         """Predicts theta, and renders every noise model over its image around the predicted surface.

@@ -73,14 +73,11 @@ class AttributeGradients(Protocol):
         ...
 
     def at_centers(self, values: NDArray[np.float32], steps: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Attributes of a population at the centres of the pixels into which its vertices project.
+        """Attributes (population or 1, channels, n) at the centres of the pixels into which the vertices project.
 
         Args:
             values: attributes of the vertices (channels, n).
             steps: as the kernel has written them.
-
-        Returns:
-            (population or 1, channels, n).
         """
         ...
 

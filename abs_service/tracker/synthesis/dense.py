@@ -91,11 +91,7 @@ class Dense:
 
 
 class DenseView:
-    """The pixels that a mesh covers in one camera's image.
-
-    Attributes:
-        camera: the camera.
-    """
+    """The pixels that a mesh covers in one camera's image."""
 
     def __init__(
         self, camera: Camera, faces: NDArray[np.int32], attributes: NDArray[np.float32], step: int, detail: int

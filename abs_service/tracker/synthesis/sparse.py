@@ -82,11 +82,7 @@ class Sparse:
 
 
 class SparseView:
-    """Projection of the vertices of a mesh into one camera.
-
-    Attributes:
-        camera: the camera.
-    """
+    """Projection of the vertices of a mesh into one camera."""
 
     def __init__(
         self,

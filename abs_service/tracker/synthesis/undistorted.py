@@ -27,12 +27,7 @@ class Settings:
 
 
 class Undistorted:
-    """Resamples images by precomputed nearest-neighbour tables, so that no two measurements are mixed.
-
-    Attributes:
-        canvas: the mesh.
-        resamples: true.
-    """
+    """Resamples images by precomputed nearest-neighbour tables, so that no two measurements are mixed."""
 
     resamples = True
 

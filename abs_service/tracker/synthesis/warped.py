@@ -48,12 +48,7 @@ class Settings:
 
 
 class Warped:
-    """One common projection for all sensors.
-
-    Attributes:
-        canvas: the mesh.
-        resamples: true.
-    """
+    """One common projection for all sensors."""
 
     resamples = True
 

@@ -14,11 +14,7 @@ from calib.noise.images.binary import LightBarrier
 
 
 class BarrierTerm:
-    """−log of the probability of the reading, given whether the mesh crosses the beam.
-
-    Attributes:
-        sensor: name of the sensor.
-    """
+    """−log of the probability of the reading, given whether the mesh crosses the beam."""
 
     def __init__(self, sensor: str, camera: Camera, faces: NDArray[np.int32], noise: LightBarrier, bounds: Bounds):
         self.sensor = sensor

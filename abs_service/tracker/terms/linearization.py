@@ -142,12 +142,7 @@ class PointLinearization:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Together:
-    """Concatenation of several linearisations.
-
-    Attributes:
-        all: the linearisations.
-        dimension: number of parameters.
-    """
+    """Concatenation of several linearisations."""
 
     all: tuple[Linearization | PointLinearization, ...]
     dimension: int

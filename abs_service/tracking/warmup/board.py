@@ -26,11 +26,7 @@ _NOISE = GaussianPolynomial(((0.01,), (1e-4,)))
 
 
 def load_cached(noises: Mapping[str, Noise], plan: Plan) -> bool:
-    """Loads kernels before the cameras are known, as for cameras without distortion; compiles none.
-
-    Returns:
-        False if a kernel was not in the cache.
-    """
+    """Loads kernels for cameras without distortion, before those are known; False if one was not in the cache."""
     try:
         with cached_only():
             _track_board({name: Sensor(name, _CAMERA, noise) for name, noise in noises.items()}, plan)

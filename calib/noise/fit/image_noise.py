@@ -36,7 +36,7 @@ def sample(model: ValueNoise, generator: np.random.Generator, real: ArrayLike) -
 def from_static_scene(
     images: ArrayLike, full_scale: float = LEVELS - 1
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Measured and true values from images of a static scene, as input of a `fit`.
+    """Measured and true values (n, …) from images of a static scene, as input of a `fit`; NaN where excluded.
 
     The mean over the images replaces the true value. Residuals from the mean are too small by the factor √((n − 1) /
     n); they are scaled to the unbiased variance.
@@ -45,9 +45,6 @@ def from_static_scene(
         images: (n, …), at least two.
         full_scale: largest value of a pixel. Pixels that reach it or 0 in any image are excluded, because their noise
             is clipped.
-
-    Returns:
-        Measured and true values, both (n, …); NaN where excluded.
 
     Raises:
         NoiseError: fewer than two images.

@@ -98,9 +98,6 @@ def evaluate(
         a: amplitudes, like `place`.
         distances, amplitudes: the domain.
 
-    Returns:
-        Values (…, n).
-
     Raises:
         IndexError: index out of range; the compiled loop does not check it.
     """

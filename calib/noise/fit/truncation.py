@@ -11,19 +11,16 @@ _LARGEST = 1.5
 
 
 def deviation_within(mean_square: float, cut: float, channels: int = 1) -> float:
-    """Standard deviation s of the normal distribution whose values within a cut have this mean square.
+    """Standard deviation s ≤ 1.5 cut of the normal distribution whose values within a cut have this mean square.
 
     Truncation biases the mean square: by 2.7 % for a cut at three deviations, by 43 % if the true deviation is twice
-        the assumed one. With k channels, all of deviation s, and r² the mean of a residual's squares, E[r² | r < cut] =
-        s² F(k + 2, q) / F(k, q), q = k cut² / s² and F the cumulative distribution of χ²; solved for s.
+    the assumed one. With k channels, all of deviation s, and r² the mean of a residual's squares, E[r² | r < cut] =
+    s² F(k + 2, q) / F(k, q), q = k cut² / s² and F the cumulative distribution of χ²; solved for s.
 
     Args:
         mean_square: of all residuals r < cut; NaN stays NaN.
         cut: largest residual that is included.
         channels: number of values that each residual is the root mean square of.
-
-    Returns:
-        s, at most 1.5 times the cut.
     """
     squares, deviations = _table(channels)
     return cut * float(np.interp(mean_square / cut**2, squares, deviations))

@@ -89,15 +89,12 @@ def between_shots(boards: ShotPoses, pairs: NDArray[np.intp], times: NDArray[np.
 
 
 def neighbours(times: NDArray[np.float64], shots: NDArray[np.float64], longest_gap: float) -> NDArray[np.intp]:
-    """Rows (views, 2) of the shots around views at given times.
+    """Rows (views, 2) of the shots around or next to each view; (-1, -1) for a view without two such shots.
 
     Args:
         times: of the views (views,) [s].
         shots: of the shots, ascending (shots,) [s].
         longest_gap: largest gap between two shots of one motion [s].
-
-    Returns:
-        (-1, -1) for a view without two such shots around it or next to it.
     """
     gaps = np.flatnonzero(np.diff(shots) <= longest_gap)
     found = np.full((len(times), 2), -1, np.intp)

@@ -34,10 +34,6 @@ CALIBRATION = "calibration.json"
 class OakRecording:
     """A recording of depthai.
 
-    Attributes:
-        cameras: by head.
-        total: number of images.
-
     Raises:
         ForeignRecordingError: a file cannot be read, its name is no stream's, or a camera is not understood.
     """

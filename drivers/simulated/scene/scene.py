@@ -16,12 +16,7 @@ REST_Z, WALL_Z = 1.0, 1.6
 
 @dataclass(frozen=True, eq=False)
 class Moment:
-    """All bodies at one moment.
-
-    Attributes:
-        surfaces: the tracked surfaces.
-        occluders: bodies in front of them.
-    """
+    """All bodies at one moment."""
 
     surfaces: tuple[SurfaceBody, ...]
     occluders: tuple[Body, ...] = ()

@@ -29,14 +29,7 @@ class Trajectory(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Rectangle:
-    """A moving rectangle.
-
-    Attributes:
-        width, height: of the flat rectangle [m].
-        motion: placement over time.
-        texture: its texture.
-        excursion: displacement in addition to the motion.
-    """
+    """A moving rectangle."""
 
     width: float
     height: float
@@ -53,12 +46,7 @@ class Rectangle:
 
 @dataclass(frozen=True, eq=False)
 class PlacedRectangle:
-    """The rectangle at one moment; see `drivers.simulated.scene.body.SurfaceBody`.
-
-    Attributes:
-        width, height, texture: as in `Rectangle`.
-        placement: pose and bend.
-    """
+    """The rectangle at one moment; see `drivers.simulated.scene.body.SurfaceBody`."""
 
     width: float
     height: float

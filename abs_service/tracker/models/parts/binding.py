@@ -109,7 +109,7 @@ def bind(
     u: NDArray[np.float64],
     w: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Closest surface point (eq. 6) and offset along the normal there (eq. 7) of every vertex.
+    """Closest surface point (u, w) (eq. 6) and offset o along the normal there [m] (eq. 7), each (n,).
 
     Args:
         vertices: positions (n, 3) [m].
@@ -117,9 +117,6 @@ def bind(
         weights: their weights (rows, columns).
         degree: degree of the surface.
         u, w: start values (n,) in [0, 1].
-
-    Returns:
-        u, w and offset o [m], each (n,).
 
     Raises:
         ModelError: a vertex is far from the normal of its closest point: at the surface's edge, or where it folds.

@@ -34,15 +34,12 @@ def base_splines(u: NDArray[np.floating], control_points: int, degree: int, deri
 def rational_basis(
     u: NDArray[np.floating], w: NDArray[np.floating], degree: int, weights: NDArray[np.float64]
 ) -> tuple[Basis, Basis, Basis]:
-    """Rational basis functions R_p of eq. 3 and their derivatives with respect to u and w.
+    """Rational basis functions R_p of eq. 3 and their derivatives ∂R/∂u, ∂R/∂w, each (n, rows × columns).
 
     Args:
         u, w: surface parameters (n,) in [0, 1].
         degree: polynomial degree d in both directions.
         weights: weight of every control point (rows, columns); rows follow u, columns follow w.
-
-    Returns:
-        R, ∂R/∂u, ∂R/∂w, each (n, rows × columns).
     """
     rows, columns = weights.shape
     n_u, n_w = base_splines(u, rows, degree), base_splines(w, columns, degree)
@@ -74,11 +71,7 @@ def power_form(control_points: int, degree: int) -> NDArray[np.float64]:
 def support(
     u: NDArray[np.floating], w: NDArray[np.floating], shape: tuple[int, int], degree: int
 ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """Knot span of every vertex, and the control points on which each span depends.
-
-    Returns:
-        span (n,), numbered row by row; control points (spans, (degree + 1)²).
-    """
+    """Knot span (n,) of every vertex, row by row, and the control points (spans, (degree + 1)²) of each span."""
     rows, columns = shape
     spans_u, spans_w = rows - degree, columns - degree
     i, j = _spans(u, rows, degree), _spans(w, columns, degree)

@@ -61,13 +61,7 @@ MakeSampler = Callable[[int, float], Sampler]
 
 @dataclass(frozen=True)
 class Schedule:
-    """Limits of one search.
-
-    Attributes:
-        name: `Outcome.searcher`.
-        generations: maximum number of generations.
-        tolerance: see `ConvergenceMonitor` [nats].
-    """
+    """Limits of one search, which `Outcome.searcher` names; `ConvergenceMonitor` has the tolerance [nats]."""
 
     name: str
     generations: int
@@ -147,19 +141,7 @@ def sample(
     schedule: Schedule,
     budget: Budget,
 ) -> Search:
-    """Asks and tells a sampler over ξ with Θ = origin + metric ξ, for at least one generation.
-
-    Args:
-        origin: Θ at ξ = 0 (dim,).
-        cost: its cost [nats].
-        metric: (dim, dim).
-        sampler: the sampler.
-        schedule: limits of the search.
-        budget: limits of the frame.
-
-    Returns:
-        The better of the origin and the sampler's mean.
-    """
+    """Asks and tells a sampler over ξ with Θ = origin + metric ξ, at least once; the better of mean and origin."""
     sampler.restart(origin, metric)
     stop, monitor = None, ConvergenceMonitor(schedule.generations, schedule.tolerance)
     while not monitor.is_over and stop is None:

@@ -89,7 +89,7 @@ def update_distribution(
     paths: NDArray[np.float64],
     learnt: NDArray[np.float32],
 ) -> float:
-    """One generation of the tutorial's figure 6; updates mean, paths and covariance in place.
+    """One generation of the tutorial's figure 6; updates mean, paths and covariance in place, returns the step size.
 
     Args:
         z: standard normal numbers (population, dim).
@@ -101,9 +101,6 @@ def update_distribution(
         mean: (dim,).
         paths: of the step size and of the covariance, in the coordinates of z (2, dim).
         learnt: covariance in the coordinates of z (dim, dim).
-
-    Returns:
-        The new step size.
     """
     c_c, c_sigma, c_1, c_mu, d_sigma, mu_eff, expected_length = rates
     population, n = order.size, mean.size

@@ -14,9 +14,6 @@ class ConvergenceMonitor:
     Args:
         generations: maximum number of generations.
         tolerance: maximum difference of costs [nats].
-
-    Attributes:
-        converged: True if costs agree.
     """
 
     def __init__(self, generations: int, tolerance: float):

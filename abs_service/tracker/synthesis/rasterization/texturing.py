@@ -31,16 +31,7 @@ def lattice(mesh: Mesh, detail: int) -> Mesh:
 
 
 def paint(values: NDArray[np.float32], detail: int, samples: Samples) -> NDArray[np.float32]:
-    """Attributes of the samples.
-
-    Args:
-        values: attributes at the lattice points (k, channels).
-        detail: parts of every edge.
-        samples: of a population.
-
-    Returns:
-        (population, channels, m), linear within the sub-triangles between the lattice points.
-    """
+    """Attributes (population, channels, m) of samples, from those at lattice points (k, channels), linear between."""
     population, m = samples.pixel.shape
     result = np.empty((population, values.shape[1], m), np.float32)
     _paint(values, detail, samples.face, samples.weights, result)

@@ -40,11 +40,7 @@ LARGEST_MISFIT_M = 0.05
 
 
 class DepthTerm:
-    """−log φ of eqs. 18 and 19, summed over the samples.
-
-    Attributes:
-        sensor: name of the sensor.
-    """
+    """−log φ of eqs. 18 and 19, summed over the samples."""
 
     def __init__(
         self,

@@ -44,9 +44,6 @@ class ChannelTerm:
     """−log of the density of the measured number given what the vertex has in the pixel's channel.
 
     Behind a Bayer mosaic only the channel that the pixel has is compared, and nothing is interpolated (section 4.1).
-
-    Attributes:
-        sensor: name of the sensor.
     """
 
     def __init__(

@@ -26,11 +26,7 @@ from calib.noise.images.color import GaussianColor
 
 
 class ColorTerm:
-    """−log of the density of the measured colour given the vertex's own, summed over the samples.
-
-    Attributes:
-        sensor: name of the sensor.
-    """
+    """−log of the density of the measured colour given the vertex's own, summed over the samples."""
 
     def __init__(
         self,

@@ -24,7 +24,7 @@ class Outline(Protocol):
         predicted: Surface,
         window: Window = WHOLE,
     ) -> NDArray[np.bool_]:
-        """Sets the outline from a window of a depth image.
+        """Sets the outline from a window of a depth image; True for pixels beside the object that serve for it only.
 
         Args:
             distance: measured distances (rows, columns) [m] in the window.
@@ -32,9 +32,6 @@ class Outline(Protocol):
             expected: distances of the predicted surface there, infinite beside it [m].
             predicted: predicted surface, a population of one.
             window: of the image.
-
-        Returns:
-            Mask (rows, columns) of the pixels beside the object that serve for the outline only.
         """
         ...
 
