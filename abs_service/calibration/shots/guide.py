@@ -30,19 +30,19 @@ class Guide(Protocol):
     """Displays the progress of a collection; a context manager."""
 
     def __enter__(self) -> Self:
-        """Starts the display."""
-        ...
+        """Starts the display, if it has to be."""
+        return self
 
     def __exit__(self, *error: object) -> None:
         """Stops the display."""
-        ...
+        return
 
     def update(self, collector: Collector, is_kept: bool) -> None:
         """Shows the result of one shot."""
         ...
 
 
-class LiveGuide:
+class LiveGuide(Guide):
     """Coverage maps in a terminal, redrawn with every shot."""
 
     def __init__(self, console: Console) -> None:
@@ -62,19 +62,12 @@ class LiveGuide:
         self._live.update(draw(collector))
 
 
-class LineGuide:
+class LineGuide(Guide):
     """One line for every kept shot and for every new reason for rejection, for files and pipes."""
 
     def __init__(self, console: Console) -> None:
         self._console = console
         self._latest = ""
-
-    def __enter__(self) -> Self:
-        """See `Guide`."""
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        """See `Guide`."""
 
     def update(self, collector: Collector, is_kept: bool) -> None:
         """See `Guide`."""

@@ -9,14 +9,12 @@ import os
 import socket
 import sys
 from collections.abc import Callable, Mapping
-from typing import Self
 
 from absmsg.v1.health_pb2 import Health
 
-from abs_service.supervision.health.rig_view import RigView
+from abs_service.supervision.health.rig_view import Display, RigView
 from abs_service.supervision.process_setup import log_lines
 from abs_service.supervision.repeats import Repeats
-from abs_service.tracking.log.tracker_log import EstimateReport
 
 SOCKET = "/run/systemd/journal/socket"
 PERIOD_NS = 1_000_000_000
@@ -27,7 +25,7 @@ _LOG_PRIORITIES = {"critical": "2", "error": "3", "warning": "4", "debug": "7"}
 _INFORMATION = "6"
 
 
-class JournalDisplay:
+class JournalDisplay(Display):
     """Writes one entry for every change of a component's level, a tracker's status or a process's state.
 
     Levels and states that come again and again, as those of a process that never works, are written ever more rarely.
@@ -39,12 +37,6 @@ class JournalDisplay:
         self._reported: dict[tuple[str, str], str] = {}
         self._repeats = Repeats()
         self._now_ns = self._next_ns = 0
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        """Nothing to restore."""
 
     def update(self, view: RigView) -> None:
         """See `Display`."""
@@ -64,9 +56,6 @@ class JournalDisplay:
                 self._tell_change("ABS_STATUS", f"track/{name}", log.last.status, reasons, _INFORMATION)
         for child in view.children:
             self._tell_change("ABS_STATE", child.component, child.state.value, child.reason, _INFORMATION)
-
-    def estimate(self, report: EstimateReport) -> None:
-        """Estimates are in the recording."""
 
     def note(self, text: str) -> None:
         """See `Display`; a record of a log in JSON keeps its level and process."""

@@ -2,10 +2,9 @@
 
 import json
 from contextlib import suppress
-from typing import Self
 
 from abs_service.display.terminal.output import Output
-from abs_service.supervision.health.rig_view import RigView, size
+from abs_service.supervision.health.rig_view import Display, RigView, size
 from abs_service.tracking.log.tracker_log import EstimateReport
 
 PERIOD_NS = 1_000_000_000
@@ -17,7 +16,7 @@ def _note(text: str, notes: Output) -> None:
         notes.write(f"{text}\n")
 
 
-class PlainDisplay:
+class PlainDisplay(Display):
     """One line a second."""
 
     def __init__(self, out: Output, notes: Output) -> None:
@@ -25,21 +24,12 @@ class PlainDisplay:
         self._notes = notes
         self._next_ns = 0
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        """Nothing to restore."""
-
     def update(self, view: RigView) -> None:
         """See `Display`."""
         if view.now_ns < self._next_ns:
             return
         self._next_ns = view.now_ns + PERIOD_NS
         self._out.write(f"{line(view)}\n")
-
-    def estimate(self, report: EstimateReport) -> None:
-        """Lines show the last estimate only."""
 
     def note(self, text: str) -> None:
         """See `Display`."""
@@ -53,21 +43,12 @@ class PlainDisplay:
         return self._out.lost
 
 
-class JsonDisplay:
+class JsonDisplay(Display):
     """One JSON object per estimate and line, flushed; everything else goes to the notes."""
 
     def __init__(self, out: Output, notes: Output) -> None:
         self._out = out
         self._notes = notes
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        """Nothing to restore."""
-
-    def update(self, view: RigView) -> None:
-        """Only estimates are printed."""
 
     def estimate(self, report: EstimateReport) -> None:
         """See `Display`."""

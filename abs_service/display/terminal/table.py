@@ -14,7 +14,7 @@ from rich.text import Text
 
 from abs_service.display.terminal.output import Output
 from abs_service.supervision.children.child import ChildState
-from abs_service.supervision.health.rig_view import RigView, size
+from abs_service.supervision.health.rig_view import Display, RigView, size
 from abs_service.tracking.log.tracker_log import EstimateReport, TrackerLog
 
 #: Time between two tables [ns].
@@ -30,7 +30,7 @@ _STATE = {
 }
 
 
-class TableDisplay:
+class TableDisplay(Display):
     """A table that is redrawn several times a second, below the notes; not while the terminal is halted (Ctrl-S)."""
 
     def __init__(self, console: Console, output: Output) -> None:
@@ -56,9 +56,6 @@ class TableDisplay:
         self._next_ns = view.now_ns + PERIOD_NS
         with suppress(OSError):  # the terminal is gone, and the rig goes on
             self._region.update(draw(view, self._spinner), refresh=True)
-
-    def estimate(self, report: EstimateReport) -> None:
-        """The table shows the last estimate only."""
 
     def note(self, text: str) -> None:
         """See `Display`."""

@@ -172,19 +172,24 @@ class RigView:
 
 
 class Display(Protocol):
-    """Shows a running rig. Used in a `with` statement; after it, the terminal is restored."""
+    """Shows a running rig. Used in a `with` statement; after it, the terminal is restored.
 
-    def __enter__(self) -> Self: ...
+    A class that inherits from it ignores what it does not override.
+    """
 
-    def __exit__(self, *error: object) -> None: ...
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        return
 
     def update(self, view: RigView) -> None:
         """Shows the current state; called some twenty times a second."""
-        ...
+        return
 
     def estimate(self, report: EstimateReport) -> None:
         """Shows one estimate."""
-        ...
+        return
 
     def note(self, text: str) -> None:
         """Shows a message once. May be called from any thread."""
