@@ -68,7 +68,7 @@ class ClockOffsets:
             if len(self._readings) > CLOCKS:
                 del self._readings[next(iter(self._readings))]
             now_ns = self._clock()
-            offsets = [Offset(one.ns, one.error_ns + _drift_ns(now_ns - t_ns)) for t_ns, one in readings]
+            offsets = [Offset(one.ns, one.error_ns + round((now_ns - t_ns) * MAX_DRIFT)) for t_ns, one in readings]
         return min(offsets, key=lambda one: one.error_ns, default=None)
 
     def measure(self) -> None:
@@ -103,7 +103,3 @@ class ClockOffsets:
 def answer(bus: Bus, headers: HeaderFactory) -> Subscription:
     """Answers `ClockOffsets` of other hosts with the time of this one."""
     return bus.answer_queries(keys.clock(headers.host_clock), READING, lambda: headers.now(0).SerializeToString())
-
-
-def _drift_ns(elapsed_ns: int) -> int:
-    return round(elapsed_ns * MAX_DRIFT)

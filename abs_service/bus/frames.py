@@ -11,7 +11,7 @@ from abs_service.bus.contract import EVENTS, IMAGES, Bus, Publisher, Sample
 from abs_service.bus.queues import LatestQueue
 from abs_service.bus.sequence_gaps import SequenceGaps
 from abs_service.bus.stamps import HeaderFactory
-from drivers.contract.device import DeviceState, Truth
+from drivers.contract.device import Sink, Truth
 from drivers.contract.frame import Frame
 from drivers.encoding import codec
 
@@ -19,8 +19,8 @@ from drivers.encoding import codec
 DEPTH = 4
 
 
-class FramePublisher:
-    """Publishes the frames of one device from a thread of its own; a `drivers.contract.device.Sink`.
+class FramePublisher(Sink):
+    """Publishes the frames of one device from a thread of its own; states and warnings travel in the health.
 
     The device is never blocked: if publishing falls behind, the oldest frame of the stream is dropped and counted.
     One that no message can hold, by a mistake of the driver, is counted, too.
@@ -65,12 +65,6 @@ class FramePublisher:
     def on_truth(self, truth: Truth) -> None:
         """See `drivers.contract.device.Sink.on_truth`."""
         self._queue.put(keys.truth(self._device), truth)
-
-    def on_state(self, state: DeviceState, reason: str) -> None:
-        """See `drivers.contract.device.Sink.on_state`; the device supervisor publishes it in its health."""
-
-    def on_warning(self, condition: str, message: str) -> None:
-        """See `drivers.contract.device.Sink.on_warning`; warnings travel in the health, too."""
 
     def close(self) -> None:
         """Publishes the queued frames and ends the thread; may be called again."""

@@ -26,13 +26,6 @@ class Level(IntEnum):
     ERROR = 3
 
 
-_WIRE = {
-    Level.OK: health_pb2.Health.LEVEL_OK,
-    Level.WARNING: health_pb2.Health.LEVEL_WARNING,
-    Level.ERROR: health_pb2.Health.LEVEL_ERROR,
-}
-
-
 class Health:
     """The health of one component.
 
@@ -135,7 +128,7 @@ class Health:
             message = health_pb2.Health(
                 header=self._headers.now(self._seq),
                 component=self._component,
-                level=_WIRE[level],
+                level=f"LEVEL_{level.name}",
                 message=printable(
                     "; ".join(text for rank, text in self._conditions.values() if rank == level and text)
                 ),

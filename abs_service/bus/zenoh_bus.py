@@ -3,14 +3,14 @@
 import logging
 import threading
 from collections.abc import Callable, Sequence
-from types import TracebackType
+from contextlib import ExitStack
 from typing import Any, Self
 
 import zenoh
 from zenoh import ext
 
 from abs_service.bus import keys
-from abs_service.bus.contract import EVENTS, Priority, Publisher, Qos, Sample, Subscription
+from abs_service.bus.contract import EVENTS, Publisher, Qos, Sample, Subscription
 from abs_service.bus.security import link_log
 from abs_service.bus.security.mutual_tls import NO_SECURITY, MutualTls, NoSecurity
 from abs_service.bus.session import SessionMode, open_session
@@ -23,13 +23,6 @@ ENCODING = "application/protobuf"
 HEARTBEAT_S = 0.5
 #: Time that a session has to close; zenoh waits ten seconds for some callbacks [s].
 CLOSE_S = 1.0
-
-_PRIORITIES = {
-    Priority.REAL_TIME: zenoh.Priority.REAL_TIME,
-    Priority.DATA_HIGH: zenoh.Priority.DATA_HIGH,
-    Priority.DATA: zenoh.Priority.DATA,
-    Priority.DATA_LOW: zenoh.Priority.DATA_LOW,
-}
 
 
 class ZenohBus:
@@ -61,7 +54,7 @@ class ZenohBus:
         """See `contract.Bus.publisher`."""
         settings: dict[str, Any] = {
             "encoding": f"{ENCODING};{message}",
-            "priority": _PRIORITIES[qos.priority],
+            "priority": getattr(zenoh.Priority, qos.priority),
             "congestion_control": zenoh.CongestionControl.DROP,
             "express": qos.express,
         }
@@ -165,15 +158,15 @@ class ZenohBus:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self.close()
 
     def _keep(self, declared: Any) -> Subscription:
-        # zenoh undeclares a token, and possibly others, when Python collects the object.
-        self._kept.append(_Declared(declared))
-        return self._kept[-1]
+        # zenoh undeclares a token, and possibly others, when Python collects the object, and raises at a second call.
+        once = ExitStack()
+        once.callback(declared.undeclare)
+        self._kept.append(once)
+        return once
 
     def _key(self, topic: str) -> str:
         return keys.key(self._rig, topic)
@@ -218,17 +211,3 @@ class _LatchedPublisher:
     def _on_query(self, query: zenoh.Query) -> None:
         if self._last is not None:
             query.reply(self._key, self._last, encoding=f"{ENCODING};{self._message}")
-
-
-class _Declared:
-    def __init__(self, declared: Any) -> None:
-        self._undeclare: Callable[[], None] = declared.undeclare
-
-    def close(self) -> None:
-        # zenoh raises when something is undeclared twice.
-        undeclare, self._undeclare = self._undeclare, _nothing
-        undeclare()
-
-
-def _nothing() -> None:
-    pass

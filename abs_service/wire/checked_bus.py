@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Self
 
-from abs_service.bus.contract import Bus, Publisher, Qos, Sample, Subscription
+from abs_service.bus.contract import Bus, Sample, Subscription
 from abs_service.bus.health import Health, Level
 from abs_service.wire.edge import Edge
 
@@ -24,6 +24,11 @@ class CheckedBus:
         self._edge = Edge(clock)
         self._reported = 0
         self.trouble = ""
+        self.publisher, self.latched_publisher = bus.publisher, bus.latched_publisher
+        self.answer_queries = bus.answer_queries
+        self.answer_commands = bus.answer_commands  # not checked, since each command gets an answer
+        self.declare_liveliness, self.watch_liveliness = bus.declare_liveliness, bus.watch_liveliness
+        self.close = bus.close
 
     def report(self, health: Health) -> None:
         """Adds the refusals to the health of the process; call it before `Health.tick`."""
@@ -34,25 +39,9 @@ class CheckedBus:
         self.trouble = f"refused {new} messages, the last: {self._edge.last_error}" if new else ""
         health.report("refused", Level.WARNING if new else Level.OK, self.trouble)
 
-    def publisher(self, topic: str, message: str, qos: Qos) -> Publisher:
-        """See `contract.Bus.publisher`."""
-        return self._bus.publisher(topic, message, qos)
-
-    def latched_publisher(self, topic: str, message: str) -> Publisher:
-        """See `contract.Bus.latched_publisher`."""
-        return self._bus.latched_publisher(topic, message)
-
-    def answer_queries(self, topic: str, message: str, payload: Callable[[], bytes]) -> Subscription:
-        """See `contract.Bus.answer_queries`."""
-        return self._bus.answer_queries(topic, message, payload)
-
     def query(self, pattern: str, timeout_s: float) -> list[Sample]:
         """See `contract.Bus.query`."""
         return [sample for sample in self._bus.query(pattern, timeout_s) if self._edge.admits(sample)]
-
-    def answer_commands(self, topic: str, message: str, answer: Callable[[Sample], bytes]) -> Subscription:
-        """See `contract.Bus.answer_commands`; the commands are not checked, since each one gets an answer."""
-        return self._bus.answer_commands(topic, message, answer)
 
     def command(self, topic: str, message: str, payload: bytes, timeout_s: float) -> list[Sample]:
         """See `contract.Bus.command`."""
@@ -67,18 +56,6 @@ class CheckedBus:
                 on_sample(sample)
 
         return self._bus.subscribe(pattern, on_any)
-
-    def declare_liveliness(self, component: str) -> Subscription:
-        """See `contract.Bus.declare_liveliness`."""
-        return self._bus.declare_liveliness(component)
-
-    def watch_liveliness(self, on_change: Callable[[str, bool], None]) -> Subscription:
-        """See `contract.Bus.watch_liveliness`."""
-        return self._bus.watch_liveliness(on_change)
-
-    def close(self) -> None:
-        """See `contract.Bus.close`."""
-        self._bus.close()
 
     def __enter__(self) -> Self:
         return self

@@ -4,7 +4,6 @@ import logging
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 
 from absmsg.v1.command_pb2 import CommandAnswer, Record, Reinitialize, Reload, SetControls
 
@@ -75,15 +74,8 @@ def answer_reinitialize(
 ) -> Subscription:
     """Answers requests to detect the object of a tracker anew; calls `act` for those that are valid.
 
-    Each one is counted, and reported in a line of the log and in a label of health, which recordings keep.
-
-    Args:
-        bus: of the rig.
-        tracker: its name.
-        headers: of the answers.
-        health: of the tracker.
-        act: detects anew what was chosen, and returns the answer's `region`, or raises RefusedError; called
-            from a thread of the transport.
+    Each one is counted, and reported in a line of the log and in a label of health, which recordings keep. `act`, in a
+    thread of the transport, detects what was chosen and returns the answer's `region`, or raises RefusedError.
     """
 
     def on_command(payload: bytes) -> CommandAnswer:
@@ -98,11 +90,7 @@ def answer_reinitialize(
 def answer_record(bus: Bus, headers: HeaderFactory, health: Health, act: Callable[[bool], str]) -> Subscription:
     """Answers requests to record, or to wait; counts and logs them as `answer_reinitialize`.
 
-    Args:
-        bus: of the rig.
-        headers: of the answers.
-        health: of the recorder.
-        act: records, or waits; returns why it does not, "" if it does. Called from a thread of the transport.
+    `act`, in a thread of the transport, records, or waits; it returns why it does not, "" if it does.
     """
 
     def on_command(payload: bytes) -> CommandAnswer:
@@ -121,34 +109,21 @@ def answer_reload(
 ) -> Subscription:
     """Answers requests to read the rig file again; counts and logs them as `answer_reinitialize`.
 
-    Args:
-        bus: of the rig.
-        headers: of the answers.
-        health: of who answers.
-        act: reads it and returns the components that start, or start again, and those that end, or raises
-            RefusedError. Called from a thread of the transport.
+    `act`, in a thread of the transport, reads it and returns the components that start, or start again, and those that
+    end, or raises RefusedError.
     """
-    reply = partial(answer_valid, bus, keys.RELOAD, RELOAD, headers, health)
 
     def on_command(payload: bytes) -> CommandAnswer:
         restarts, ends = act()
         return CommandAnswer(restarts=restarts, ends=ends)
 
-    return reply(on_command, lambda payload: "")
+    return answer_valid(bus, keys.RELOAD, RELOAD, headers, health, on_command, lambda payload: "")
 
 
 def reinitialize(
     bus: Bus, tracker: str, headers: HeaderFactory, timeout_s: float, choice: Choice = AS_CONFIGURED
 ) -> CommandAnswer | None:
-    """Asks a tracker to detect its object anew; returns its answer, None if there is none.
-
-    Args:
-        bus: of the rig.
-        tracker: its name.
-        headers: of this process.
-        timeout_s: of the answer [s].
-        choice: the object.
-    """
+    """Asks a tracker to detect its object anew; returns its answer, None if there is none."""
     command = Reinitialize(header=headers.now(0), tracker=tracker)
     if choice.seed is not None:
         command.seed.column, command.seed.row = choice.seed

@@ -21,12 +21,7 @@ Act = Callable[[Mapping[str, Value]], Mapping[ControlInfo, Value]]
 def answer_controls(bus: Bus, device: str, headers: HeaderFactory, health: Health, act: Act) -> Subscription:
     """Answers requests to set controls of a device; counts and logs them as `commands.answer_reinitialize`.
 
-    Args:
-        bus: of the rig.
-        device: its name.
-        headers: of the answers.
-        health: of capture.
-        act: may raise DeviceError. Called from a thread of the transport.
+    `act` is called in a thread of the transport, and may raise DeviceError.
     """
 
     def on_command(payload: bytes) -> CommandAnswer:
@@ -47,15 +42,7 @@ def answer_controls(bus: Bus, device: str, headers: HeaderFactory, health: Healt
 def set_controls(
     bus: Bus, device: str, headers: HeaderFactory, timeout_s: float, values: Mapping[str, Value]
 ) -> CommandAnswer | None:
-    """Asks a device to set controls, or without any to list them; returns its answer, None if there is none.
-
-    Args:
-        bus: of the rig.
-        device: its name.
-        headers: of this process.
-        timeout_s: of the answer [s].
-        values: by control.
-    """
+    """Asks a device to set controls, or without any to list them; returns its answer, None if there is none."""
     command = SetControls(header=headers.now(0), device=device)
     for name, wanted in values.items():
         command.controls.add(name=name, **{_FIELDS[type(wanted)]: wanted})

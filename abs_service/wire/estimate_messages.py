@@ -26,12 +26,6 @@ TOPOLOGY = deformed_mesh_pb2.MeshTopology.DESCRIPTOR.full_name
 #: Most numbers in each table of a basis, those of 16,000 vertices and cubic splines; larger ones are not sent.
 LARGEST_BASIS = 1 << 18
 
-_STATUS = {
-    Status.INITIALIZING: State.STATUS_INITIALIZING,
-    Status.TRACKING: State.STATUS_TRACKING,
-    Status.DEGRADED: State.STATUS_DEGRADED,
-    Status.LOST: State.STATUS_LOST,
-}
 _STOP = {
     Stop.NOTHING: State.STOP_UNSPECIFIED,
     Stop.CONVERGED: State.STOP_CONVERGED,
@@ -95,7 +89,7 @@ def state(header: common_pb2.Header, estimate: Estimate, identity: Identity, eff
     return State(
         header=header,
         tracker=identity.tracker,
-        status=_STATUS[estimate.status],
+        status=f"STATUS_{estimate.status}",
         reasons=estimate.reasons,
         model=identity.model,
         model_id=identity.model_id,
