@@ -7,7 +7,6 @@ and its own products may have all cores as soon as a frame is done.
 
 import functools
 import threading
-from types import TracebackType
 
 import scipy.linalg.cython_blas  # noqa: F401  whose BLAS Numba's products use; what is loaded later is not limited
 from threadpoolctl import ThreadpoolController
@@ -30,9 +29,7 @@ class OneBlasThread:
                 self._limit = _libraries().limit(limits=1)
             self._inside += 1
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         with self._lock:
             self._inside -= 1
             if not self._inside:

@@ -35,7 +35,7 @@ LARGEST_MESSAGE_BYTES = LARGEST_IMAGE + (1 << 20)
 #: Time before the end of a certificate from which on each start warns of it.
 CERTIFICATE_ENDS = timedelta(days=30)
 
-_ENDPOINT = re.compile(r"(tcp|tls|quic|udp|ws)/(?P<host>\[[0-9a-fA-F:.]+\]|[^\s:/?#\[\]]+):(?P<port>\d{1,5})([?#]\S*)?")
+_ENDPOINT = re.compile(r"(tcp|tls|quic|udp|ws)/(\[[0-9a-fA-F:.]+\]|[^\s:/?#\[\]]+):(?P<port>\d{1,5})([?#]\S*)?")
 
 
 #: Lowest levels of zenoh's log, which has refused clients as warnings.
@@ -102,19 +102,24 @@ def open_session(
         raise kind(f'bus.endpoint = "{endpoint}": {reason}') from error
 
 
+def is_endpoint(text: str) -> bool:
+    """True for PROTOCOL/HOST:PORT."""
+    match = _ENDPOINT.fullmatch(text)
+    return match is not None and 1 <= int(match["port"]) <= 65535
+
+
 def check_endpoint(endpoint: str, security: NoSecurity | MutualTls = NO_SECURITY, key: str = "bus.endpoint") -> str:
     """Returns `endpoint`, which `key` names in messages, if it can be one.
 
     Raises:
         BusError: it cannot.
     """
-    match = _ENDPOINT.fullmatch(endpoint)
-    if match is None or not 1 <= int(match["port"]) <= 65535:
+    if not is_endpoint(endpoint):
         raise BusError(
             f'{key} = "{endpoint}": not an endpoint; write PROTOCOL/HOST:PORT with protocol tcp, tls, quic, udp '
             "or ws and a port from 1 to 65535, such as tcp/127.0.0.1:7447"
         )
-    if security.link and match[1] != "tls":
+    if security.link and not endpoint.startswith("tls/"):
         raise BusError(f'{key} = "{endpoint}": must begin with tls/, because there is a table [bus.tls]')
     return endpoint
 

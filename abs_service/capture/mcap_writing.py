@@ -3,10 +3,9 @@
 from collections.abc import Mapping
 
 from absmsg.v1.common_pb2 import Header
-from google.protobuf.message import Message
 
 from abs_service.bus import keys
-from abs_service.capture.sensor_metadata import calibration, sensor_model, transforms
+from abs_service.capture.sensor_metadata import of_cameras
 from calib.camera import Camera
 from drivers.contract.frame import Frame
 from drivers.encoding import codec
@@ -20,12 +19,7 @@ def write_cameras(file: McapFile, header: Header, cameras: Mapping[str, Camera],
     Raises:
         McapFileError, OSError: as `McapFile.write`.
     """
-    content: dict[str, Message] = {}
-    for sensor, camera in cameras.items():
-        content[keys.model(sensor)] = sensor_model(header, sensor, camera, {})
-        content[keys.calibration(sensor)] = calibration(sensor, camera, wall_ns)
-    content[keys.TRANSFORMS] = transforms(cameras, wall_ns)
-    for topic, message in content.items():
+    for topic, message in of_cameras(header, cameras, {name: {} for name in cameras}, wall_ns).items():
         file.write(f"/{topic}", message.DESCRIPTOR.full_name, message.SerializeToString(), wall_ns, 0)
 
 

@@ -5,11 +5,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from google.protobuf.message import Message
+
 from abs_service.bus import keys
 from abs_service.bus.contract import Bus, Publisher
 from abs_service.bus.stamps import HeaderFactory
 from abs_service.capture import sensor_metadata
-from abs_service.wire.message_header import CALIBRATION, CONFIG, MODEL, TRANSFORMS
 from calib.camera import Camera
 
 
@@ -57,19 +58,13 @@ class MetadataPublisher:
         with self._lock:
             header = self._headers.now(self._seq)
             self._seq += 1
+            self._put(keys.CONFIG, sensor_metadata.config(header, self._described.toml))
             wall_ns = header.stamp.ToNanoseconds()
-            toml = sensor_metadata.config(header, self._described.toml)
-            self._put(keys.CONFIG, CONFIG, toml.SerializeToString())
-            for sensor, camera in self._cameras.items():
-                model = sensor_metadata.sensor_model(header, sensor, camera, self._described.noises[sensor])
-                calibration = sensor_metadata.calibration(sensor, camera, wall_ns)
-                self._put(keys.model(sensor), MODEL, model.SerializeToString())
-                self._put(keys.calibration(sensor), CALIBRATION, calibration.SerializeToString())
-            if self._cameras:
-                poses = sensor_metadata.transforms(self._cameras, wall_ns)
-                self._put(keys.TRANSFORMS, TRANSFORMS, poses.SerializeToString())
+            cameras = sensor_metadata.of_cameras(header, self._cameras, self._described.noises, wall_ns)
+            for topic, message in cameras.items():
+                self._put(topic, message)
 
-    def _put(self, topic: str, message: str, payload: bytes) -> None:
+    def _put(self, topic: str, message: Message) -> None:
         if topic not in self._publishers:
-            self._publishers[topic] = self._bus.latched_publisher(topic, message)
-        self._publishers[topic].put(payload)
+            self._publishers[topic] = self._bus.latched_publisher(topic, message.DESCRIPTOR.full_name)
+        self._publishers[topic].put(message.SerializeToString())

@@ -12,7 +12,7 @@ from abs_service.pairing.points import points_s, z_image
 from abs_service.wire.message_header import POINTS
 from abs_service.wire.viewer_messages import ViewRate, point_cloud
 from calib.camera import Camera
-from drivers.contract.device import DeviceState, Sink, Truth
+from drivers.contract.device import Sink
 from drivers.contract.frame import Frame, Kind
 
 
@@ -35,6 +35,7 @@ class PointCloudPublisher:
         self._view_hz = view_hz
         self._camera = camera
         self._sink = sink
+        self.on_truth, self.on_state, self.on_warning = sink.on_truth, sink.on_state, sink.on_warning
         self._rates: dict[str, ViewRate] = {}
         self._publishers: dict[str, Publisher] = {}
         self._refused: Counter[str] = Counter()
@@ -55,18 +56,6 @@ class PointCloudPublisher:
         topic = keys.points(keys.image(frame.sensor, frame.stream))
         if self._rates.setdefault(topic, ViewRate(self._view_hz[frame.sensor])).due(frame.t_host_ns):
             self._queue.put(topic, frame)
-
-    def on_truth(self, truth: Truth) -> None:
-        """See `drivers.contract.device.Sink.on_truth`."""
-        self._sink.on_truth(truth)
-
-    def on_state(self, state: DeviceState, reason: str) -> None:
-        """See `drivers.contract.device.Sink.on_state`."""
-        self._sink.on_state(state, reason)
-
-    def on_warning(self, condition: str, message: str) -> None:
-        """See `drivers.contract.device.Sink.on_warning`."""
-        self._sink.on_warning(condition, message)
 
     def close(self) -> None:
         """Publishes the queued clouds and ends the thread; may be called again."""

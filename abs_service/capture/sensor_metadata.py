@@ -9,6 +9,7 @@ from absmsg.v1 import common_pb2, sensor_model_pb2
 from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from google.protobuf.descriptor_pb2 import FileDescriptorSet
+from google.protobuf.message import Message
 
 import abs_service
 from abs_service.bus import keys
@@ -21,6 +22,17 @@ from drivers.encoding.mcap_file import file_descriptor_set
 
 #: Names of the lens models in `foxglove.CameraCalibration`.
 _DISTORTION_MODELS = {Lens.name: "rational_polynomial", KannalaBrandt.name: "kannala_brandt"}
+
+
+def of_cameras(
+    header: common_pb2.Header, cameras: Mapping[str, Camera], noises: Mapping[str, Mapping[str, Any]], wall_ns: int
+) -> dict[str, Message]:
+    """Models, calibrations and poses of sensors by topic, from their cameras and noise models by sensor name."""
+    messages: dict[str, Message] = {}
+    for sensor, camera in cameras.items():
+        messages[keys.model(sensor)] = sensor_model(header, sensor, camera, noises[sensor])
+        messages[keys.calibration(sensor)] = calibration(sensor, camera, wall_ns)
+    return messages | ({keys.TRANSFORMS: transforms(cameras, wall_ns)} if cameras else {})
 
 
 def calibration(sensor: str, camera: Camera, wall_ns: int) -> CameraCalibration:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from abs_service.capture.image_check import RepeatedImages, is_empty
 from drivers.contract.capabilities import StreamInfo
-from drivers.contract.device import DeviceState, Sink, Truth
+from drivers.contract.device import DeviceState, Sink
 from drivers.contract.frame import Frame, Kind
 
 #: A stream without a frame for so many periods, and at least so long [ns], is stalled.
@@ -44,6 +44,7 @@ class StallDetector:
         repeated_images: RepeatedImages,
     ) -> None:
         self._sink = sink
+        self.on_truth = sink.on_truth
         self._heads = heads
         self._streams = {stream.key: stream for stream in streams if stream.sensor in heads}
         self._clock = clock
@@ -76,10 +77,6 @@ class StallDetector:
         self._awaited.discard(frame.key)
         self.delivered = True
         self._sink.on_frame(replace(frame, sensor=sensor, epoch=self._first_epoch + frame.epoch))
-
-    def on_truth(self, truth: Truth) -> None:
-        """See `drivers.contract.device.Sink.on_truth`."""
-        self._sink.on_truth(truth)
 
     def on_state(self, state: DeviceState, reason: str) -> None:
         """See `drivers.contract.device.Sink.on_state`."""

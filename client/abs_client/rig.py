@@ -1,7 +1,6 @@
 """A running rig: its estimates, images and calibrations, and commands to it."""
 
 from collections.abc import Mapping, Sequence
-from types import TracebackType
 from typing import Self
 
 from absmsg.v1.command_pb2 import CommandAnswer, Record, Reinitialize, SetControls
@@ -171,9 +170,7 @@ class Rig:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self.close()
 
     def _header(self) -> Header:

@@ -5,7 +5,6 @@ import threading
 import weakref
 from collections.abc import AsyncIterator, Callable, Iterator
 from time import monotonic
-from types import TracebackType
 from typing import Generic, Protocol, Self, TypeVar
 
 from abs_client.connection.link import Link
@@ -113,7 +112,5 @@ class Stream(Generic[T]):
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self.close()

@@ -12,6 +12,7 @@ from pydantic import AfterValidator, GetCoreSchemaHandler, ValidationInfo
 from pydantic_core import CoreSchema, core_schema
 
 from abs_service.bus import keys
+from abs_service.bus.session import is_endpoint
 from abs_service.config import plugins
 
 #: Drivers whose addresses name a file, which starts from the folder of the TOML file like every other path.
@@ -23,8 +24,7 @@ URI = re.compile(r"[a-z][a-z0-9_]*:\S+")
 
 
 def _endpoint(value: str) -> str:
-    match = re.fullmatch(r"(?:tcp|tls|quic|udp|ws)/(?:\[[0-9a-fA-F:.]+\]|[^:/\s]+):(\d{1,5})(?:[?#]\S*)?", value)
-    if match is None or int(match[1]) > 65535:
+    if not is_endpoint(value):
         raise ValueError('an endpoint is protocol/address:port, for example "tcp/127.0.0.1:7447"')
     return value
 

@@ -3,7 +3,6 @@
 import threading
 from collections.abc import Callable
 from time import time_ns
-from types import TracebackType
 from typing import Any, Self
 
 import zenoh
@@ -68,9 +67,7 @@ class RosNode:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self.close()
 
     def _publisher(self, topic: str, name: str, qos: Qos) -> "_Publisher":
