@@ -90,7 +90,7 @@ def settings(module: str, table: Any, base: Path) -> Any:
 
 @cache
 def _adapter(Settings: type) -> TypeAdapter[Any]:
-    """Of `Settings` of one module, made once: a rig file has some of them, and making one takes milliseconds."""
+    """Adapter of one module's `Settings`, made once: a rig file has some of them, and making one takes milliseconds."""
     return TypeAdapter(Settings)
 
 

@@ -51,12 +51,12 @@ class DepthImage:
 
     @property
     def distance(self) -> NDArray[np.float32]:
-        """See above."""
+        """Radial distances of the whole image, see the class."""
         return self.within((slice(None), slice(None)))[0]
 
     @property
     def amplitude(self) -> NDArray[np.float32]:
-        """See above."""
+        """Amplitudes of the whole image, see the class."""
         return self.within((slice(None), slice(None)))[1]
 
     def within(self, window: Window) -> Parts:

@@ -60,7 +60,7 @@ class Renewal:
 
     @property
     def starts(self) -> list[str]:
-        """Those of the components that the rig has."""
+        """The components that start and that the rig has."""
         has = {child.component for child in self.children}
         return [component for component in self.components if component in has]
 

@@ -62,7 +62,7 @@ def build(size: tuple[int, int], matrix: tuple[float, float, float, float], lens
 
 
 def _squared_length(places: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Of places (…, 2); five times faster than a norm along so short an axis."""
+    """Squared lengths (…) of places (…, 2); five times faster than a norm along so short an axis."""
     return places[..., 0] ** 2 + places[..., 1] ** 2
 
 

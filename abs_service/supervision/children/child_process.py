@@ -70,7 +70,7 @@ class _NoProcess:
         return 0
 
     def threads(self) -> Mapping[int, ThreadTimes]:
-        """None."""
+        """No threads."""
         return {}
 
     def terminate(self) -> None:

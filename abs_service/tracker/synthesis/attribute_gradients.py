@@ -90,7 +90,7 @@ class Constant:
         return sampler(lens)
 
     def steps(self, population: int, vertices: int) -> NDArray[np.float32]:
-        """None."""
+        """No memory: the kernel writes no steps."""
         return np.empty((2, 0, 0), np.float32)
 
     def per_pixel(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -145,7 +145,7 @@ class FirstOrder:
         return self._per_pixel
 
     def noise_gains(self, vertices: int) -> NDArray[np.float64]:
-        """Those of the last call of `look`."""
+        """Variances of the last call of `look`."""
         return self._gains
 
     def look(self, predicted: Surface) -> None:

@@ -137,7 +137,7 @@ class SparseView:
         return self._gradients.per_pixel(self._attributes)
 
     def gradient_noise_gains(self, surface: Surface) -> NDArray[np.float64]:
-        """Those for the predicted surface, see `look`."""
+        """Their noise gains for the predicted surface, see `look`."""
         return self._gradients.noise_gains(surface.vertices.shape[2])
 
     def spread(self, surface: Surface, values: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -174,7 +174,7 @@ class _Split:
 
 
 def _best(own: Array, whole: Array, pulls: Array) -> _Split:
-    """Of poses in their order: information (poses, m, m), its root from all (poses, k, m), and pulls (poses, m)."""
+    """The best split, by the information (poses, m, m), its root from all (poses, k, m), and the pulls (poses, m)."""
     before, together, pull = (np.cumsum(part, axis=0)[MIN_POSES - 1 : -MIN_POSES] for part in (own, whole, pulls))
     curvature = before - together.transpose(0, 2, 1) @ together
     curvature += _UNSEEN * np.diag(own.sum(axis=0).diagonal() + _UNSEEN)

@@ -59,7 +59,7 @@ def _raw(path: Path) -> dict[str, Any]:
 
 
 def _known(name: str, table: Any, evidence: SensorEvidence, path: Path) -> SensorCalibration:
-    """Of one sensor, from its table in either kind of file."""
+    """Calibration of one sensor, from its table in either kind of file."""
     depth = table.depth or config.DepthTable()
     return SensorCalibration(
         camera(name, table.camera, path),

@@ -40,7 +40,7 @@ class Displacement(Protocol):
 
 
 class NoDisplacement:
-    """That of a rig without images of the appearance."""
+    """No displacement: the rig has no images of the appearance."""
 
     def variance(self, optimum: Optimum) -> NDArray[np.float64]:
         """Zeros (n,)."""
@@ -48,7 +48,7 @@ class NoDisplacement:
 
 
 class AppearanceMisfit:
-    """That of a mesh whose appearance images show."""
+    """Displacement by images of the appearance; see the module."""
 
     def __init__(self, mesh: Mesh):
         self._mean = mean_around(mesh)

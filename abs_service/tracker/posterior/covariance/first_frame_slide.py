@@ -34,7 +34,7 @@ class Slide(Protocol):
 
 
 class NoSlide:
-    """That of a template: it is laid over the first frame only roughly, and the first estimate corrects it."""
+    """No slide: a template is laid over the first frame only roughly, and the first estimate corrects it."""
 
     def beyond(self, surface: Surface, known: NDArray[np.float64]) -> NDArray[np.float64]:
         """Zeros (n, 3, 3)."""
@@ -42,7 +42,7 @@ class NoSlide:
 
 
 class FirstFrameSlide:
-    """That of a mesh that the first frame defines."""
+    """Slide of a mesh that the first frame defines."""
 
     def __init__(self, mesh: Mesh):
         self._made = mesh.vertices.astype(np.float64)
@@ -50,7 +50,7 @@ class FirstFrameSlide:
         self._slide = np.zeros((0, 2))
 
     def beyond(self, surface: Surface, known: NDArray[np.float64]) -> NDArray[np.float64]:
-        """That of an error as long as the slide, in its direction, which turns with the surface."""
+        """Covariance of an error as long as the slide, in its direction, which turns with the surface."""
         if len(self._slide) and not self._slide.any():
             return np.zeros_like(known)
         tangents = self._tangents.along(surface)

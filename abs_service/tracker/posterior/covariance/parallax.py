@@ -31,7 +31,7 @@ class Parallax(Protocol):
 
 
 class NoParallax:
-    """That of a mesh whose vertices were measured one by one, whose errors average out, or of a known shape."""
+    """No parallax: the vertices were measured one by one, so that their errors average out, or the shape is known."""
 
     def covariance(self, optimum: Optimum, frame: FramePosterior) -> NDArray[np.float64]:
         """Zeros (n, 3, 3)."""
@@ -39,7 +39,7 @@ class NoParallax:
 
 
 class FittedParallax:
-    """That of a mesh which lies where the model was fitted to the first image.
+    """Parallax of a mesh that lies where the model was fitted to the first image.
 
     Args:
         model: the deformation model.
@@ -53,7 +53,7 @@ class FittedParallax:
         self._error = np.zeros((0, 2))
 
     def covariance(self, optimum: Optimum, frame: FramePosterior) -> NDArray[np.float64]:
-        """The same error in all frames, which turns with the surface."""
+        """Covariance of one error in all frames, which turns with the surface."""
         tangents = self._tangents.along(optimum.surface)
         if not len(self._error):
             self._error = np.vecdot(tangents, self._first(optimum, frame)[:, None])

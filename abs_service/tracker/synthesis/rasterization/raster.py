@@ -130,7 +130,7 @@ def _nearest_at(
     columns: NDArray[np.int64],
     nearness: NDArray[np.float32],
 ) -> None:
-    """The same at some pixels, of which a row has few.
+    """As `_nearest`, at some pixels, of which a row has few.
 
     Args:
         place, inverse_z, faces: as for `_nearest`.

@@ -25,7 +25,7 @@ MIN_VERTICES = 30
 
 
 class Fluctuation:
-    """That of one sensor over time.
+    """Fluctuation of one sensor's distances over time.
 
     Attributes:
         scale: of the deviations of the noise model in the next frame, at least 1.

@@ -33,7 +33,7 @@ OFF = 2.0
 
 
 class Raggedness:
-    """That of one outline over time.
+    """Raggedness of one outline over time.
 
     Args:
         minimum: deviation of an outline that is not ragged [px].
