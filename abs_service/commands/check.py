@@ -49,8 +49,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Checks one configuration."""
-    if arguments.picture:
-        preview_option.check(arguments.picture)
     try:
         rig = rig_process.load_config(arguments)
         toml = limited.text(arguments.config) if arguments.config else ""

@@ -18,10 +18,9 @@ april_grid          Kalibr's; found in parts; needs some 30 pixels per tag
 import argparse
 import json
 from dataclasses import fields, replace
-from pathlib import Path
 
 from abs_service.calibration.files import board_sheet, target_file
-from abs_service.commands.parts.options import OptionError
+from abs_service.commands.parts.options import OptionError, ending_in
 from abs_service.supervision.exit_codes import Exit
 from calib.board.april_grid import AprilGrid
 from calib.board.target import AsymmetricCircles, Charuco, Chessboard, Circles, Target, outline
@@ -72,15 +71,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--paper", type=_paper, default=PAPERS["a4"], metavar="SIZE", help="a4, a3, letter or WIDTHxHEIGHT in mm (a4)"
     )
     parser.add_argument(
-        "--out", type=Path, default=Path("target.pdf"), metavar="FILE", help=".pdf or .svg (%(default)s)"
+        "--out", type=ending_in(".pdf", ".svg"), default="target.pdf", metavar="FILE", help=".pdf or .svg (%(default)s)"
     )
     parser.add_argument("--json", action="store_true", help="print what was written as one JSON object")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Writes the page and the description."""
-    if arguments.out.suffix not in (".pdf", ".svg"):
-        raise OptionError(f"--out = {arguments.out}: must end in .pdf or .svg")
     target = _target(arguments)
     width, height = sorted(arguments.paper, reverse=_is_wide(target))
     page = board_sheet.lay_out(target, width, height, _words(target))

@@ -4,6 +4,7 @@ import argparse
 import math
 import re
 from collections.abc import Callable, Iterable
+from pathlib import Path
 
 
 class OptionError(Exception):
@@ -27,6 +28,21 @@ def number(minimum: float, maximum: float, what: str) -> Callable[[str], float]:
 
 #: Type of an argument: a number that is neither 0 nor infinite.
 positive = number(math.ulp(0.0), math.nextafter(math.inf, 0.0), "a number above 0")
+
+
+def ending_in(*suffixes: str) -> Callable[[str], Path]:
+    """Type of an argument: the path of a file in one of the formats that its suffix names."""
+
+    def read(text: str) -> Path:
+        if Path(text).suffix not in suffixes:
+            raise argparse.ArgumentTypeError(f"{text}: its suffix must be one of {', '.join(suffixes)}")
+        return Path(text)
+
+    return read
+
+
+#: Type of an argument: a file that a figure is drawn into.
+picture = ending_in(".png", ".svg", ".pdf")
 
 
 def assignments(option: str, given: Iterable[str]) -> dict[str, str]:

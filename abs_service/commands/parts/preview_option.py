@@ -6,14 +6,11 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from abs_service import config, wiring
-from abs_service.commands.parts.options import OptionError
+from abs_service.commands.parts.options import OptionError, picture
 from abs_service.display.pictures import preview_picture
 from abs_service.tracking.preview import PreviewError, preview
 from calib.rig import Rig
 from drivers.contract.frame import FrameSet
-
-#: Formats of the picture.
-SUFFIXES = (".png", ".svg", ".pdf")
 
 #: The rig of a tracker, and its frame sets in order of time.
 Source = tuple[Rig, Iterable[FrameSet]]
@@ -24,19 +21,9 @@ def add_argument(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--picture",
         metavar="PATH",
-        type=Path,
+        type=picture,
         help="picture to draw of what would be tracked in the first frame; of several trackers, PATH-NAME each",
     )
-
-
-def check(path: Path) -> None:
-    """Refuses a path without the suffix of a format.
-
-    Raises:
-        OptionError: its suffix is none of `SUFFIXES`.
-    """
-    if path.suffix not in SUFFIXES:
-        raise OptionError(f"--picture {path}: its suffix must be one of {', '.join(SUFFIXES)}")
 
 
 def draw(settings: config.ServiceConfig, name: str, path: Path, source: Source) -> str:

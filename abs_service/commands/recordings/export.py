@@ -23,7 +23,7 @@ from abs_service.api.checks import ArgumentError
 from abs_service.api.estimate import Estimate
 from abs_service.api.recording import Recording
 from abs_service.bus import keys
-from abs_service.commands.parts.options import number
+from abs_service.commands.parts.options import ending_in, number
 from abs_service.commands.parts.progress import bars
 from abs_service.export import animation, arrays, series, table, viewers
 from abs_service.export.errors import ExportError
@@ -53,7 +53,12 @@ _SERIES = (".obj", ".ply")
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the arguments of `abs-service export`."""
     parser.add_argument("recording", metavar="FILE.mcap", type=Path, help="a recording, or what `replay` wrote")
-    parser.add_argument("--out", metavar="PATH", type=Path, help="what to write (default: FILE_view.mcap beside it)")
+    parser.add_argument(
+        "--out",
+        metavar="PATH",
+        type=ending_in(".mcap", *_WRITERS, *_EXTRAS),
+        help="what to write (default: FILE_view.mcap beside it)",
+    )
     parser.add_argument("--tracker", metavar="NAME", default="", help="whose estimates, if there are several")
     parser.add_argument(
         "--view-hz",
@@ -68,8 +73,6 @@ def run(arguments: argparse.Namespace) -> int:
     """Exports one recording."""
     source: Path = arguments.recording
     path: Path = arguments.out or source.parent / f"{source.stem}_view.mcap"
-    if path.suffix not in (".mcap", *_WRITERS, *_EXTRAS):
-        raise ExportError(f"--out {path}: its suffix must be one of .mcap, {', '.join([*_WRITERS, *_EXTRAS])}")
     package, extra = _EXTRAS.get(path.suffix, ("", ""))
     if package and find_spec(package) is None:
         raise ExportError(f"--out {path} needs {package}: .venv/bin/pip install -e '.[{extra}]' in the clone")

@@ -56,8 +56,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Replays a recording, offline or live."""
-    if arguments.picture:
-        preview_option.check(arguments.picture)
     recording = Recording(arguments.recording)
     for note in notes(recording):
         print(f"abs-service: note: {note}", file=sys.stderr)

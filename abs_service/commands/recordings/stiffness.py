@@ -15,7 +15,7 @@ from pathlib import Path
 
 from abs_service import config, wiring
 from abs_service.commands.parts import progress, recorded_rig
-from abs_service.commands.parts.options import OptionError, positive
+from abs_service.commands.parts.options import OptionError, picture, positive
 from abs_service.commands.recordings import replay
 from abs_service.display.pictures.stiffness_plot import draw
 from abs_service.supervision.exit_codes import Exit
@@ -27,9 +27,6 @@ from drivers.replay import Recording
 #: Standard gravity [m/s²].
 FREE_FALL = 9.80665
 
-#: Formats of the picture.
-SUFFIXES = (".png", ".svg", ".pdf")
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the arguments of `abs-service stiffness`."""
@@ -37,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--weight", metavar="KG_M2", type=positive, required=True, help="mass of the strip per area")
     parser.add_argument("--config", metavar="RIG", type=Path, help="TOML file (default: the one in the recording)")
     parser.add_argument("--tracker", metavar="NAME", help="tracker (default: the one with a gravity model)")
-    parser.add_argument("--plot", metavar="PATH", type=Path, help="picture to draw (default: FILE-stiffness.png)")
+    parser.add_argument("--plot", metavar="PATH", type=picture, help="picture to draw (default: FILE-stiffness.png)")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
 
 
@@ -45,8 +42,6 @@ def run(arguments: argparse.Namespace) -> int:
     """Estimates, prints and draws."""
     path = arguments.recording
     plot = arguments.plot or path.with_name(f"{path.stem}-stiffness.png")
-    if plot.suffix not in SUFFIXES:
-        raise OptionError(f"--plot {plot}: its suffix must be one of {', '.join(SUFFIXES)}")
     if not plot.parent.is_dir():  # before minutes of tracking, not after
         raise OptionError(f"--plot {plot}: {plot.parent} is no folder")
     recording = Recording(path)

@@ -107,7 +107,7 @@ def contradictions(solution: Solution, left: Mapping[tuple[str, int], float] = {
 
 
 def scatter(solution: Solution, least_px: float = SCATTERS_PX) -> list[Scatter]:
-    """Whether the images of most shots were taken at different moments: empty, or one `Scatter`.
+    """Evidence that images of most shots were taken at different moments: empty, or one `Scatter`.
 
     Args:
         solution: from all shots.

@@ -162,19 +162,19 @@ def test_doubts_about_the_object_are_said_before_it_is_tracked(tmp_path, capsys)
 
 
 @pytest.mark.parametrize("command", ["replay", "check"])
-@pytest.mark.parametrize(
-    ("name", "problem"),
-    [
-        ("x.jpg", "x.jpg: its suffix must be one of .png, .svg, .pdf"),
-        ("no/folder/x.png", "no/folder/x.png: cannot be written: No such file or directory"),
-    ],
-)
-def test_impossible_paths_are_refused(recording, tmp_path, capsys, command, name, problem):
+def test_a_picture_has_a_known_format(capsys, command):
+    with pytest.raises(SystemExit, match="2"):
+        cli.main([command, "x", "--picture", "x.jpg"])
+    assert "argument --picture: x.jpg: its suffix must be one of .png, .svg, .pdf" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", ["replay", "check"])
+def test_a_path_that_cannot_be_written_is_refused(recording, tmp_path, capsys, command):
     rig = tmp_path / "rig.toml"
     rig.write_text(RIG)
-    asked = [str(recording if command == "replay" else rig), "--picture", str(tmp_path / name)]
-    assert cli.main([command, *asked]) == Exit.USER
-    assert f"error: --picture {tmp_path}/{problem}" in capsys.readouterr().err
+    picture = tmp_path / "no" / "folder" / "x.png"
+    assert cli.main([command, str(recording if command == "replay" else rig), "--picture", str(picture)]) == Exit.USER
+    assert f"error: --picture {picture}: cannot be written: No such file or directory" in capsys.readouterr().err
     assert not list(recording.parent.glob("*_replay*"))
 
 
