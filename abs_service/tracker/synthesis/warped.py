@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from abs_service.pairing.images import DepthImage, Window
 from abs_service.pairing.observation import Observation
 from abs_service.tracker.mesh import Mesh
-from abs_service.tracker.models.base import ModelError, SparseJacobian, Surface
+from abs_service.tracker.models.base import ModelError, Surface
 from abs_service.tracker.synthesis.base import Synthesis, View
 from abs_service.tracker.synthesis.sparse import SparseView
 from abs_service.tracker.synthesis.window import WHOLE
@@ -135,16 +135,15 @@ class _Projection:
 
 
 class _SharedView:
-    """One sensor's attributes in the common view."""
+    """One sensor's attributes in the common view, which is that of the vertices for all else."""
 
     def __init__(self, projection: _Projection, attributes: NDArray[np.float32]):
-        self.camera = projection.view.camera
+        view = projection.view
+        self.camera, self.look, self.render = view.camera, projection.look, view.render
+        self.spread, self.follow, self.carry, self.balance = view.spread, view.follow, view.carry, view.balance
+        self.gradient_noise_gains = view.gradient_noise_gains
         self._projection = projection
         self._attributes = np.ascontiguousarray(attributes.T, np.float32)[None]
-
-    def look(self, predicted: Surface) -> None:
-        """Determines the occluded vertices of this frame, the same for all sensors."""
-        self._projection.look(predicted)
 
     def synthesize(self, surface: Surface) -> Synthesis:
         """The common synthesis with this sensor's attributes."""
@@ -154,27 +153,3 @@ class _SharedView:
     def attribute_gradients(self, surface: Surface) -> NDArray[np.float32]:
         """NaN: only the vertices' own attributes are known."""
         return np.full((*self._attributes[0].T.shape, 2), np.nan, np.float32)
-
-    def gradient_noise_gains(self, surface: Surface) -> NDArray[np.float64]:
-        """Zeros: no gradients are known."""
-        return np.zeros((surface.vertices.shape[2], 2))
-
-    def spread(self, surface: Surface, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The values themselves: the samples are the vertices."""
-        return values
-
-    def follow(self, surface: Surface, sparse_jacobian: SparseJacobian) -> SparseJacobian:
-        """The Jacobian itself: the samples are the vertices."""
-        return sparse_jacobian
-
-    def carry(self, surface: Surface, values: NDArray[np.float32]) -> NDArray[np.float32]:
-        """The values themselves: the samples are the vertices."""
-        return values
-
-    def balance(self, costs: NDArray[np.float64], surface: Surface, unseen: float) -> NDArray[np.float64]:
-        """The costs themselves: every candidate has one sample per vertex."""
-        return costs
-
-    def render(self, surface: Surface) -> NDArray[np.float32]:
-        """Radial distances (height, width) [m] of a population of one in the common view; infinite off the mesh."""
-        return self._projection.view.render(surface)
