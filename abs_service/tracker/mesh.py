@@ -97,6 +97,14 @@ def pieces_of(faces: NDArray[np.integer]) -> tuple[NDArray[np.intp], NDArray[np.
     return piece[corners[:, 0]], np.bincount(piece, minlength=count)
 
 
+def mean_around(mesh: Mesh) -> "scipy.sparse.csr_array":
+    """Matrix (n, n) of the mean over each vertex and its neighbours."""
+    n, edges = len(mesh.vertices), mesh.edges
+    rows, columns = np.concatenate([edges, edges[:, ::-1], np.tile(np.arange(n)[:, None], 2)]).T
+    ring = scipy.sparse.csr_array((np.ones(len(rows)), (rows, columns)), shape=(n, n))
+    return scipy.sparse.csr_array(scipy.sparse.diags_array(1 / ring.sum(axis=1)) @ ring)
+
+
 def area_vectors(vertices: NDArray[np.floating], faces: NDArray[np.int32]) -> NDArray[np.floating]:
     """Normals (m, 3) of the faces (m, 3) of vertices (n, 3) [m], as long as twice their area [m²]."""
     corner = vertices[faces[:, 0]]

@@ -11,7 +11,7 @@ import numpy as np
 import scipy  # its parts are imported when they are first used
 from numpy.typing import NDArray
 
-from abs_service.tracker.mesh import Mesh, unit
+from abs_service.tracker.mesh import Mesh, mean_around, unit
 
 #: Times that every normal is replaced by the mean with its neighbours: what is smooth reaches over some five edges.
 ROUNDS = 30
@@ -29,7 +29,7 @@ def noiseless_normals(mesh: Mesh) -> NDArray[np.float64]:
     normals = mesh.normals
     if not np.any(mesh.deviation):
         return normals
-    mean = _mean_with_neighbours(mesh)
+    mean = mean_around(mesh)
     smooth, relief = _parted(normals, mean)
     noise = [_parted(drawn, mean)[1] - relief for drawn in _drawn(mesh, normals)]
     share = 1 - EXCESS * np.mean(np.square(noise)) / max(np.mean(relief**2), np.finfo(float).tiny)
@@ -43,7 +43,7 @@ def _drawn(mesh: Mesh, normals: NDArray[np.float64]) -> list[NDArray[np.float64]
 
 
 def _parted(
-    normals: NDArray[np.float64], mean: scipy.sparse.csr_array
+    normals: NDArray[np.float64], mean: "scipy.sparse.csr_array"
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Smooth part (n, 3) of normals, of unit length, and the rest."""
     smooth = normals
@@ -51,12 +51,3 @@ def _parted(
         smooth = mean @ smooth
     smooth = unit(smooth)
     return smooth, normals - smooth
-
-
-def _mean_with_neighbours(mesh: Mesh) -> scipy.sparse.csr_array:
-    """Matrix (n, n) that takes the mean of every vertex and its neighbours."""
-    n, (first, second) = len(mesh.vertices), mesh.edges.T
-    own = np.arange(n)
-    rows, columns = np.concatenate([own, first, second]), np.concatenate([own, second, first])
-    ones = scipy.sparse.csr_array((np.ones(len(rows)), (rows, columns)), shape=(n, n))
-    return scipy.sparse.csr_array(scipy.sparse.diags_array(1 / ones.sum(axis=1)) @ ones)

@@ -19,8 +19,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.mesh import Mesh
-from abs_service.tracker.posterior.covariance.misfit import mean_around
+from abs_service.tracker.mesh import Mesh, mean_around
 from abs_service.tracker.posterior.optimum import Optimum
 from abs_service.tracker.terms import chain_rule
 from abs_service.tracker.terms.base import INLIER_DEVIATIONS

@@ -13,10 +13,9 @@ variance is at least a running mean, over mesh and frames, until hardly any vert
 """
 
 import numpy as np
-import scipy  # its parts are imported when they are first used
 from numpy.typing import NDArray
 
-from abs_service.tracker.mesh import Mesh
+from abs_service.tracker.mesh import Mesh, mean_around
 from abs_service.tracker.terms.base import INLIER_DEVIATIONS
 
 #: Share of the vertices that miss the measurements above which the mesh may slide, and below which it fits again.
@@ -103,11 +102,3 @@ class CommonDistance:
 def _beyond(squares: NDArray[np.float64], noise: NDArray[np.float64]) -> NDArray[np.float64]:
     """Squares beyond `INLIER_DEVIATIONS` of noise, 0 below."""
     return np.maximum(squares - INLIER_DEVIATIONS**2 * noise, 0.0)
-
-
-def mean_around(mesh: Mesh) -> "scipy.sparse.csr_array":
-    """Matrix (n, n) of the mean over each vertex and its neighbours."""
-    n, edges = len(mesh.vertices), mesh.edges
-    rows, columns = np.concatenate([edges, edges[:, ::-1], np.tile(np.arange(n)[:, None], 2)]).T
-    ring = scipy.sparse.csr_array((np.ones(len(rows)), (rows, columns)), shape=(n, n))
-    return scipy.sparse.csr_array(scipy.sparse.diags_array(1 / ring.sum(axis=1)) @ ring)
