@@ -46,12 +46,7 @@ def _punch(file: Path, size: int) -> None:
 
 
 class EndedPools:
-    """Frees the pools of processes some time after they ended.
-
-    Args:
-        clock: monotonic time [ns].
-        free: gives back the memory of a process's pool.
-    """
+    """Frees the pools of processes some time after they ended."""
 
     def __init__(self, clock: Callable[[], int], free: Callable[[int], None] = free_pool) -> None:
         self._clock, self._free = clock, free

@@ -106,11 +106,7 @@ class TrackingSession:
         return {} if self._tracker is None else derived(self._plan, self._tracker.model)
 
     def track(self, frames: FrameSet, in_time: Callable[[], bool]) -> Estimate:
-        """The estimate for a frame set.
-
-        Args:
-            frames: images of one moment.
-            in_time: False after the deadline of the search.
+        """The estimate for a frame set, whose search ends when `in_time` is False.
 
         Raises:
             ObservationError: the frames do not fit the rig.

@@ -17,11 +17,6 @@ class SolePublishers:
     """Watches topics of which only one process may be the publisher at a time.
 
     A process that is started again takes the place of its predecessor, which never publishes again; rivals take turns.
-
-    Args:
-        bus: of the rig.
-        patterns: of the topics.
-        clock: CLOCK_MONOTONIC [ns].
     """
 
     def __init__(self, bus: Bus, patterns: Iterable[str], clock: Callable[[], int]) -> None:

@@ -100,12 +100,7 @@ def _is_pair(root: Mapping[str, Any]) -> bool:
 
 
 def write(cameras: Mapping[str, Camera], dialect: int = cv2.FILE_STORAGE_FORMAT_YAML) -> Written:
-    """One camera at the top level, several in a map each; with T_rs besides OpenCV's own keys.
-
-    Args:
-        cameras: cameras to write.
-        dialect: a `cv2.FILE_STORAGE_FORMAT_…`.
-    """
+    """One camera at the top level, several in a map each; with T_rs besides OpenCV's own keys."""
     storage = cv2.FileStorage("", cv2.FILE_STORAGE_WRITE | cv2.FILE_STORAGE_MEMORY | dialect)
     for name, one in cameras.items():
         if len(cameras) > 1:

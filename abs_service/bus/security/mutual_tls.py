@@ -17,13 +17,7 @@ ANSWER_S = 2.0
 
 
 class TlsError(Exception):
-    """A file of `[bus.tls]` that cannot be used.
-
-    Args:
-        key: of `[bus.tls]`.
-        value: its value.
-        problem: the error.
-    """
+    """A file of `[bus.tls]` that cannot be used."""
 
     def __init__(self, key: str, value: str, problem: str) -> None:
         self.key, self.value, self.problem = key, value, problem

@@ -120,10 +120,6 @@ def write(calibration: RigCalibration, path: Path) -> list[Path]:
 def read_covariance(path: Path, sha256: str) -> Covariance:
     """Covariances of a side file.
 
-    Args:
-        path: the file.
-        sha256: expected hash, from the calibration file.
-
     Raises:
         RigFileError: it cannot be read, or its hash differs.
     """

@@ -38,12 +38,7 @@ class Ages:
         self._changed_ns: dict[str, int] | None = None  # by name, CLOCK_MONOTONIC [ns]
 
     def of(self, files: Iterable[Kept], now_ns: int) -> dict[str, int]:
-        """Times since the last change of all files that there are, by name [ns].
-
-        Args:
-            files: they.
-            now_ns: the present, CLOCK_MONOTONIC [ns].
-        """
+        """Times since the last change of all files that there are, by name [ns]."""
         before, self._changed_ns, ages = self._changed_ns, {}, {}
         for file in files:
             name = file.name.removesuffix(ACTIVE)
@@ -102,11 +97,7 @@ class Retention:
         return Growth(rate, sum(file.size for file in self.files()), self.retain_s, self.retain_bytes)
 
     def apply(self, ages: Callable[[Iterable[Kept]], dict[str, int]]) -> tuple[list[Path], list[OSError]]:
-        """Deletes the files beyond the limits; returns them, and why others could not be deleted.
-
-        Args:
-            ages: ages of files [ns].
-        """
+        """Deletes the files beyond the limits, by their ages [ns]; returns them, and why others cannot be deleted."""
         deleted: list[Path] = []
         failures: list[OSError] = []
         if self.retain_s == self.retain_bytes == float("inf"):

@@ -13,10 +13,6 @@ from abs_service.bus.contract import Bus, Sample
 class FirstTracking:
     """Notices the first estimate with status TRACKING of any tracker.
 
-    Args:
-        bus: of the rig.
-        trackers: their names; without any, there is nothing to wait for.
-
     Attributes:
         seen: set when something is tracked, and from the beginning if nothing is to be.
     """

@@ -35,12 +35,7 @@ class Received:
 
 
 class RigState:
-    """Current state of a rig. Not thread-safe.
-
-    Args:
-        trackers: their names.
-        clock: monotonic time [ns].
-    """
+    """Current state of a rig. Not thread-safe."""
 
     def __init__(self, trackers: Iterable[str], clock: Callable[[], int]) -> None:
         self.trackers = {name: TrackerLog() for name in trackers}

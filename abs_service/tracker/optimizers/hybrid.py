@@ -64,13 +64,7 @@ class Settings:
 
 
 class Hybrid:
-    """An `Optimizer`: descent first, sampling as a fallback.
-
-    Args:
-        settings: its settings.
-        make: makes samplers.
-        population: candidates per generation.
-    """
+    """An `Optimizer`: descent first, sampling as a fallback."""
 
     def __init__(self, settings: Settings, make: MakeSampler, population: int):
         self._settings = settings

@@ -38,12 +38,7 @@ class FramePosterior:
         return replace(self, motion=motion)
 
     def cost(self, thetas: NDArray[np.float64], surface: Surface) -> NDArray[np.float64]:
-        """Negative log-posterior (population,) [nats].
-
-        Args:
-            thetas: candidates (population, dim).
-            surface: the mesh deformed by them.
-        """
+        """Negative log-posterior (population,) [nats]."""
         priors = self.stretch.cost(surface) + self.shape.cost(thetas) + self.motion.cost(thetas)
         return self.objective.cost(surface) + priors
 

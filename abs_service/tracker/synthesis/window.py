@@ -59,10 +59,6 @@ class Bordered:
 
     Allocating memory takes as long as filling it.
 
-    Attributes:
-        border, beyond: see below.
-        window: window of the last frame.
-
     Args:
         border: value of the border (channels,).
         beyond: value of the image outside the window (channels,).

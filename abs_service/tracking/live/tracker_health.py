@@ -12,13 +12,7 @@ from abs_service.tracking.monitors.silence_monitor import SilenceMonitor
 
 
 class TrackerHealth:
-    """Reports of one live tracker.
-
-    Args:
-        health: of the process.
-        sets: the tracker's frame sets.
-        clock: CLOCK_MONOTONIC [ns].
-    """
+    """Reports of one live tracker."""
 
     def __init__(self, health: Health, sets: FrameSetQueue, clock: Callable[[], int]):
         self._health = health

@@ -21,9 +21,6 @@ IN_A_ROW = 2
 class CalibrationMonitor:
     """Compares what is published with the cameras that a tracker was begun with.
 
-    Args:
-        cameras: by sensor, as they were published.
-
     Attributes:
         changed: set when a sensor has another camera.
     """

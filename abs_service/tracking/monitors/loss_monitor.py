@@ -44,12 +44,7 @@ class Settings:
 
 
 class LossMonitor:
-    """Status of one tracker over time.
-
-    Args:
-        settings: its settings.
-        limits: thresholds of the status, which say when a mesh is misplaced.
-    """
+    """Status of one tracker over time."""
 
     def __init__(self, settings: Settings, limits: status.Settings):
         self._limits = limits

@@ -18,9 +18,6 @@ class KernelQueue:
     The largest kernel that is known is next, so that the end is not spent waiting for one that began late. No two
     workers have the same kernel at once, for other types: Numba's index of a kernel's code is not made for that.
 
-    Args:
-        clock: monotonic time [s].
-
     Attributes:
         total: kernels that were put.
         done: those that are finished, successfully or not.

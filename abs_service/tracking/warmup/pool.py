@@ -21,9 +21,6 @@ class Pool:
     """Compiles kernels in other processes; a context manager that ends them.
 
     A process begins when there is work for it; see `KernelQueue` for the order.
-
-    Args:
-        workers: number of processes at most.
     """
 
     def __init__(self, workers: int):

@@ -66,10 +66,6 @@ def filled(polygon: Polygon, shape: tuple[int, ...]) -> NDArray[np.bool_]:
 def load_mask(file: Path, key: str) -> NDArray[np.bool_]:
     """Pixels (height, width) where an image's alpha channel, or without one its brightness, is not zero.
 
-    Args:
-        file: the image.
-        key: TOML key that names it, for messages.
-
     Raises:
         DetectionError: the file is missing or no image.
     """

@@ -54,12 +54,7 @@ class _Content:
 
 
 def load(path: Path, metres: float, vertices: int) -> KnownObject:
-    """The object in an OBJ, PLY or STL file, with a mesh of about `vertices` vertices.
-
-    Args:
-        path: the file.
-        metres: length of its unit [m].
-        vertices: see above.
+    """The object in an OBJ, PLY or STL file, whose unit is so many metres, with about so many vertices.
 
     Raises:
         DetectionError: the file is missing, or no mesh that can be tracked; names the key and the allowed values.

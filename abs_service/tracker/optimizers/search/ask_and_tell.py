@@ -38,12 +38,7 @@ class Sampler(Protocol):
         ...
 
     def restart(self, origin: NDArray[np.float64], metric: NDArray[np.float64]) -> None:
-        """Starts a frame at ξ = 0 with step size and covariance of the last frame.
-
-        Args:
-            origin: (dim,).
-            metric: (dim, dim).
-        """
+        """Starts a frame at ξ = 0 with step size and covariance of the last frame."""
         ...
 
     def ask(self) -> NDArray[np.float64]:

@@ -79,9 +79,6 @@ class CommonDistance:
         """`excess`, and the mean square [m²] of the mean distances up to it, less noise.
 
         The latter is 0 unless beyond its own deviations.
-
-        Args:
-            distance, variance: as for `excess`.
         """
         squares, noise = self._squares(distance, variance)
         within = np.minimum(squares, INLIER_DEVIATIONS**2 * noise)
