@@ -4,9 +4,6 @@ An image is two messages: RawImage, which every viewer displays, and FrameInfo, 
 untrusted: decoding yields a valid frame or a `CodecError` that names the problem.
 """
 
-from collections.abc import Mapping
-from typing import TypeVar
-
 import numpy as np
 from absmsg.v1.common_pb2 import Header
 from absmsg.v1.frame_info_pb2 import FrameInfo
@@ -24,19 +21,6 @@ from drivers.encoding.parsing import CodecError, bytes_per_pixel, pixels_of
 IMAGE_SCHEMA = RawImage.DESCRIPTOR.full_name
 INFO_SCHEMA = FrameInfo.DESCRIPTOR.full_name
 TRUTH_SCHEMA = SurfaceTruth.DESCRIPTOR.full_name
-
-_GEOMETRIES = {
-    Geometry.NONE: FrameInfo.GEOMETRY_NONE,
-    Geometry.Z: FrameInfo.GEOMETRY_Z,
-    Geometry.RADIAL: FrameInfo.GEOMETRY_RADIAL,
-}
-_REFERENCES = {
-    Reference.START: FrameInfo.REFERENCE_START,
-    Reference.MIDDLE: FrameInfo.REFERENCE_MIDDLE,
-    Reference.END: FrameInfo.REFERENCE_END,
-}
-_GEOMETRY_OF: Mapping[int, Geometry] = {number: geometry for geometry, number in _GEOMETRIES.items()}
-_REFERENCE_OF: Mapping[int, Reference] = {number: reference for reference, number in _REFERENCES.items()}
 
 
 def encode_image(frame: Frame, wall_ns: int) -> bytes:
@@ -74,13 +58,13 @@ def encode_info(frame: Frame, header: Header) -> bytes:
         epoch=frame.epoch,
         scale=frame.scale,
         unit=frame.unit,
-        geometry=_GEOMETRIES[frame.geometry],
+        geometry=f"GEOMETRY_{frame.geometry.name}",
         invalid=frame.invalid,
         t_device_ticks=frame.t_device_ticks,
         tick_hz=frame.tick_hz,
         clock_domain=frame.clock_domain,
         t_sigma_ns=frame.t_sigma_ns,
-        t_reference=_REFERENCES[frame.t_reference],
+        t_reference=f"REFERENCE_{frame.t_reference.name}",
         t_arrival_ns=frame.t_arrival_ns,
         exposure_s=frame.exposure_s,
         gain=frame.gain,
@@ -135,13 +119,13 @@ def decode(image: bytes, info: bytes) -> Frame:
             epoch=about.epoch,
             scale=about.scale,
             unit=about.unit,
-            geometry=_member(name, "geometry", _GEOMETRY_OF, about.geometry),
+            geometry=Geometry[FrameInfo.Geometry.Name(about.geometry).removeprefix("GEOMETRY_")],
             invalid=about.invalid if about.HasField("invalid") else None,
             t_device_ticks=about.t_device_ticks,
             tick_hz=about.tick_hz,
             clock_domain=about.clock_domain,
             t_sigma_ns=about.t_sigma_ns,
-            t_reference=_member(name, "t_reference", _REFERENCE_OF, about.t_reference),
+            t_reference=Reference[FrameInfo.Reference.Name(about.t_reference).removeprefix("REFERENCE_")],
             exposure_s=about.exposure_s,
             gain=about.gain,
             temperature_c=about.temperature_c,
@@ -189,12 +173,3 @@ def _kind(name: str, value: str) -> Kind:
         return Kind(value)
     except ValueError:
         raise CodecError(f"{name}: kind {value!r} is none of {[kind.value for kind in Kind]}") from None
-
-
-_Member = TypeVar("_Member", Geometry, Reference)
-
-
-def _member(name: str, field: str, members: Mapping[int, _Member], number: int) -> _Member:
-    if number not in members:
-        raise CodecError(f"{name}: {field} {number} is none of {sorted(members)}")
-    return members[number]

@@ -46,13 +46,6 @@ class Compression(StrEnum):
     ZSTD = "zstd"
 
 
-_COMPRESSION = {
-    Compression.NONE: CompressionType.NONE,
-    Compression.LZ4: CompressionType.LZ4,
-    Compression.ZSTD: CompressionType.ZSTD,
-}
-
-
 class McapFileError(Exception):
     """An invalid message, or a file that has failed after an earlier error."""
 
@@ -73,7 +66,7 @@ class McapFile:
         self, stream: BinaryIO, compression: Compression = Compression.ZSTD, chunk_size: int = CHUNK_SIZE
     ) -> None:
         self._stream = stream
-        self._writer = Writer(stream, chunk_size=chunk_size, compression=_COMPRESSION[compression])
+        self._writer = Writer(stream, chunk_size=chunk_size, compression=CompressionType[compression.name])
         self._schemas: dict[str, int] = {}
         self._channels: dict[str, tuple[str, int]] = {}
         self._failure = ""
