@@ -1,5 +1,6 @@
 """AprilGrid: Kalibr's grid of AprilTags with a black square in every corner between them."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import cv2
@@ -13,6 +14,19 @@ BORDER, BITS = 2, 6
 
 #: OpenCV's dictionary; it stores tags turned by 180° relative to Kalibr's print.
 TAGS = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_APRILTAG_36h11)
+
+
+def black_cells(
+    image: NDArray[np.integer | np.floating], left: float, top: float, cell: float
+) -> Iterator[tuple[float, float, float, float]]:
+    """Left, top, width, height of the black parts of a marker, an image of its cells, at a place of the board [m].
+
+    Adjacent cells of a row are one part, so that no gaps appear between them.
+    """
+    for row, line in enumerate(image < 128):
+        ends = np.flatnonzero(np.diff(np.concatenate([[0], line.astype(int), [0]])))
+        for begin, end in ends.reshape(-1, 2):
+            yield left + begin * cell, top + row * cell, (end - begin) * cell, cell
 
 
 @dataclass(frozen=True)
@@ -85,12 +99,7 @@ class AprilGrid:
         for number in range(self.columns * self.rows):
             left, top = points[self.ids_of_tag(number)[2], :2]
             image = cv2.aruco.generateImageMarker(TAGS, number, BITS + 2 * BORDER, borderBits=BORDER)
-            for row, line in enumerate(np.rot90(image, 2) < 128):
-                ends = np.flatnonzero(np.diff(np.concatenate([[0], line.astype(int), [0]])))
-                found += [
-                    (left + begin * cell, top + row * cell, (end - begin) * cell, cell)
-                    for begin, end in ends.reshape(-1, 2)
-                ]
+            found += black_cells(np.rot90(image, 2), left, top, cell)
         return np.array(found)
 
     def _places(self, tags: int) -> NDArray[np.float64]:

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from calib.board.april_grid import AprilGrid
+from calib.board.april_grid import AprilGrid, black_cells
 from calib.board.target import Charuco, Chessboard, Target
 
 #: Width of a marker's black frame, in cells.
@@ -29,7 +29,7 @@ class Artwork:
 def artwork(target: Target) -> Artwork:
     """Shapes of a board in its own frame, with the first corner, or the centre of the first disc, at (0, 0)."""
     if isinstance(target, Chessboard):
-        return Artwork(_black_squares(target.columns + 1, target.rows + 1, target.square), np.zeros((0, 3)))
+        return Artwork(_squares(target.columns + 1, target.rows + 1, target.square, odd=0), np.zeros((0, 3)))
     if isinstance(target, Charuco):
         squares = _squares(target.columns, target.rows, target.square, odd=int(not target.is_first_black))
         return Artwork(np.concatenate([squares, _markers(target)]), np.zeros((0, 3)))
@@ -48,25 +48,16 @@ def _squares(columns: int, rows: int, square: float, odd: int) -> NDArray[np.flo
     return np.stack([(column[chosen] - 1) * square, (row[chosen] - 1) * square, edge, edge], axis=1)
 
 
-def _black_squares(columns: int, rows: int, square: float) -> NDArray[np.float64]:
-    return _squares(columns, rows, square, odd=0)
-
-
 def _markers(target: Charuco) -> NDArray[np.float64]:
-    """Black cells of all markers; adjacent cells of a row are merged, so that no gaps appear between them."""
+    """Black parts of all markers."""
     dictionary = target.markers()
     cells = dictionary.markerSize + 2 * _FRAME
     cell = target.marker / cells
     white = _squares(target.columns, target.rows, target.square, odd=int(target.is_first_black))
     found = []
     for number, (left, top, edge, _) in enumerate(white):
-        black = cv2.aruco.generateImageMarker(dictionary, number, cells) < 128
-        inset = (edge - target.marker) / 2
-        for row, line in enumerate(black):
-            ends = np.flatnonzero(np.diff(np.concatenate([[0], line.astype(int), [0]])))
-            for begin, end in ends.reshape(-1, 2):
-                x, y = left + inset + begin * cell, top + inset + row * cell
-                found.append((x, y, (end - begin) * cell, cell))
+        image, inset = cv2.aruco.generateImageMarker(dictionary, number, cells), (edge - target.marker) / 2
+        found += black_cells(image, left + inset, top + inset, cell)
     return np.array(found)
 
 
