@@ -7,6 +7,7 @@ mistake is named if the images fit without it, and by far not with it.
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
+from functools import partial
 from itertools import combinations, product
 
 import numpy as np
@@ -128,49 +129,38 @@ def _undone(stored: Stored, shots: Shots, names: Sequence[str]) -> Iterator[tupl
     sizes = {name: (stored.sensors[name].camera.width, stored.sensors[name].camera.height) for name in names}
     for a, b in combinations(names, 2):
         if sizes[a] == sizes[b]:
-            yield (Kind.EXCHANGED, (a, b)), _each(shots, _Exchange({a: b, b: a}))
+            yield (Kind.EXCHANGED, (a, b)), _each(shots, partial(_exchanged, to={a: b, b: a}))
     extent = np.max([view.points_b.max(axis=0) for views in shots for view in views], axis=0)[:2]
     for group, image, board in product([*((name,) for name in names), tuple(names)], _FLIPS[1:], _FLIPS):
         # A mirrored board is numbered from another corner, and a turned one from the other end if its ends look alike.
         if sum(image) % 2 == sum(board) % 2:
             kind = Kind.MIRRORED if sum(image) % 2 else Kind.TURNED
-            flip = _Flip({name: sizes[name] for name in group}, image, tuple(np.multiply(board, extent).tolist()))
-            yield (kind, group), _each(shots, flip)
+            own, along = {name: sizes[name] for name in group}, tuple(np.multiply(board, extent).tolist())
+            yield (kind, group), _each(shots, partial(_flipped, sizes=own, image=image, board=along))
 
 
-@dataclass(frozen=True)
-class _Exchange:
-    """Gives the images of a sensor to another one."""
-
-    to: Mapping[str, str]
-
-    def __call__(self, view: CornerView) -> CornerView:
-        """View of the other sensor; one of further sensors as it is."""
-        return replace(view, sensor=self.to.get(view.sensor, view.sensor))
+def _exchanged(view: CornerView, to: Mapping[str, str]) -> CornerView:
+    """View of the sensor that gets the images of another one; one of further sensors as it is."""
+    return replace(view, sensor=to.get(view.sensor, view.sensor))
 
 
-@dataclass(frozen=True)
-class _Flip:
-    """Reverses axes of some sensors' images, and those along which the board's points are numbered.
+def _flipped(
+    view: CornerView, sizes: Mapping[str, tuple[int, int]], image: tuple[int, int], board: tuple[float, float]
+) -> CornerView:
+    """View with reversed axes, of a sensor without a size as it is.
 
-    Attributes:
+    Args:
+        view: as given.
         sizes: of the images, by sensor [px].
         image: axes of the images that are reversed.
         board: extent of the board along the axes that are reversed [m], otherwise 0.
     """
-
-    sizes: Mapping[str, tuple[int, int]]
-    image: tuple[int, int]
-    board: tuple[float, float]
-
-    def __call__(self, view: CornerView) -> CornerView:
-        """View without the mistake; one of another sensor as it is."""
-        if view.sensor not in self.sizes:
-            return view
-        pixels = np.where(self.image, np.array(self.sizes[view.sensor]) - 1 - view.pixels, view.pixels)
-        points_b = view.points_b.copy()
-        points_b[:, :2] = np.where(self.board, self.board - points_b[:, :2], points_b[:, :2])
-        return replace(view, pixels=pixels, points_b=points_b)
+    if view.sensor not in sizes:
+        return view
+    pixels = np.where(image, np.array(sizes[view.sensor]) - 1 - view.pixels, view.pixels)
+    points_b = view.points_b.copy()
+    points_b[:, :2] = np.where(board, board - points_b[:, :2], points_b[:, :2])
+    return replace(view, pixels=pixels, points_b=points_b)
 
 
 def _each(shots: Shots, change: Callable[[CornerView], CornerView]) -> Shots:

@@ -12,7 +12,7 @@ from abs_service.tracker.detection.depth_view import DepthView, Step
 from abs_service.tracker.detection.initial_detection import DetectionError
 from abs_service.tracker.detection.plausibility import is_scene
 from abs_service.tracker.detection.segments.color_growth import grown_by_color
-from abs_service.tracker.detection.segments.seeds import ColorSeed, MotionSeed, PixelSeed, Seed, Seeded, Surfaces
+from abs_service.tracker.detection.segments.seeds import ColorSeed, MotionSeed, PixelSeed, Seed, Seeded, SurfaceLimits
 from abs_service.tracker.detection.segments.within import Polygon, Restricted, restricted
 
 Level = Annotated[int, Ge(0), Le(255)]
@@ -53,10 +53,10 @@ class Settings:
 
     def build(self) -> Restricted:
         """The region; DetectionError if `within` is missing or no image."""
-        seed, surfaces = self._seed(), Surfaces(self.largest_step_m, self.minimum_pixels)
+        seed, limits = self._seed(), SurfaceLimits(self.largest_step_m, self.minimum_pixels)
 
         def select(view: DepthView) -> NDArray[np.bool_]:
-            seeded = seed(view, surfaces)
+            seeded = seed(view, limits)
             if self.grow == "color":
                 return grown_by_color(seeded, view)
             return _apart_from_what_rests(seeded, view) if self.motion_s is not None else seeded.surface

@@ -46,15 +46,15 @@ class Seeded:
 
 
 @dataclass(frozen=True, slots=True)
-class Surfaces:
-    """Settings of connected surfaces: see `large_surfaces`."""
+class SurfaceLimits:
+    """Limits of what is one surface, and of what counts as one: see `large_surfaces`."""
 
     largest_step_m: Step
     minimum_pixels: int
 
 
 #: Finds a seed in a view; DetectionError if it is not there.
-Seed = Callable[[DepthView, Surfaces], Seeded]
+Seed = Callable[[DepthView, SurfaceLimits], Seeded]
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,9 +67,9 @@ class PixelSeed:
 
     pixel: tuple[int, int]
 
-    def __call__(self, view: DepthView, surfaces: Surfaces) -> Seeded:
+    def __call__(self, view: DepthView, limits: SurfaceLimits) -> Seeded:
         """The disc of the surface that is nearest to the pixel; DetectionError if there is no surface near it."""
-        surface = surface_at(self.pixel, view.distance, view.step(surfaces.largest_step_m), surfaces.minimum_pixels)
+        surface = surface_at(self.pixel, view.distance, view.step(limits.largest_step_m), limits.minimum_pixels)
         row, column = np.ogrid[: surface.shape[0], : surface.shape[1]]
         away = np.hypot(column - self.pixel[0], row - self.pixel[1])
         return Seeded(surface & (away <= away[surface].min() + DISC * surface.shape[1]), surface)
@@ -85,7 +85,7 @@ class ColorSeed:
 
     color: tuple[int, int, int]
 
-    def __call__(self, view: DepthView, surfaces: Surfaces) -> Seeded:
+    def __call__(self, view: DepthView, limits: SurfaceLimits) -> Seeded:
         """The patch; DetectionError if nothing of the colour is in sight."""
         rgb = view.colors.rgb
         if not np.isfinite(rgb).any():
@@ -93,7 +93,7 @@ class ColorSeed:
                 'color needs a colour camera (noise type "color") that sees what the depth sensor does'
             )
         what = f"no surface of about the color {list(self.color)}"
-        return _largest_patch(view, surfaces, joined(alike(rgb, np.array([self.color], np.float32))), what)
+        return _largest_patch(view, limits, joined(alike(rgb, np.array([self.color], np.float32))), what)
 
 
 class MotionSeed:
@@ -108,7 +108,7 @@ class MotionSeed:
         self._seconds, self._minimum_m = seconds, minimum_m
         self._before: deque[tuple[int, NDArray[np.float32]]] = deque()
 
-    def __call__(self, view: DepthView, surfaces: Surfaces) -> Seeded:
+    def __call__(self, view: DepthView, limits: SurfaceLimits) -> Seeded:
         """The largest patch that moved; DetectionError if none did, UndecidedError while too few images are known."""
         compared_s = self._remember(view)
         if compared_s < self._seconds:
@@ -120,9 +120,9 @@ class MotionSeed:
             least = np.fmax(self._minimum_m, MOVING * view.deviation)
             nearer = before[-min(BEHIND, len(before))] - view.distance > least
         inner = np.asarray(cv2.erode(nearer.view(np.uint8), np.ones((RIM_PX, RIM_PX)))).view(np.bool_)
-        limits = f"{self._minimum_m:g} m towards the camera, or in front of something, in {self._seconds:g} s"
-        what = f"nothing moved by {limits}"
-        return _largest_patch(view, surfaces, inner, what)
+        by = f"{self._minimum_m:g} m towards the camera, or in front of something, in {self._seconds:g} s"
+        what = f"nothing moved by {by}"
+        return _largest_patch(view, limits, inner, what)
 
     def _remember(self, view: DepthView) -> float:
         """Adds an image to those that are compared; returns the time that they cover [s]."""
@@ -157,19 +157,19 @@ def joined(pixels: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return np.asarray(cv2.morphologyEx(there, cv2.MORPH_CLOSE, np.ones((PRINT_PX, PRINT_PX)))).view(np.bool_)
 
 
-def _largest_patch(view: DepthView, surfaces: Surfaces, pixels: NDArray[np.bool_], what: str) -> Seeded:
+def _largest_patch(view: DepthView, limits: SurfaceLimits, pixels: NDArray[np.bool_], what: str) -> Seeded:
     """The largest connected patch of pixels (height, width) on a connected surface; `what` is missing otherwise.
 
     Raises:
         DetectionError: none has `minimum_pixels`.
     """
-    labels, large = large_surfaces(view.distance, view.step(surfaces.largest_step_m), surfaces.minimum_pixels)
+    labels, large = large_surfaces(view.distance, view.step(limits.largest_step_m), limits.minimum_pixels)
     there = (pixels & np.isin(labels, large)).view(np.uint8)
     patches = np.asarray(cv2.connectedComponents(cv2.morphologyEx(there, cv2.MORPH_OPEN, np.ones((3, 3))))[1])
     sizes = np.bincount(patches.ravel())[1:]
     most = int(sizes.max(initial=0))
-    if most < surfaces.minimum_pixels:
-        raise DetectionError(f"{what}: the largest has {most} pixels, minimum_pixels = {surfaces.minimum_pixels}")
+    if most < limits.minimum_pixels:
+        raise DetectionError(f"{what}: the largest has {most} pixels, minimum_pixels = {limits.minimum_pixels}")
     patch = patches == 1 + np.argmax(sizes)
     surface = labels == np.argmax(np.bincount(labels[patch]))
     return Seeded(patch & surface, surface)
