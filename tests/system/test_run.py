@@ -23,7 +23,7 @@ TOPICS = {
     *(f"/tof/{stream}/{part}" for stream in ("depth", "amplitude") for part in ("image", "info")),
     *("/color/color/image", "/color/color/info", "/sim/truth", "/tf", "/config"),
     *(f"/{sensor}/{part}" for sensor in ("tof", "color") for part in ("calibration", "model")),
-    *(f"/sheet/{part}" for part in ("state", "mesh", "topology")),
+    *(f"/sheet/{part}" for part in ("state", "mesh", "theta", "topology")),
     *(f"/health/{component}" for component in ("run", "capture", "track/sheet", "record")),
 }
 FOXGLOVE = {

@@ -36,6 +36,7 @@ PUBLISHERS = {
     "sheet/state": "tracker",
     "sheet/mesh": "tracker",
     "sheet/scene": "tracker",
+    "sheet/theta": "tracker",
     "sheet/topology": "tracker",
     "sheet/reinitialize": "tracker",
     "health/track/sheet": "tracker",
