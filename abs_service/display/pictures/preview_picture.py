@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from abs_service.display.sentences import sentences
 from abs_service.report import plots
 from abs_service.tracker.terms.depth.outline.rim_classes import RimClass
 from abs_service.tracking.preview import FoundMesh, Preview
@@ -103,12 +104,7 @@ def note(preview: Preview) -> str:
     if preview.found is None:
         return preview.reason
     late = (f"not found in the first frame: {preview.reason}",) if preview.reason else ()
-    return " ".join(_sentence(one) for one in (*preview.warnings, *late))
-
-
-def _sentence(words: str) -> str:
-    """Words with a capital letter and a full stop, unless they end with one or ask."""
-    return words[:1].upper() + words[1:] + ("" if words.endswith((".", "?")) else ".")
+    return sentences((*preview.warnings, *late))
 
 
 class _Page:

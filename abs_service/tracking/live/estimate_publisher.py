@@ -1,15 +1,18 @@
 """Publishes the results of a tracker: estimates, meshes, their topologies, and scenes for viewers."""
 
+from collections.abc import Callable
+
 import numpy as np
 from absmsg.v1.common_pb2 import Header
 from absmsg.v1.deformed_mesh_pb2 import MeshTopology
+from numpy.typing import NDArray
 
 from abs_service.bus import keys
 from abs_service.bus.clock_offsets import Offset
 from abs_service.bus.contract import IMAGES, MESH, STATE, Bus
 from abs_service.bus.stamps import HeaderFactory
 from abs_service.tracker.estimate import Estimate
-from abs_service.tracker.models.base import HasVertexBasis
+from abs_service.tracker.models.base import DeformationModel, HasVertexBasis
 from abs_service.tracking.session import TrackingSession
 from abs_service.wire import estimate_messages
 from abs_service.wire.estimate_messages import Effort, Identity, State
@@ -42,6 +45,7 @@ class EstimatePublisher:
         self._compact = bus.publisher(keys.theta(tracker), estimate_messages.COMPACT, STATE)
         self._scene = bus.publisher(keys.scene(tracker), SCENE, IMAGES)
         self._view_rate, self._offset_rate = ViewRate(view_hz), ViewRate(OFFSETS_HZ)
+        self._offset = _offset_of(None)
         self._sent_offset = _NO_OFFSETS
         self._topology_message = MeshTopology()
         self._identity = Identity(tracker, model, "", calib_id, 0)
@@ -64,22 +68,21 @@ class EstimatePublisher:
             header = self._header(tracking.made_ns, host_clock, offset, tracking.mesh_version)
             self._topology_message = estimate_messages.topology(header, tracking.mesh, self._identity, tracking.model)
             self._topology.put(self._topology_message.SerializeToString())
+            self._offset = _offset_of(tracking.model)
         header = self._header(estimate.t_host_ns, host_clock, offset, self._seq)
         state = estimate_messages.state(header, estimate, self._identity, effort)
         mesh = estimate_messages.mesh(header, estimate, self._identity)
         self._state.put(state.SerializeToString())
         self._mesh.put(mesh.SerializeToString())
-        self._publish_compact(state, tracking)
+        self._publish_compact(state)
         if self._view_rate.due(estimate.t_host_ns):
             self._scene.put(scene_update(mesh, self._topology_message, state.status).SerializeToString())
         self._seq += 1
 
-    def _publish_compact(self, state: State, tracking: TrackingSession) -> None:
+    def _publish_compact(self, state: State) -> None:
         """Publishes theta and status, with the offsets of the vertices if that is due."""
-        now = tracking.model.offset if isinstance(tracking.model, HasVertexBasis) else _NO_OFFSETS
-        is_new = len(now) != len(self._sent_offset) or np.sum(
-            (now - self._sent_offset) ** 2
-        ) > OFFSETS_CHANGED_M**2 * len(now)
+        now, sent = self._offset(), self._sent_offset
+        is_new = len(now) != len(sent) or np.sum((now - sent) ** 2) > OFFSETS_CHANGED_M**2 * len(now)
         if is_due := self._offset_rate.due(state.header.t_host_ns) or is_new:
             self._sent_offset = now
         compact = estimate_messages.compact(state, now if is_due else _NO_OFFSETS)
@@ -87,3 +90,8 @@ class EstimatePublisher:
 
     def _header(self, t_host_ns: int, host_clock: str, offset: Offset, seq: int) -> Header:
         return self._headers.elsewhere(t_host_ns, host_clock, t_host_ns + offset.ns, seq, keys.RIG_FRAME)
+
+
+def _offset_of(model: DeformationModel | None) -> Callable[[], NDArray[np.float32]]:
+    """Offsets of a model's vertices as they are known when it is called; (0,) of a model without a basis."""
+    return (lambda: model.offset) if isinstance(model, HasVertexBasis) else (lambda: _NO_OFFSETS)

@@ -201,9 +201,8 @@ def _covariance(equations: Equations) -> tuple[NDArray[np.float64], NDArray[np.f
     zero = np.zeros(equations.layout.size)
     residuals = equations.residuals(zero)
     curvature = require_determined(_normal(equations.jacobian(zero)), equations.layout.names)
-    size = np.sqrt(np.diag(curvature))
-    inverse = linalg.inv(curvature / np.outer(size, size)) / np.outer(size, size)
-    return variance_components.covariance_inflation(equations, residuals) * (inverse + inverse.T) / 2, residuals
+    inflation = variance_components.covariance_inflation(equations, residuals)
+    return inflation * uncertainty.scaled_inverse(curvature), residuals
 
 
 def _updated_factors(solved: Adjustment) -> tuple[float, ...]:

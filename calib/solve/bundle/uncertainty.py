@@ -85,7 +85,7 @@ def information_of(
 def noise_covariance(poses: PoseInformation, inflation: float) -> NDArray[np.float64]:
     """Covariance (k, k) if noise were the only error and every distinct pose had been seen once."""
     once = np.sum(poses.information / poses.repeats[:, None, None], axis=0)
-    return inflation * _inverse(once + poses.prior)
+    return inflation * scaled_inverse(once + poses.prior)
 
 
 def pose_covariance(poses: PoseInformation, noise: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -123,7 +123,8 @@ def with_boards(independent: NDArray[np.float64], sensors: NDArray[np.float64]) 
     return independent + carried @ (sensors - own) @ carried.T
 
 
-def _inverse(curvature: NDArray[np.float64]) -> NDArray[np.float64]:
+def scaled_inverse(curvature: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Inverse (k, k) of a positive definite matrix, whose parameters may differ in size by many orders."""
     size = np.sqrt(np.diag(curvature))
     inverse = linalg.inv(curvature / np.outer(size, size)) / np.outer(size, size)
     return (inverse + inverse.T) / 2

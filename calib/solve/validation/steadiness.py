@@ -12,10 +12,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg, stats
+from scipy import stats
 
 from calib import pose
 from calib.solve.bundle.parameters.layout import POSE, turned
+from calib.solve.bundle.uncertainty import scaled_inverse
 from calib.solve.solution import Solution
 from calib.solve.validation.free_shape import FreeShape, along, disagreement, once, without
 
@@ -105,9 +106,7 @@ def focal_scatter(free: FreeShape, needed_px: float) -> dict[str, float]:
 
 def of_focal(information: Array, prior: Array, scores: Array, focal: Array) -> tuple[float, float]:
     """Disagreement of poses about the focal length, a direction (k,), to that about all else, and its deviation [1]."""
-    whole = information.sum(axis=0) + prior
-    size = np.sqrt(np.diag(whole))
-    taken = linalg.inv(whole / np.outer(size, size)) / np.outer(size, size)
+    taken = scaled_inverse(information.sum(axis=0) + prior)
     own = information - information @ taken @ information
     weights = np.maximum(focal @ own @ focal, 1e-12)
     ratio = float(np.mean((scores @ focal) ** 2 / weights)) / disagreement(own, scores)

@@ -27,9 +27,9 @@ def opened(endpoint: str, tls: Tls | None = None) -> zenoh.Session:
         host = endpoint.partition("/")[2].rpartition(":")[0].strip("[]")
         try:
             socket.getaddrinfo(host, None)
-        except OSError as unresolved:
-            reason = f'the name "{host}" in {endpoint} cannot be resolved: {unresolved.strerror}'
-            raise UnreachableError(reason) from error
+        except (OSError, UnicodeError) as unresolved:  # an empty part, or one of more than 63 letters
+            reason = getattr(unresolved, "strerror", "it is no name")
+            raise UnreachableError(f'the name "{host}" in {endpoint} cannot be resolved: {reason}') from error
         raise UnreachableError(f"nothing answers at {endpoint} within {CONNECT_S:g} s: is it running?") from error
 
 

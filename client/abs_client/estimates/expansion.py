@@ -34,12 +34,12 @@ class Surface:
         """Vertices (n, 3) [m] for the control points theta (dim,): eq. 8 of the method.
 
         Raises:
-            MalformedError: theta has too few control points, or there are not as many offsets as vertices.
+            MalformedError: theta is not whole control points, or too few, or offsets are not as many as vertices.
         """
-        count = len(theta) // 3
-        if len(self.offset) != len(self.control_points) or self.control_points.max(initial=0) >= count:
-            raise MalformedError(f"{count} control points, or {len(self.offset)} offsets, do not fit the mesh")
-        control = theta[: 3 * count].reshape(-1, 3)[self.control_points]
+        count, rest = divmod(len(theta), 3)
+        if rest or len(self.offset) != len(self.control_points) or self.control_points.max(initial=0) >= count:
+            raise MalformedError(f"{len(theta)} parameters, or {len(self.offset)} offsets, do not fit the mesh")
+        control = theta.reshape(-1, 3)[self.control_points]
         points, along_u, along_w = np.einsum("tnk,nkd->tnd", self.tables, control)
         normals = np.cross(along_u, along_w)
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-20)

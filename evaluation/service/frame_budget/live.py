@@ -91,6 +91,17 @@ class Observed:
     frames: Mapping[int, TrackedFrame]
 
     @property
+    def age_ms(self) -> tuple[float, float]:
+        """Median and 99th percentile of the ages at publication [ms]; NaN without estimates."""
+        p50, p99 = np.percentile(self.ages_ms, (50, 99)) if len(self.ages_ms) else (np.nan, np.nan)
+        return float(p50), float(p99)
+
+    @property
+    def all_cores(self) -> float:
+        """CPU time per time of all processes."""
+        return sum(self.cores.values())
+
+    @property
     def silent(self) -> int:
         """Exposures that are in no estimate and that nobody counted."""
         return max(0, self.lost - self.counted)

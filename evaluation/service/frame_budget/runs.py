@@ -51,7 +51,7 @@ def goals(seen: Mapping[str, Observed], replay: Mapping[int, TrackedFrame], trut
 
 
 def _alone(seen: Observed, replay: Mapping[int, TrackedFrame], truth: Truth) -> list[Goal]:
-    p50, p99 = np.percentile(seen.ages_ms, (50, 99)) if len(seen.ages_ms) else (np.nan, np.nan)
+    p50, p99 = seen.age_ms
     live_mm, replay_mm = vertex_errors(seen.frames, truth), vertex_errors(replay, truth)
     both = sorted(live_mm.keys() & replay_mm.keys())
     ratio = np.mean([live_mm[k] for k in both]) / np.mean([replay_mm[k] for k in both]) if both else np.nan
@@ -60,7 +60,7 @@ def _alone(seen: Observed, replay: Mapping[int, TrackedFrame], truth: Truth) -> 
         at_most("Age at publication, p50", p50, AGE_P50_MS, "ms"),
         at_most("Age at publication, p99", p99, AGE_P99_MS, "ms"),
         at_most("The tracker's process", seen.cores.get("track", np.nan), TRACKER_CORES, "cores"),
-        at_most("All processes", sum(seen.cores.values()), ALL_CORES, "cores"),
+        at_most("All processes", seen.all_cores, ALL_CORES, "cores"),
         at_most("Mean vertex error live, by that of the replay of the same exposures", float(ratio), ERROR_RATIO),
     ]
 
@@ -75,7 +75,7 @@ def section(seen: Mapping[str, Observed]) -> Section:
     )  # fmt: skip
     rows = tuple(
         (
-            name, one.rate_hz, *_ages(one), one.skipped, one.lost, one.silent, one.tracking,
+            name, one.rate_hz, *one.age_ms, one.skipped, one.lost, one.silent, one.tracking,
             *(100 * one.cores.get(command, 0.0) for command in ("run", "capture", "track", "record")),
         )
         for name, one in seen.items()
@@ -88,7 +88,7 @@ def values(seen: Mapping[str, Observed]) -> dict[str, Any]:
     return {
         name: {
             "rate_hz": one.rate_hz,
-            "age_ms": _ages(one),
+            "age_ms": one.age_ms,
             "skipped": one.skipped,
             "lost": one.lost,
             "silent": one.silent,
@@ -97,10 +97,3 @@ def values(seen: Mapping[str, Observed]) -> dict[str, Any]:
         }
         for name, one in seen.items()
     }
-
-
-def _ages(seen: Observed) -> tuple[float, float]:
-    """Median and 99th percentile of the ages [ms]."""
-    if not len(seen.ages_ms):
-        return np.nan, np.nan
-    return float(np.percentile(seen.ages_ms, 50)), float(np.percentile(seen.ages_ms, 99))

@@ -74,9 +74,9 @@ def run(settings: Settings, context: Context) -> Findings:
     values: dict[str, Any] = {"points": {name: [asdict(one) for one in points] for name, (points, _) in found.items()}}
     if settings.trackers:
         measured = services.measure(settings.trackers, settings.live_s, context.seed + 1, context.progress)
-        laws["trackers"] = measured.law
+        laws["trackers"] = law = measured.costs.trackers
         times = [one["track"] for one in measured.by_trackers.values()]
-        sections += services.sections(measured, _drawn("trackers", list(measured.by_trackers), times, measured.law))
+        sections += services.sections(measured, _drawn("trackers", list(measured.by_trackers), times, law))
         goals, values = services.goals(measured), values | services.values(measured)
     fits = [at_least(f"R² of the law by {name}", law.determination, DETERMINATION) for name, law in laws.items()]
     return Findings(

@@ -18,7 +18,7 @@ from evaluation.service.frame_budget.live import Observed, Run
 from evaluation.service.frame_budget.rig import write_take
 from evaluation.service.growth import hosts
 from evaluation.service.growth.hosts import LOAD, Costs
-from evaluation.service.growth.laws import Law, fit
+from evaluation.service.growth.laws import fit
 
 #: The depth head of the rigs.
 HEAD = "structured_light"
@@ -45,11 +45,6 @@ class Services:
     by_trackers: Mapping[int, Mapping[str, float]]
     costs: Costs
     beside: Sequence[Observed]
-
-    @property
-    def law(self) -> Law:
-        """Law of all trackers together."""
-        return self.costs.trackers
 
 
 def measure(trackers: Sequence[int], duration_s: float, seed: int, progress: Callable[[str], None]) -> Services:
@@ -80,7 +75,7 @@ def goals(services: Services) -> list[Goal]:
     name = f"{len(seen)} rigs on {os.cpu_count()} cores"
     sets = sum(len(one.ages_ms) + one.skipped for one in seen)
     passed_over = sum(one.skipped for one in seen) / sets if sets else np.nan
-    cores = sum(_cores(one) for one in seen) / (len(seen) * services.costs.cores(1))
+    cores = sum(one.all_cores for one in seen) / (len(seen) * services.costs.cores(1))
     return [
         at_most(f"{name}: frame sets passed over", 100 * passed_over, 100 * PASSED_OVER, "%"),
         at_most(f"{name}: exposures in no estimate that nobody counted", sum(one.silent for one in seen), 0),
@@ -104,8 +99,8 @@ def sections(services: Services, drawn: Picture) -> list[Section]:
 def values(services: Services) -> dict[str, Any]:
     """Numbers of the services for programs."""
     beside = [
-        {"rate_hz": one.rate_hz, "age_ms": _ages(one), "skipped": one.skipped, "silent": one.silent}
-        | {"tracking": one.tracking, "cores": _cores(one)}
+        {"rate_hz": one.rate_hz, "age_ms": one.age_ms, "skipped": one.skipped, "silent": one.silent}
+        | {"tracking": one.tracking, "cores": one.all_cores}
         for one in services.beside
     ]
     return {"by_trackers": services.by_trackers, "side_by_side": beside}
@@ -135,15 +130,5 @@ def _table(beside: Sequence[Observed]) -> Table:
         Column("p99", "ms", ".1f"), Column("passed over", format=".0f"), Column("TRACKING", "", ".1%"),
         Column("cores", format=".2f"),
     )  # fmt: skip
-    rows = ((k + 1, one.rate_hz, *_ages(one), one.skipped, one.tracking, _cores(one)) for k, one in enumerate(beside))
+    rows = ((k + 1, one.rate_hz, *one.age_ms, one.skipped, one.tracking, one.all_cores) for k, one in enumerate(beside))
     return Table("Rigs of today on this host", columns, tuple(rows))
-
-
-def _cores(one: Observed) -> float:
-    return sum(one.cores.values())
-
-
-def _ages(one: Observed) -> tuple[float, float]:
-    """Median and 99th percentile of the ages [ms]."""
-    p50, p99 = np.percentile(one.ages_ms, (50, 99)) if len(one.ages_ms) else (np.nan, np.nan)
-    return float(p50), float(p99)

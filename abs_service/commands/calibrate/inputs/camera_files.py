@@ -19,11 +19,12 @@ UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 
 def read_all(paths: Sequence[Path], hints: Hints, source: str | None, unit: str | None) -> list[Content]:
     """The cameras of several files; see `read`. OpenCV's extrinsics.yml belongs to the intrinsics.yml beside it."""
-    pairs_of = [path for path in paths if len(paths) > 1 and source in (None, "opencv") and opencv.is_pair(_text(path))]
-    if len(pairs_of) != 1:
-        return [read(path, hints, source, unit) for path in paths]
-    whole = replace(hints, pair=_text(pairs_of[0]))
-    return [read(path, whole, source, unit) for path in paths if path not in pairs_of]
+    texts = [(path, _text(path)) for path in paths]
+    pairs = [one for one in texts if len(texts) > 1 and source in (None, "opencv") and opencv.is_pair(one[1])]
+    if len(pairs) == 1:
+        texts.remove(pairs[0])
+        hints = replace(hints, pair=pairs[0][1])
+    return [_content(path, text, hints, source, unit) for path, text in texts]
 
 
 def read(path: Path, hints: Hints, source: str | None = None, unit: str | None = None) -> Content:
@@ -38,7 +39,11 @@ def read(path: Path, hints: Hints, source: str | None = None, unit: str | None =
     Raises:
         OptionError: it cannot be read, or what it says cannot be.
     """
-    text = _text(path)
+    return _content(path, _text(path), hints, source, unit)
+
+
+def _content(path: Path, text: str, hints: Hints, source: str | None, unit: str | None) -> Content:
+    """The cameras of the text of a file, see `read`."""
     name = source or exchange.of_content(path, text)
     if hints.lens and name != "opencv":
         raise OptionError(f"--lens {hints.lens}: {path} says itself which lens it has")

@@ -4,6 +4,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from abs_service.display.sentences import sentences
+
 #: Data older than this is stale [s]; a tracker below this share of its camera's rate is slow.
 STALE_S, SLOW_SHARE = 1.0, 0.8
 
@@ -70,9 +72,9 @@ def tracker(
         text = f"The last estimate said: {title.lower()}. Check that the tracker runs and its sensors deliver."
         return Words(f"No estimate for {age(age_s)}", text, STALE_COLOR)
     precise = f", σ {sigma_mm:.2f} mm" if status in ("TRACKING", "DEGRADED") and math.isfinite(sigma_mm) else ""
-    text = ". ".join(one[:1].upper() + one[1:] for one in [*([slow] if slow else []), *reasons, *warnings])
+    text = sentences((slow, *reasons, *warnings))
     color = STATUS["DEGRADED"][1] if slow and status == "TRACKING" else color
-    return Words(title + precise, f"{text}. {remedy}".strip(". ") if text or remedy else "", color)
+    return Words(title + precise, f"{text} {remedy}".strip(". "), color)
 
 
 def slow(rate_hz: float, camera_hz: float, skipped: int) -> str:

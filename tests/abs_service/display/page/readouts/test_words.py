@@ -25,6 +25,11 @@ def test_reasons_warnings_and_the_remedy_are_said():
     assert "Reinitialise" in words.tracker("LOST", ["hardly any vertex agrees"], [], 0.1, 2.0).text
 
 
+def test_a_doubt_that_asks_ends_with_its_question_mark():
+    said = words.tracker("DEGRADED", ["tof is missing"], ["is the region right?"], 0.1, 2.0)
+    assert said.text == "Tof is missing. Is the region right? Use the estimate with care"
+
+
 def test_a_tracker_that_misses_images_says_that_before_its_other_reasons():
     said = words.tracker("LOST", ["only 46 % agree"], [], 0.1, 2.0, slow="only 7 estimates")
     assert said.text.startswith("Only 7 estimates. Only 46 % agree. Bring")
