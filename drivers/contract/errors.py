@@ -17,17 +17,22 @@ class AddressError(FinalError):
 
 
 class SdkMissingError(FinalError):
-    """A driver whose library is not installed.
+    """A driver whose library is not installed, or cannot be loaded.
 
     Args:
         package: the package that cannot be imported.
         extra: the extra of this project that installs it, "" if there is none.
         command: what installs it where no extra can.
+        error: of its import; a library of the system may be missing that it needs.
     """
 
-    def __init__(self, package: str, extra: str = "", *, command: str = "") -> None:
-        self.reason = f"{package} is not installed"
-        self.remedy = command or f".venv/bin/pip install -e '.[{extra}]'"
+    def __init__(self, package: str, extra: str = "", *, command: str = "", error: ImportError | None = None) -> None:
+        if error is None or isinstance(error, ModuleNotFoundError):
+            self.reason = f"{package} is not installed"
+            self.remedy = command or f".venv/bin/pip install -e '.[{extra}]'"
+        else:
+            self.reason = f"{package} cannot be loaded: {error}"
+            self.remedy = "install what it lacks (docs/how-to/install.md)"
         super().__init__(f"{self.reason}:  {self.remedy}")
 
 

@@ -26,7 +26,7 @@ def load() -> Any:
     try:
         from harvesters import core  # noqa: PLC0415  an extra
     except ImportError as error:
-        raise SdkMissingError("harvesters", "genicam") from error
+        raise SdkMissingError("harvesters", "genicam", error=error) from error
     logging.getLogger(core.__name__).setLevel(
         logging.CRITICAL
     )  # what it says to the terminal is raised or counted, too

@@ -25,7 +25,7 @@ def open_device(uri: str, clock: Callable[[], int]) -> Device:
     try:
         from drivers.kinect1 import opening  # noqa: PLC0415
     except ImportError as error:
-        raise SdkMissingError("pyusb", "kinect") from error
+        raise SdkMissingError("pyusb", "kinect", error=error) from error
     return opening.open_camera(address, clock)
 
 
@@ -33,8 +33,8 @@ def discover(timeout_s: float) -> list[Found]:
     """Attached cameras, and obstacles to opening them. Never raises."""
     try:
         from drivers.kinect1 import opening  # noqa: PLC0415
-    except ImportError:
-        missing = SdkMissingError("pyusb", "kinect")
+    except ImportError as error:
+        missing = SdkMissingError("pyusb", "kinect", error=error)
         return [Found(_UNKNOWN, Availability.SDK_MISSING, missing.reason, missing.remedy)]
     try:
         return opening.find()

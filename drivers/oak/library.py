@@ -36,7 +36,7 @@ def load(network: bool = False, search_ms: int = SEARCH_MS) -> Any:
     try:
         import depthai  # noqa: PLC0415  an extra, and half a second
     except ImportError as error:
-        raise SdkMissingError("depthai", "oak") from error
+        raise SdkMissingError("depthai", "oak", error=error) from error
     return depthai
 
 

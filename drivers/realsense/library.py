@@ -16,7 +16,7 @@ def load() -> Any:
     try:
         import pyrealsense2  # noqa: PLC0415  an extra
     except ImportError as error:
-        raise SdkMissingError("pyrealsense2", "realsense") from error
+        raise SdkMissingError("pyrealsense2", "realsense", error=error) from error
     return pyrealsense2
 
 

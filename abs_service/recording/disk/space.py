@@ -47,5 +47,5 @@ class Space:
         left, resumes = self.left(), self._minimum * RESUME_FACTOR
         self._is_short = left < (resumes - self._minimum if self._is_short else 0)
         if self._is_short:
-            free = f"only {(left + self._minimum) / 1e6:.0f} MB free in {self._directory}"
+            free = f"only {max(left + self._minimum, 0) / 1e6:.0f} MB free in {self._directory}"
             raise OSError(f"{free}; recording resumes with {resumes / 1e6:.0f} MB")

@@ -101,8 +101,9 @@ def test_the_trackers_that_live(address):
 
 @pytest.mark.parametrize("path", ["/states/**", "/states/", "/else"])
 def test_what_is_not_there_is_refused(address, path):
-    with pytest.raises(urllib.error.HTTPError, match="404"):
+    with pytest.raises(urllib.error.HTTPError, match="404") as refused:
         urllib.request.urlopen(address + path, timeout=TIMEOUT_S)
+    refused.value.close()
 
 
 def test_a_page_elsewhere_reads_only_if_it_is_named(bus, endpoint):

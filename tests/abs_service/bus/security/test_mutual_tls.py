@@ -28,11 +28,11 @@ def openssl(*arguments):
 
 
 def expire(folder, name):
-    """Signs a certificate anew that ended yesterday."""
+    """Signs a certificate anew that ends now; OpenSSL 3.6 refuses one that ended before it began."""
     request = folder / "request"
     openssl("req", "-new", "-key", folder / f"{name}.key", "-subj", f"/CN={name}", "-out", request)
     authority = ("-CA", folder / "authority.pem", "-CAkey", folder / "authority.key")
-    openssl("x509", "-req", "-in", request, *authority, "-days", "-1", "-out", folder / f"{name}.pem")
+    openssl("x509", "-req", "-in", request, *authority, "-days", "0", "-out", folder / f"{name}.pem")
 
 
 def test_what_is_right_has_a_name_and_an_end(keys):

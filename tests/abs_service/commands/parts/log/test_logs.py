@@ -26,7 +26,9 @@ def act(arguments):
         raise DeviceError("no camera; plug one in")
     if arguments.end == "odd":
         raise DeviceError("no camera \x1b[2J\a–")
-    return 1 // int(arguments.end)
+    if arguments.end == "mistake":
+        raise ZeroDivisionError("one by none")
+    return int(arguments.end)
 
 module = types.ModuleType("abs_service.commands.act", "Acts.")
 module.add_arguments = lambda parser: parser.add_argument("end")
@@ -68,7 +70,7 @@ def test_programs_get_nothing_but_json():
 
 
 def test_our_own_mistakes_are_logged_with_their_traceback():
-    code, lines = act("0", "--log-format", "json")
+    code, lines = act("mistake", "--log-format", "json")
     error = json.loads(lines[-1])
     assert code == Exit.FAILED
     assert error["message"].startswith("ZeroDivisionError: ")
@@ -78,13 +80,13 @@ def test_our_own_mistakes_are_logged_with_their_traceback():
 @pytest.mark.parametrize("form", ["text", "json"])
 def test_a_file_gets_everything_and_standard_error_what_ended_the_command(tmp_path, form):
     file = tmp_path / "log"
-    for end in ("user", "0", "1"):
+    for end in ("user", "mistake", "1"):
         code, lines = act(end, "--log-file", file, "--log-format", form)
-        assert code == {"user": Exit.USER, "0": Exit.FAILED, "1": 1}[end]
+        assert code == {"user": Exit.USER, "mistake": Exit.FAILED, "1": 1}[end]
         assert not any("left" in line for line in lines)
         assert (lines or [""])[-1] == {
             "user": "abs-service: error: no camera; plug one in",
-            "0": "ZeroDivisionError: integer division or modulo by zero",
+            "mistake": "ZeroDivisionError: one by none",
             "1": "",
         }[end]
     text = file.read_text()
