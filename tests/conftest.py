@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 
 import hypothesis
@@ -180,7 +181,11 @@ def launch():
 def browser():
     """Chromium; skipped where it is missing."""
     sync_api = pytest.importorskip("playwright.sync_api")
-    with sync_api.sync_playwright() as playwright:
+    with ExitStack() as stack:
+        try:
+            playwright = stack.enter_context(sync_api.sync_playwright())
+        except Exception as error:
+            pytest.skip(f"Playwright does not start ({error}); without libatomic.so.1: apt install libatomic1")
         try:
             opened = playwright.chromium.launch(executable_path=CHROMIUM, args=CHROMIUM_OPTIONS)
         except sync_api.Error as error:
