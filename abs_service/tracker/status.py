@@ -102,7 +102,9 @@ def _seen(fits: Sequence[SensorFit], lost: bool, limits: Settings) -> Iterator[s
     advice = _FIND if lost else _FOLLOW
     outvoted = lost and inliers >= limits.lost_below
     if disagree and not outvoted:
-        yield f"only {inliers:.0%} of the visible vertices agree with a measurement – {advice}"
+        missing = min((fit.counts.share("missing") for fit in of_distances(fits)), default=0.0)
+        unmeasured = f", {missing:.0%} of all {_ABSENT['missing']}" if missing > 1 / 2 and not lost else f" – {advice}"
+        yield f"only {inliers:.0%} of the visible vertices agree with a measurement{unmeasured}"
     if hidden:
         yield (
             f"{occluded:.0%} of the vertices are occluded in the sensor that sees most of them – "

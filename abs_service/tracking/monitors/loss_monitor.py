@@ -24,14 +24,16 @@ class Settings:
         keep_s: time after the loss in which the old mesh is relocated onto the detected object, so that its vertices
             keep their material points; later, a new mesh is made [s]. For scenes without similar objects.
         every_s: time between two attempts [s].
-        confirm: number of consecutive good estimates from which on the status is TRACKING; before, it is DEGRADED.
+        confirm: number of consecutive good estimates from which on the status is TRACKING after a loss, with a new mesh,
+            or after `misfit_s` without TRACKING; before, it is DEGRADED.
         size_ratio: largest ratio between the areas of the detected and the lost object, and between the mean squared
             distances of their points from their centres; others are rejected, because an empty scene has surfaces, too.
             So are those that share less than one part in `size_ratio` of their colours with the lost one.
         grow_s: time for which the object must be seen to continue beyond edges of the mesh that something hid at first
             before a new, larger mesh is made [s].
-        misfit_s: time without TRACKING after which a new mesh is made if the free edges lay off the object's outline at
-            its beginning, and still do (`status.degraded_rim`, `status.degraded_rim_m`) [s].
+        misfit_s: time without TRACKING after which single good estimates are chance, and after which a new mesh is made
+            if the free edges lay off the object's outline at its beginning, and still do (`status.degraded_rim`,
+            `status.degraded_rim_m`) [s].
     """
 
     after_s: Annotated[float, Ge(0)] = 0.5
@@ -52,6 +54,7 @@ class LossMonitor:
         self._lost_ns: int | None = None
         self._tried_ns: int | None = None
         self._off_ns: int | None = None
+        self._doubted_ns: int | None = None  # first estimate without TRACKING since the last one with it
         self._is_off = False
         self._good = settings.confirm
         self._event = "found again"
@@ -78,22 +81,35 @@ class LossMonitor:
         return self._lost_ns is not None and t_ns - self._lost_ns < self._settings.keep_s * 1e9
 
     def with_hysteresis(self, estimate: Estimate) -> Estimate:
-        """The estimate with hysteresis: the first good estimates after a loss are DEGRADED."""
+        """The estimate with hysteresis: the first good estimates after a loss, or after a long doubt, are DEGRADED."""
         self._is_off = status.is_misplaced(estimate.fits, estimate.shape, self._limits)
         if self._is_off:
             self._off_ns = self._off_ns or estimate.t_host_ns
-        elif estimate.status == Status.TRACKING:  # a mesh that is jammed lies off the outline in some frames only
-            self._off_ns = None
+        if estimate.status == Status.TRACKING:
+            return self._confirmed(estimate)
+        self._doubted_ns = self._doubted_ns or estimate.t_host_ns
         if estimate.status == Status.LOST:
             self._lost_ns = estimate.t_host_ns if self._lost_ns is None else self._lost_ns
             self._good, self._event = 0, "found again"
             return estimate
         self._lost_ns = self._tried_ns = None
+        if self._good < self._settings.confirm:
+            self._good = 0
+        elif estimate.t_host_ns - self._doubted_ns >= self._settings.misfit_s * 1e9:
+            self._good, self._event = 0, "agrees again in all checks"
+        return estimate
+
+    def _confirmed(self, estimate: Estimate) -> Estimate:
+        """A good estimate, DEGRADED unless enough were good before: a jammed mesh agrees in some frames only."""
+        self._lost_ns = self._tried_ns = None
         self._good += 1
-        if self._good >= self._settings.confirm:
-            return estimate
-        reason = f"{self._event} {self._good} of {self._settings.confirm} estimates ago"
-        return replace(estimate, status=Status.DEGRADED, reasons=(*estimate.reasons, reason))
+        if self._good < self._settings.confirm:
+            reason = f"{self._event} {self._good} of {self._settings.confirm} estimates ago"
+            return replace(estimate, status=Status.DEGRADED, reasons=(*estimate.reasons, reason))
+        self._doubted_ns = None
+        if not self._is_off:
+            self._off_ns = None
+        return estimate
 
     def restart(self, event: str) -> None:
         """Makes the next estimates DEGRADED as after a loss, because of an event such as "a larger mesh was made"."""

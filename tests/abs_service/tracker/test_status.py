@@ -97,6 +97,16 @@ def test_of_the_vertices_that_should_be_in_sight_half_have_to_agree_in_one_senso
     assert judge(both, (), SHAPE, 0.0, SETTINGS) == (Status.TRACKING, ())
 
 
+def test_where_no_distance_is_measured_the_advice_is_not_that_for_a_mesh_that_disagrees():
+    hole = replace(fit(0.5), counts=VertexCounts(facing=100, missing=96), remainder=Remainder(0.1, 0.1))
+    status, reasons = judge([hole, replace(fit(0.5), sensor="color")], (), SHAPE, 0.0, SETTINGS)
+    assert status == Status.DEGRADED
+    assert reasons[0] == (
+        "only 50% of the visible vertices agree with a measurement, 96% of all have no return – bring the surface "
+        "nearer, or turn it towards the camera"
+    )
+
+
 def test_colors_of_an_object_that_left_the_depth_image_do_not_make_up_for_its_distances():
     """Those of a white table agree wherever it is."""
     colors = seen(agreeing=65, outside=35)

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
+import cv2
 import numpy as np
 from annotated_types import Ge
 from numpy.typing import NDArray
@@ -13,6 +14,9 @@ from abs_service.tracker.detection.initial_detection import DetectionError
 from abs_service.tracker.detection.plausibility import is_scene
 from abs_service.tracker.detection.segments.depth_segments import large_surfaces
 from abs_service.tracker.detection.segments.within import Polygon, Restricted, restricted
+
+#: A piece of the scene is torn off where returns are missing: within so many pixels, the scene goes on.
+TORN_PX = 5
 
 
 @dataclass(frozen=True)
@@ -41,10 +45,14 @@ class Settings:
         """Pixels (height, width) of the connected surface whose median distance is smallest.
 
         Raises:
-            DetectionError: there is none, or it is a scene in which everything is connected.
+            DetectionError: there is none, or it is a scene in which everything is connected, or a piece of that.
         """
-        labels, large = large_surfaces(view.distance, view.step(self.largest_step_m), self.minimum_pixels)
+        step = view.step(self.largest_step_m)
+        labels, large = large_surfaces(view.distance, step, self.minimum_pixels)
         nearest = labels == min(large, key=lambda label: float(np.median(view.distance[labels == label])))
+        largest = labels == large[0]
+        if is_scene(largest, view.measured) and _goes_on(nearest, largest, view.distance, step):
+            nearest = largest
         if is_scene(nearest, view.measured):
             share = np.count_nonzero(nearest) / np.count_nonzero(view.measured)
             raise DetectionError(
@@ -53,3 +61,19 @@ class Settings:
                 'it lies or stands on something flat, or else to "seed", "box" or "mask"'
             )
         return nearest
+
+
+def _goes_on(
+    piece: NDArray[np.bool_],
+    surface: NDArray[np.bool_],
+    distance: NDArray[np.float32],
+    largest_step: NDArray[np.float32] | float,
+) -> bool:
+    """True if a surface (height, width) is about as far away as a piece of it, where it begins beside the piece."""
+    around = np.ones((2 * TORN_PX + 1, 2 * TORN_PX + 1))
+    farthest = cv2.dilate(np.where(piece, distance, 0), around)
+    nearest = cv2.erode(np.where(piece, distance, np.float32(np.inf)), around)
+    beside = surface & (farthest > 0)
+    with np.errstate(invalid="ignore"):
+        alike = (distance > nearest - largest_step) & (distance < farthest + largest_step)
+    return bool(np.count_nonzero(beside & alike) > np.count_nonzero(beside) / 2)

@@ -104,6 +104,20 @@ def test_a_large_object_is_no_scene(part, background):
     assert selected(nearest.Settings(), scene(part, background=background))[25, 30]
 
 
+@pytest.mark.parametrize(("ahead_m", "is_object"), [(0.0, False), (0.01, False), (0.3, True)])
+def test_a_piece_torn_off_the_scene_is_the_scene(ahead_m, is_object):
+    distance = scene((slice(0, 48), slice(0, 64), 1.0))
+    distance += np.linspace(0, 0.1, 64, dtype=np.float32)  # the piece at its left end is nearest
+    distance[8:40, 0:16] = np.nan
+    distance[12:36, 3:14] = 1.0 - ahead_m
+    region = nearest.Settings()
+    if is_object:
+        assert selected(region, distance)[16:32, 6:11].all()
+    else:
+        with pytest.raises(DetectionError, match="it is the scene"):
+            selected(region, distance)
+
+
 def test_an_empty_image_has_no_surface():
     with pytest.raises(DetectionError, match="minimum_pixels = 200"):
         selected(nearest.Settings(), np.full(SHAPE, np.nan, np.float32))

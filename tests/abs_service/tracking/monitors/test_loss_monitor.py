@@ -85,6 +85,22 @@ def test_after_a_loss_the_first_good_estimates_are_degraded():
     assert after[2].reasons == ()
 
 
+def test_an_estimate_in_doubt_after_a_loss_is_no_good_one():
+    monitor = LossMonitor(Settings(confirm=3), LIMITS)
+    judged = [Status.LOST, Status.DEGRADED, Status.DEGRADED, *[Status.TRACKING] * 3]
+    after = [monitor.with_hysteresis(estimate(k, status)).status for k, status in enumerate(judged)]
+    assert after == [Status.LOST, *[Status.DEGRADED] * 4, Status.TRACKING]
+
+
+def test_after_a_long_doubt_single_good_estimates_are_chance():
+    monitor = LossMonitor(Settings(confirm=3, misfit_s=0.3), LIMITS)
+    good = {*range(5), 6, 20, 24, 25, 30, 31, 32, 33, 35}
+    judged = [Status.TRACKING if k in good else Status.DEGRADED for k in range(36)]
+    after = [monitor.with_hysteresis(estimate(k, status)) for k, status in enumerate(judged)]
+    assert [k for k, one in enumerate(after) if one.status == Status.TRACKING] == [*range(5), 6, 32, 33, 35]
+    assert after[25].reasons == ("agrees again in all checks 2 of 3 estimates ago",)
+
+
 @pytest.mark.parametrize(
     "found",
     [
