@@ -5,7 +5,7 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import chain, islice
+from itertools import chain, islice, pairwise
 from pathlib import Path
 
 from calib.files import limited
@@ -102,11 +102,29 @@ def _by_all_numbers(paths: Sequence[Path], alone: bool) -> list[Path]:
 
 
 def by_list(folder: Path, name: str) -> list[ImageFile]:
-    """Files in a list of the TUM RGB-D benchmark: lines with a time [s] and a path; `#` starts a comment.
+    """Files in a list of the TUM RGB-D benchmark, by time. A line has a time [s] and a path; `#` starts a comment.
 
     Raises:
         ImageFolderError: missing list, malformed line, or missing file; names the line.
     """
+    ordered = sorted(_listed(folder, name).items(), key=lambda item: item[1])
+    return [ImageFile(path, seq, time) for seq, (path, time) in enumerate(ordered)]
+
+
+def time_problem(folder: Path, name: str) -> str:
+    """What is wrong with the times of a list, which should increase from line to line, or ""; raises as `by_list`."""
+    times = list(_listed(folder, name).values())
+    earlier = sum(after <= before for before, after in pairwise(times))
+    if not earlier:
+        return ""
+    return (
+        f"the times of {earlier} of {len(times)} lines are not later than those of the line before, so the images are "
+        f"taken in another order, within {(max(times) - min(times)) * 1e-9:.3g} s"
+    )
+
+
+def _listed(folder: Path, name: str) -> dict[Path, int]:
+    """Time [ns] of each file in a list, in the order of its lines; raises as `by_list`."""
     try:
         lines = limited.read(folder / name, LARGEST_LIST).decode().splitlines()
     except (OSError, UnicodeDecodeError) as error:
@@ -125,8 +143,7 @@ def by_list(folder: Path, name: str) -> list[ImageFile]:
         times[path] = time
     if not times:
         raise ImageFolderError(f"{folder / name}: names no image")
-    ordered = sorted(times.items(), key=lambda item: item[1])
-    return [ImageFile(path, seq, time) for seq, (path, time) in enumerate(ordered)]
+    return times
 
 
 def _nanoseconds(text: str) -> int | None:

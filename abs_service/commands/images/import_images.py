@@ -57,7 +57,7 @@ from drivers.contract.frame import Geometry
 from drivers.contract.text import printable
 from drivers.encoding.foreign_recording import ForeignRecording
 from drivers.image_folder.images import ColorImages, DepthImages, ImageFolder, Images
-from drivers.image_folder.listing import ImageFile, ImageFolderError, by_list, by_number
+from drivers.image_folder.listing import ImageFile, ImageFolderError, by_list, by_number, time_problem
 from drivers.opening import open_recording
 from drivers.sens.recording import SensRecording
 
@@ -189,6 +189,9 @@ def _streams(arguments: argparse.Namespace, cameras: CameraFile) -> Mapping[str,
     depth = cameras.depth
     depth_names, color_names = PATTERNS.get(arguments.layout, ("", ""))
     depth_names, color_names = arguments.depth or depth_names, arguments.color or color_names
+    if not numbered and (problem := time_problem(folder, "depth.txt")):
+        advice = "where the lines are in order and the times are wrong, --layout pairs takes the numbers in the names"
+        print(f"abs-service: note: {folder / 'depth.txt'}: {problem}; {advice}", file=sys.stderr)
     files = arguments.frames.of(by_number(folder, depth_names, rate) if numbered else by_list(folder, "depth.txt"))
     streams: dict[str, Images] = {
         "depth": DepthImages(

@@ -24,8 +24,8 @@ class Settings:
         keep_s: time after the loss in which the old mesh is relocated onto the detected object, so that its vertices
             keep their material points; later, a new mesh is made [s]. For scenes without similar objects.
         every_s: time between two attempts [s].
-        confirm: number of consecutive good estimates from which on the status is TRACKING after a loss, with a new mesh,
-            or after `misfit_s` without TRACKING; before, it is DEGRADED.
+        confirm: number of consecutive good estimates from which on the status is TRACKING after a loss, with a new
+            mesh, or after `misfit_s` without TRACKING; before, it is DEGRADED.
         size_ratio: largest ratio between the areas of the detected and the lost object, and between the mean squared
             distances of their points from their centres; others are rejected, because an empty scene has surfaces, too.
             So are those that share less than one part in `size_ratio` of their colours with the lost one.

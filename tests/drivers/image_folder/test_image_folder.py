@@ -10,7 +10,7 @@ from calib.camera import Camera
 from drivers.contract.frame import Geometry, Kind
 from drivers.image_folder import image_file
 from drivers.image_folder.images import ColorImages, DepthImages, ImageFolder
-from drivers.image_folder.listing import ImageFile, ImageFolderError, by_list, by_number
+from drivers.image_folder.listing import ImageFile, ImageFolderError, by_list, by_number, time_problem
 
 CAMERA = Camera(4, 3, 4.0, 4.0, 1.5, 1.0)
 
@@ -47,6 +47,18 @@ def test_lists_name_images_and_their_times_exactly(tmp_path: Path) -> None:
         ("a.png", 0, 1305031102_160407123),
         ("b.png", 1, 1305031102_194330000),
     ]
+
+
+def test_times_that_go_back_from_line_to_line_are_told(tmp_path: Path) -> None:
+    for k in range(4):
+        save(tmp_path / f"{k}.png", depth_image())
+    (tmp_path / "good.txt").write_text("".join(f"{k / 30} {k}.png\n" for k in range(4)))
+    (tmp_path / "bad.txt").write_text("0.015 0.png\n0.014 1.png\n0.016 2.png\n0.016 3.png\n")
+    assert time_problem(tmp_path, "good.txt") == ""
+    assert time_problem(tmp_path, "bad.txt").startswith(
+        "the times of 2 of 4 lines are not later than those of the line"
+    )
+    assert time_problem(tmp_path, "bad.txt").endswith("within 0.002 s")
 
 
 @pytest.mark.parametrize(
