@@ -37,6 +37,10 @@ _ALMOST = 0.75
 #: Vertices within so many pixels of the image's border may continue beyond it.
 BORDER_PX = 2.0
 
+#: A sensor measures nothing in the outermost rows and columns, up to this share of the image: where views of two cameras
+#: are matched, or distances are registered to another camera.
+BLIND = 0.08
+
 
 class RimClass(IntEnum):
     """Reason why the mesh ends at a vertex."""
@@ -85,8 +89,9 @@ def classify_rim(
     hidden = np.any([np.isnan(inside_at(points)) for points in further], axis=0)
     leaves = np.any([~_is_within(camera, camera.project(points)) for points in further], axis=0)
     unseen = np.where(leaves, RimClass.BORDER, RimClass.OCCLUDED)
+    ends = outer + gap[:, None] * step
     # If the mesh ends far inside the object, or the outline bends, it is nearest elsewhere than where the edge points.
-    missed = np.abs(inside_at(outer + gap[:, None] * step)) > LARGEST_MISS_PX
+    missed = np.abs(inside_at(ends)) > LARGEST_MISS_PX
     goes_on = ~(beyond <= LARGEST_GAP_STEPS) | (missed & (gap > 0))
     far = ~goes_on & (inside > LARGEST_MISS_PX) & (not rim.is_end)
     goes_on[far] = _leaves(camera, (outer + _ALMOST * gap[:, None] * step)[far], distance)
@@ -94,6 +99,8 @@ def classify_rim(
     classes[end_cosine < MIN_COSINE] = RimClass.SILHOUETTE
     classes = np.where(inside > camera.width + camera.height, unseen, classes).astype(np.uint8)
     classes[~_is_within(camera, place, BORDER_PX)] = RimClass.BORDER
+    if not rim.is_end:
+        classes[(classes == RimClass.FREE) & _ends_at_border(camera.project(ends), distance)] = RimClass.BORDER
     free = classes == RimClass.FREE
     if _bulges(camera, surface, rim.outer[free], -gradients[free]):
         classes[free] = RimClass.SILHOUETTE
@@ -108,6 +115,18 @@ def _is_within(camera: Camera, places: NDArray[np.float64], margin: float = 0.0)
     """True for places (k, 2) in a camera's image that are so far from its border [px]."""
     last = np.array([camera.width, camera.height]) - 1
     return np.all((places >= margin) & (places <= last - margin), axis=1)
+
+
+def _ends_at_border(places: NDArray[np.float64], distance: NDArray[np.float32]) -> NDArray[np.bool_]:
+    """True for places (k, 2) at the border of what is measured of an image (height, width): an end there is none."""
+    known = np.isfinite(distance)
+    at_border = np.zeros(len(places), np.bool_)
+    for axis, size in enumerate(known.shape[::-1]):
+        lines = np.flatnonzero(known.any(axis=axis))
+        first = lines[0] if lines[0] <= BLIND * size else 0
+        last = lines[-1] if lines[-1] >= (1 - BLIND) * size else size - 1
+        at_border |= (places[:, axis] < first + LARGEST_MISS_PX) | (places[:, axis] > last - LARGEST_MISS_PX)
+    return at_border
 
 
 def _bulges(camera: Camera, surface: Surface, outer: NDArray[np.intp], outwards: NDArray[np.float64]) -> bool:

@@ -116,6 +116,22 @@ def test_an_edge_at_the_border_of_the_image_may_continue_beyond_it():
     assert found[RimClass.FREE] >= 2 * 15
 
 
+@pytest.mark.parametrize("blind", [0, 4, 8])
+def test_an_edge_before_columns_in_which_nothing_is_measured_is_cut_by_the_border(blind: int):
+    """Half of the sheet is to the right of the image, whose last columns, and every other pixel before, are blind."""
+    rays = CAMERA.unproject(np.ones((CAMERA.height, CAMERA.width)))
+    last = CAMERA.width - 1 - blind
+    shift = (rays[..., 0] / rays[..., 2])[0, last] - MESH.vertices[:, 0].max() - 0.008
+    cut = replace(MESH, vertices=MESH.vertices + np.array([shift, 0, 0]))
+    seen = picture(replace(MESH, vertices=MESH.vertices * (2, 1, 1) + np.array([shift + 0.15, 0, 0])))
+    seen[:, last + 1 :] = np.nan
+    seen[::2, last] = np.nan
+    found = outline(seen, cut)
+    right = cut.vertices[Rim.of(cut).outer, 0] > cut.vertices[:, 0].max() - 0.01
+    assert np.mean(found.classes[right] == RimClass.BORDER) > 0.8  # but for the corners
+    assert not np.any(found.classes[~right] == RimClass.BORDER)
+
+
 def test_an_edge_up_to_two_cells_before_the_border_is_cut_by_it_until_the_object_comes_into_the_image():
     """Half of the sheet is to the right of the image; the mesh ends a cell before its last column."""
     rays = CAMERA.unproject(np.ones((CAMERA.height, CAMERA.width)))
