@@ -37,7 +37,7 @@ _ALMOST = 0.75
 #: Vertices within so many pixels of the image's border may continue beyond it.
 BORDER_PX = 2.0
 
-#: A sensor measures nothing in the outermost rows and columns, up to this share of the image: where views of two cameras
+#: A sensor measures nothing in the outermost rows and columns, up to this share of the image: where two views
 #: are matched, or distances are registered to another camera.
 BLIND = 0.08
 
