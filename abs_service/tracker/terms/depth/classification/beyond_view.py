@@ -20,6 +20,8 @@ MIN_RETURNS, MIN_OTHERS = 0.5, 0.25
 EDGE_SHARE = 0.01
 #: Returns within so many pixels of the predicted mesh may be the object's.
 NEAR_PX = 5
+#: Up to this share of the rows or columns may be blind along one side of the image, whatever ends along the others.
+BLIND_SHARE = 0.08
 #: Returns that are fewer in the square of three pixels a side around them are strays.
 MIN_NEIGHBOURS = 3
 
@@ -52,11 +54,17 @@ def beyond(missing: NDArray[np.bool_], expected: NDArray[np.bool_]) -> NDArray[n
         missing: pixels without return (height, width).
         expected: silhouette of the object.
     """
-    nothing, returns = np.zeros(missing.shape, np.bool_), ~missing
+    blind, returns = np.zeros(missing.shape, np.bool_), ~missing
     neighbours = cv2.boxFilter(returns.view(np.uint8), cv2.CV_8U, (3, 3), normalize=False)
     corners = cv2.findNonZero((returns & (neighbours >= MIN_NEIGHBOURS)).view(np.uint8))
     if corners is None:
-        return nothing
+        return blind
+    reach = round(BLIND_SHARE * missing.shape[1])
+    others = cv2.dilate(expected.view(np.uint8), _square(reach)) == 0
+    strays = neighbours < MIN_NEIGHBOURS
+    for turn in range(4):  # views: every side of the image becomes the left one
+        count = _blind_columns(*(np.rot90(mask, turn) for mask in (returns & ~strays, others)))
+        np.rot90(blind, turn)[:, :count] = True
     hull = cv2.fillConvexPoly(np.zeros(missing.shape, np.uint8), cv2.convexHull(corners), 1)
     stripe = max(round(EDGE_SHARE * missing.shape[1]), 1)
     inner = cv2.erode(hull, _square(stripe), borderValue=1) > 0
@@ -64,7 +72,23 @@ def beyond(missing: NDArray[np.bool_], expected: NDArray[np.bool_]) -> NDArray[n
     there, ours = edge & returns, cv2.dilate(expected.view(np.uint8), _square(NEAR_PX)) > 0
     length, measured, of_others = (np.count_nonzero(mask) for mask in (edge, there, there & ~ours))
     ends = measured >= MIN_RETURNS * length and of_others >= MIN_OTHERS * length
-    return ~inner if ends and np.count_nonzero(hull) >= MIN_AREA * hull.size else nothing
+    return ~inner | blind if ends and np.count_nonzero(hull) >= MIN_AREA * hull.size else blind
+
+
+def _blind_columns(returns: NDArray[np.bool_], others: NDArray[np.bool_]) -> int:
+    """Number of first columns that are blind: a straight line of returns begins after them, not of the object alone.
+
+    Args:
+        returns: pixels with a return (height, width).
+        others: pixels that are far from the object (height, width).
+    """
+    seen = np.flatnonzero(returns.any(axis=0))
+    first = int(seen[0]) if seen.size else 0
+    if not 0 < first <= BLIND_SHARE * returns.shape[1]:
+        return 0
+    line = returns[:, first : first + max(round(EDGE_SHARE * returns.shape[1]), 1)]
+    of_others = line & others[:, first : first + line.shape[1]]
+    return first if np.mean(line) >= MIN_RETURNS and np.mean(of_others) >= MIN_OTHERS else 0
 
 
 def _square(reach: int) -> NDArray[np.uint8]:

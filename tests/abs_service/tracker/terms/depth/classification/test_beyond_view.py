@@ -46,6 +46,16 @@ def test_what_is_around_a_field_of_view_is_beyond_it(view):
     assert inside[view & ~grown].all(), "more than the stripe at the edge is lost"
 
 
+@pytest.mark.parametrize("turns", range(4))
+def test_columns_along_one_side_are_blind_whatever_ends_along_another(turns):
+    """The lower half is a table that comes too near to be measured before the image ends."""
+    view = box(0, 120, 0, 154) & (ROWS < 84 + COLUMNS // 8)
+    table = view & (ROWS >= 50)
+    found = beyond(np.rot90(~view, turns), np.rot90(table, turns))
+    assert np.rot90(found, -turns)[:, 154:].all()
+    assert not np.rot90(found, -turns)[:, :152].any()
+
+
 def test_an_image_that_is_full_ends_nowhere():
     assert not beyond(NOTHING, OBJECT).any()
     assert not beyond(~NOTHING, OBJECT).any()
