@@ -55,7 +55,7 @@ class LossMonitor:
         self._tried_ns: int | None = None
         self._off_ns: int | None = None
         self._doubted_ns: int | None = None  # first estimate without TRACKING since the last one with it
-        self._is_off = False
+        self._is_off = self._was_lost = False  # was lost since the last estimate with TRACKING
         self._good = settings.confirm
         self._event = "found again"
 
@@ -69,12 +69,20 @@ class LossMonitor:
         if self._is_off and self._off_ns is not None and t_ns - self._off_ns >= self._settings.misfit_s * 1e9:
             self._off_ns = None
             return True
-        if self._lost_ns is None or t_ns - self._lost_ns < self._settings.after_s * 1e9:
+        if not (self._is_lost_for_good(t_ns) or self._is_left_over(t_ns)):
             return False
         if self._tried_ns is not None and t_ns - self._tried_ns < self._settings.every_s * 1e9:
             return False
         self._tried_ns = t_ns
         return True
+
+    def _is_lost_for_good(self, t_ns: int) -> bool:
+        return self._lost_ns is not None and t_ns - self._lost_ns >= self._settings.after_s * 1e9
+
+    def _is_left_over(self, t_ns: int) -> bool:
+        """True if the mesh of a lost object caught on something, in doubt ever since."""
+        since = self._doubted_ns if self._was_lost and not self.is_lost and not self._good else None
+        return since is not None and t_ns - since >= self._settings.misfit_s * 1e9
 
     def keeps_mesh(self, t_ns: int) -> bool:
         """True if an object detected at `t_ns` [ns] gets the old mesh."""
@@ -90,9 +98,9 @@ class LossMonitor:
         self._doubted_ns = self._doubted_ns or estimate.t_host_ns
         if estimate.status == Status.LOST:
             self._lost_ns = estimate.t_host_ns if self._lost_ns is None else self._lost_ns
-            self._good, self._event = 0, "found again"
+            self._good, self._event, self._was_lost = 0, "found again", True
             return estimate
-        self._lost_ns = self._tried_ns = None
+        self._lost_ns = None
         if self._good < self._settings.confirm:
             self._good = 0
         elif estimate.t_host_ns - self._doubted_ns >= self._settings.misfit_s * 1e9:
@@ -101,12 +109,12 @@ class LossMonitor:
 
     def _confirmed(self, estimate: Estimate) -> Estimate:
         """A good estimate, DEGRADED unless enough were good before: a jammed mesh agrees in some frames only."""
-        self._lost_ns = self._tried_ns = None
+        self._lost_ns = None
         self._good += 1
         if self._good < self._settings.confirm:
             reason = f"{self._event} {self._good} of {self._settings.confirm} estimates ago"
             return replace(estimate, status=Status.DEGRADED, reasons=(*estimate.reasons, reason))
-        self._doubted_ns = None
+        self._doubted_ns, self._was_lost = None, False
         if not self._is_off:
             self._off_ns = None
         return estimate

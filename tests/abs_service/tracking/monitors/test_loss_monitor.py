@@ -92,6 +92,16 @@ def test_an_estimate_in_doubt_after_a_loss_is_no_good_one():
     assert after == [Status.LOST, *[Status.DEGRADED] * 4, Status.TRACKING]
 
 
+def test_a_mesh_that_caught_on_something_after_a_loss_is_looked_for_again():
+    monitor, tries = LossMonitor(Settings(after_s=0.5, every_s=0.1, misfit_s=0.3), LIMITS), []
+    judged = {0: Status.TRACKING, 3: Status.LOST, 20: Status.TRACKING, 21: Status.TRACKING, 22: Status.TRACKING}
+    for k in range(40):
+        if monitor.take_attempt(k * FRAME_NS):
+            tries.append(k)
+        monitor.with_hysteresis(estimate(k, judged.get(k, Status.DEGRADED)))
+    assert tries == [11, 15, 19]  # 0.3 s after frame 1; after frame 22 it is found, and only in doubt
+
+
 def test_after_a_long_doubt_single_good_estimates_are_chance():
     monitor = LossMonitor(Settings(confirm=3, misfit_s=0.3), LIMITS)
     good = {*range(5), 6, 20, 24, 25, 30, 31, 32, 33, 35}
