@@ -42,6 +42,10 @@ BELOW_BORDER_PX = 6
 #: two vertices are apart: faces end at most that far inside an edge.
 LEFT_OUT = 0.05
 
+#: A principal point that is farther from the middle than this share of the image's width or height is that of another
+#: image size: lenses are centred to a few per cent, and half or twice the size moves it by 25 or 50 %.
+LARGEST_DECENTRING = 0.2
+
 
 class ExtentError(DetectionError):
     """Impossible extent of the object or of all in sight: the distances have the wrong unit, or the region is wrong."""
@@ -117,7 +121,19 @@ def doubts(detection: InitialDetection, mesh: Mesh, images: Mapping[str, Image],
         + noise_warnings(detection)
         + mesh_warnings(mesh)
         + left_out_warnings(detection, mesh)
+        + camera_warnings(rig)
         + alignment_warnings(detection, images, rig)
+    )
+
+
+def camera_warnings(rig: Rig) -> tuple[str, ...]:
+    """Doubts about cameras that no image is needed for: intrinsics that seem to be those of another image size."""
+    cameras = {name: sensor.camera for name, sensor in rig.sensors.items()}
+    return tuple(
+        f"the principal point of {name}, ({camera.cx:.0f}, {camera.cy:.0f}) px, is far from the middle of its images "
+        f"of {camera.width} × {camera.height} pixels: are its intrinsics those of images of this size?"
+        for name, camera in cameras.items()
+        if max(abs(camera.cx / camera.width - 0.5), abs(camera.cy / camera.height - 0.5)) > LARGEST_DECENTRING
     )
 
 

@@ -6,8 +6,17 @@ import numpy as np
 import pytest
 
 from abs_service.tracker.detection.grid_mesh import grid_mesh
-from abs_service.tracker.detection.plausibility import left_out_warnings, mesh_warnings, noise_warnings, warnings
+from abs_service.tracker.detection.plausibility import (
+    camera_warnings,
+    left_out_warnings,
+    mesh_warnings,
+    noise_warnings,
+    warnings,
+)
 from abs_service.tracker.detection.regions import box, nearest, seed
+from calib.camera import Camera
+from calib.noise.structured_light import StructuredLight
+from calib.rig import Rig, Sensor
 from tests.abs_service.tracker.detection.test_segmentation import EVERYWHERE, SHEET, detect
 
 
@@ -71,3 +80,17 @@ def test_parts_that_are_too_narrow_for_the_mesh_are_told():
     (doubt,) = left_out_warnings(hand, grid_mesh(hand))
     assert doubt.startswith("28% of what was found lie beside the mesh, whose vertices are ")
     assert left_out_warnings(hand, replace(grid_mesh(hand), is_complete=True)) == ()
+
+
+@pytest.mark.parametrize(
+    ("cx", "cy", "is_doubtful"), [(330.0, 230.0, False), (160.0, 120.0, True), (640.0, 360.0, True)]
+)
+def test_a_principal_point_of_another_image_size_is_doubted(cx, cy, is_doubtful):
+    """Intrinsics of half the size, and of 1280 × 720."""
+    rig = Rig("r", {"tof": Sensor("tof", Camera(640, 480, 585.0, 585.0, cx, cy), StructuredLight())})
+    found = camera_warnings(rig)
+    assert bool(found) == is_doubtful
+    if is_doubtful:
+        assert found[0].startswith(
+            f"the principal point of tof, ({cx:.0f}, {cy:.0f}) px, is far from the middle of its"
+        )
