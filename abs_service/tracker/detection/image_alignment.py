@@ -73,14 +73,19 @@ class Displacement(NamedTuple):
 def alignment_warnings(detection: InitialDetection, images: Mapping[str, Image], rig: Rig) -> tuple[str, ...]:
     """Doubts about the calibration of the cameras, in plain words."""
     pictures = {name: image for name, image in images.items() if isinstance(image, (ColorImage, ChannelImage))}
-    found = {name: displacement(detection, image, rig.sensors[name].camera) for name, image in pictures.items()}
-    return tuple(
-        f"the edges in the image of {name} lie {one.px:.0f} px beside those in the distances (fx and fy × "
-        f"{one.scale:.2f}, cx {one.shift[0]:+.0f} and cy {one.shift[1]:+.0f} would bring them together): is its "
-        "calibration that of images of this size, its pose T_rs that from sensor to rig and not the other way round, "
-        "and are both of the same moment?"
-        for name, one in found.items()
-        if one is not None
+    doubts = {name: _doubt(detection, image, rig.sensors[name].camera) for name, image in pictures.items()}
+    return tuple(f"the edges in the image of {name} lie {doubt}" for name, doubt in doubts.items() if doubt)
+
+
+def _doubt(detection: InitialDetection, image: ColorImage | ChannelImage, camera: Camera) -> str:
+    if is_mirrored(detection, image, camera):
+        return "where the distances have them only if left and right are exchanged: is one of the two mirrored?"
+    if (one := displacement(detection, image, camera)) is None:
+        return ""
+    return (
+        f"{one.px:.0f} px beside those in the distances (fx and fy × {one.scale:.2f}, cx {one.shift[0]:+.0f} and cy "
+        f"{one.shift[1]:+.0f} would bring them together): is its calibration that of images of this size, its pose "
+        "T_rs that from sensor to rig and not the other way round, and are both of the same moment?"
     )
 
 
@@ -92,8 +97,34 @@ def displacement(detection: InitialDetection, image: ColorImage | ChannelImage, 
         image: of the same moment.
         camera: that took it, as far as one knows.
     """
-    pixels, period = (image.rgb, 1) if isinstance(image, ColorImage) else (image.values, len(image.channels))
-    factor = max(round(pixels.shape[1] / WIDTH), period)
+    found = _agreed(detection, image, camera)
+    return found if found is not None and found.px >= MIN_DISPLACEMENT_PX * _factor(image) else None
+
+
+def is_mirrored(detection: InitialDetection, image: ColorImage | ChannelImage, camera: Camera) -> bool:
+    """True if an image agrees with the jumps of the distances better if it is mirrored; arguments of `displacement`."""
+    least, as_it_is = MIN_DISPLACEMENT_PX * _factor(image), _agreed(detection, image, camera)
+    if as_it_is is not None and as_it_is.px < least:
+        return False
+    if isinstance(image, ColorImage):
+        other = _agreed(detection, ColorImage(np.ascontiguousarray(image.rgb[:, ::-1])), camera)
+    else:
+        mirrored = ChannelImage(np.ascontiguousarray(image.values[:, ::-1]), image.channels)
+        other = _agreed(detection, mirrored, camera)
+    return other is not None and (as_it_is is None or other.px < least)
+
+
+def _factor(image: ColorImage | ChannelImage) -> int:
+    """Factor by which an image is reduced."""
+    if isinstance(image, ColorImage):
+        return max(round(image.rgb.shape[1] / WIDTH), 1)
+    return max(round(image.values.shape[1] / WIDTH), len(image.channels))
+
+
+def _agreed(detection: InitialDetection, image: ColorImage | ChannelImage, camera: Camera) -> Displacement | None:
+    """The displacement, of any length, that the halves of the image agree on; None if there is none."""
+    pixels = image.rgb if isinstance(image, ColorImage) else image.values
+    factor = _factor(image)
     size = pixels.shape[1] // factor, pixels.shape[0] // factor
     places, is_along_row = _seen(detection, camera, factor, size)
     _, cell, counts = np.unique(places * CELLS // size[0], axis=0, return_inverse=True, return_counts=True)
@@ -201,7 +232,7 @@ def _common(sums: NDArray[np.float32], off: NDArray[np.float64], counts: NDArray
     total = piles.sum(axis=0)
     scale, shift = _highest(total)
     moves = shift + (scale - 1) * off
-    if length(moves) < MIN_DISPLACEMENT_PX or total.max() <= DEVIATIONS * total.std():
+    if total.max() <= DEVIATIONS * total.std():
         return None
     order = np.random.default_rng(0).permuted(np.tile(np.arange(len(piles)), (HALVES, 1)), axis=1)
     halves = np.tensordot((order < len(piles) / 2).astype(np.float32), piles, axes=1)

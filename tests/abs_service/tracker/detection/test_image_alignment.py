@@ -81,6 +81,18 @@ def test_an_image_that_shows_nothing_of_the_jumps_tells_nothing(seed):
     assert displacement(DETECTION, ColorImage(np.ascontiguousarray(IMAGE.rgb[::-1])), COLOR) is None
 
 
+@pytest.mark.parametrize("is_grey", [False, True])
+def test_a_mirrored_image_is_told(is_grey):
+    grey = ChannelImage(LEVELS.astype(np.float32), np.zeros((1, 1), np.uint8))
+    right = grey if is_grey else IMAGE
+    pixels = right.values if isinstance(right, ChannelImage) else right.rgb
+    changed = {"values" if is_grey else "rgb": np.ascontiguousarray(pixels[:, ::-1])}
+    rig = Rig("r", {"cam": Sensor("cam", COLOR, GaussianColor(3.0))})
+    (doubt,) = alignment_warnings(DETECTION, {"cam": replace(right, **changed)}, rig)
+    assert doubt.endswith("only if left and right are exchanged: is one of the two mirrored?")
+    assert alignment_warnings(DETECTION, {"cam": right}, rig) == ()
+
+
 def test_distances_without_a_jump_tell_nothing():
     wall = np.full_like(DETECTION.distance, 1.0)
     for distance in (wall, np.full_like(wall, np.nan)):
