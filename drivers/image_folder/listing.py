@@ -112,7 +112,7 @@ def by_list(folder: Path, name: str) -> list[ImageFile]:
 
 
 def time_problem(folder: Path, name: str) -> str:
-    """What is wrong with the times of a list, which should increase from line to line, or ""; raises as `by_list`."""
+    """Problem of times that do not increase from line to line of a list, "" if they do; raises as `by_list`."""
     times = list(_listed(folder, name).values())
     earlier = sum(after <= before for before, after in pairwise(times))
     if not earlier:

@@ -85,10 +85,7 @@ def classify_rim(
     classes = np.full(len(beyond), RimClass.FREE, np.uint8)
     gap = np.where(beyond <= LARGEST_GAP_STEPS, np.maximum(beyond, 0.0), 0.0)
     step = outer - inner
-    further = [outer + by * step for by in _HIDING_STEPS]
-    hidden = np.any([np.isnan(inside_at(points)) for points in further], axis=0)
-    leaves = np.any([~_is_within(camera, camera.project(points)) for points in further], axis=0)
-    unseen = np.where(leaves, RimClass.BORDER, RimClass.OCCLUDED)
+    hidden, unseen = _unseen(camera, [outer + by * step for by in _HIDING_STEPS], inside_at)
     ends = outer + gap[:, None] * step
     # If the mesh ends far inside the object, or the outline bends, it is nearest elsewhere than where the edge points.
     missed = np.abs(inside_at(ends)) > LARGEST_MISS_PX
@@ -109,6 +106,15 @@ def classify_rim(
         classes[free] = RimClass.CONTACT
     gap[(classes != RimClass.FREE) | rim.is_end] = 0.0
     return classes, gap.astype(np.float32)
+
+
+def _unseen(
+    camera: Camera, further: list[NDArray[np.float64]], inside_at: Callable[[NDArray[np.float64]], NDArray[np.float64]]
+) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
+    """True (k,) where some of the points (k, 3) beyond edges are unknown, and the class (k,) that these then have."""
+    hidden = np.any([np.isnan(inside_at(points)) for points in further], axis=0)
+    leaves = np.any([~_is_within(camera, camera.project(points)) for points in further], axis=0)
+    return hidden, np.where(leaves, RimClass.BORDER, RimClass.OCCLUDED)
 
 
 def _is_within(camera: Camera, places: NDArray[np.float64], margin: float = 0.0) -> NDArray[np.bool_]:
