@@ -78,40 +78,30 @@ def alignment_warnings(detection: InitialDetection, images: Mapping[str, Image],
 
 
 def _doubt(detection: InitialDetection, image: ColorImage | ChannelImage, camera: Camera) -> str:
-    if is_mirrored(detection, image, camera):
+    """Where the edges of an image lie, if not where they should."""
+    found = displacement(detection, image, camera)
+    if _is_small(found, image):
+        return ""
+    if _is_small(displacement(detection, _mirrored(image), camera), image):
         return "where the distances have them only if left and right are exchanged: is one of the two mirrored?"
-    if (one := displacement(detection, image, camera)) is None:
+    if found is None:
         return ""
     return (
-        f"{one.px:.0f} px beside those in the distances (fx and fy × {one.scale:.2f}, cx {one.shift[0]:+.0f} and cy "
-        f"{one.shift[1]:+.0f} would bring them together): is its calibration that of images of this size, its pose "
-        "T_rs that from sensor to rig and not the other way round, and are both of the same moment?"
+        f"{found.px:.0f} px beside those in the distances (fx and fy × {found.scale:.2f}, cx {found.shift[0]:+.0f} and "
+        f"cy {found.shift[1]:+.0f} would bring them together): is its calibration that of images of this size, its "
+        "pose T_rs that from sensor to rig and not the other way round, and are both of the same moment?"
     )
 
 
-def displacement(detection: InitialDetection, image: ColorImage | ChannelImage, camera: Camera) -> Displacement | None:
-    """Displacement of an image's edges from the jumps of the distances; None if there is none, or if it is uncertain.
-
-    Args:
-        detection: the object, with its surroundings.
-        image: of the same moment.
-        camera: that took it, as far as one knows.
-    """
-    found = _agreed(detection, image, camera)
-    return found if found is not None and found.px >= MIN_DISPLACEMENT_PX * _factor(image) else None
+def _is_small(found: Displacement | None, image: ColorImage | ChannelImage) -> bool:
+    """True if an image has been seen to have its edges where the distances jump."""
+    return found is not None and found.px < MIN_DISPLACEMENT_PX * _factor(image)
 
 
-def is_mirrored(detection: InitialDetection, image: ColorImage | ChannelImage, camera: Camera) -> bool:
-    """True if an image agrees with the jumps of the distances better if it is mirrored; arguments of `displacement`."""
-    least, as_it_is = MIN_DISPLACEMENT_PX * _factor(image), _agreed(detection, image, camera)
-    if as_it_is is not None and as_it_is.px < least:
-        return False
+def _mirrored(image: ColorImage | ChannelImage) -> ColorImage | ChannelImage:
     if isinstance(image, ColorImage):
-        other = _agreed(detection, ColorImage(np.ascontiguousarray(image.rgb[:, ::-1])), camera)
-    else:
-        mirrored = ChannelImage(np.ascontiguousarray(image.values[:, ::-1]), image.channels)
-        other = _agreed(detection, mirrored, camera)
-    return other is not None and (as_it_is is None or other.px < least)
+        return ColorImage(np.ascontiguousarray(image.rgb[:, ::-1]))
+    return ChannelImage(np.ascontiguousarray(image.values[:, ::-1]), image.channels)
 
 
 def _factor(image: ColorImage | ChannelImage) -> int:
@@ -121,8 +111,14 @@ def _factor(image: ColorImage | ChannelImage) -> int:
     return max(round(image.values.shape[1] / WIDTH), len(image.channels))
 
 
-def _agreed(detection: InitialDetection, image: ColorImage | ChannelImage, camera: Camera) -> Displacement | None:
-    """The displacement, of any length, that the halves of the image agree on; None if there is none."""
+def displacement(detection: InitialDetection, image: ColorImage | ChannelImage, camera: Camera) -> Displacement | None:
+    """How far the edges of an image are displaced from the jumps of the distances; None if too little tells.
+
+    Args:
+        detection: the distances, of the same moment.
+        image: of the same scene.
+        camera: that took it, as far as one knows.
+    """
     pixels = image.rgb if isinstance(image, ColorImage) else image.values
     factor = _factor(image)
     size = pixels.shape[1] // factor, pixels.shape[0] // factor

@@ -20,7 +20,8 @@ MIN_RETURNS, MIN_OTHERS = 0.5, 0.25
 EDGE_SHARE = 0.01
 #: Returns within so many pixels of the predicted mesh may be the object's.
 NEAR_PX = 5
-#: Up to this share of the rows or columns may be blind along one side of the image, whatever ends along the others.
+#: A sensor measures nothing in the outermost rows or columns, up to this share of them, whatever ends along the other
+#: sides: where two views are matched, or distances are registered to another camera.
 BLIND_SHARE = 0.08
 #: Returns that are fewer in the square of three pixels a side around them are strays.
 MIN_NEIGHBOURS = 3

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.terms.base import MIN_RIM
+from abs_service.tracker.terms.depth.classification.beyond_view import BLIND_SHARE
 from abs_service.tracker.terms.depth.outline.rim import Rim, read
 from calib.camera import Camera
 
@@ -36,10 +37,6 @@ _ALMOST = 0.75
 
 #: Vertices within so many pixels of the image's border may continue beyond it.
 BORDER_PX = 2.0
-
-#: A sensor measures nothing in the outermost rows and columns, up to this share of the image: where two views
-#: are matched, or distances are registered to another camera.
-BLIND = 0.08
 
 
 class RimClass(IntEnum):
@@ -129,8 +126,8 @@ def _ends_at_border(places: NDArray[np.float64], distance: NDArray[np.float32]) 
     at_border = np.zeros(len(places), np.bool_)
     for axis, size in enumerate(known.shape[::-1]):
         lines = np.flatnonzero(known.any(axis=axis))
-        first = lines[0] if lines[0] <= BLIND * size else 0
-        last = lines[-1] if lines[-1] >= (1 - BLIND) * size else size - 1
+        first = lines[0] if lines[0] <= BLIND_SHARE * size else 0
+        last = lines[-1] if lines[-1] >= (1 - BLIND_SHARE) * size else size - 1
         at_border |= (places[:, axis] < first + LARGEST_MISS_PX) | (places[:, axis] > last - LARGEST_MISS_PX)
     return at_border
 
