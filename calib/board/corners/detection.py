@@ -93,7 +93,10 @@ def detect(target: Target, image: Image, largest_saturated: float = MAX_SATURATE
     if isinstance(target, Circles | AsymmetricCircles):
         pixels = pixels - ellipse.center_bias(target, ids, pixels)
     else:
-        pixels = saddle.refine(levels, pixels, int(np.clip(round(_REFINED * spacing), 2, 10)))
+        pixels, is_corner = saddle.refine(levels, pixels, int(np.clip(round(_REFINED * spacing), 2, 10)))
+        ids, pixels = ids[is_corner], pixels[is_corner]
+        if len(ids) < MIN_POINTS:
+            raise _detection_error(target, image, levels, len(ids))
     return Detection(ids, pixels, quality.sigma_px(target, ids, pixels), edge, spacing)
 
 

@@ -10,12 +10,12 @@ from calib.board.corners.to_8bit import Grey
 _STEPS = 5
 
 
-def refine(levels: Grey, pixels: NDArray[np.float64], radius: int) -> NDArray[np.float64]:
-    """Corners (n, 2) at the saddle of a paraboloid fitted to the brightness around each.
+def refine(levels: Grey, pixels: NDArray[np.float64], radius: int) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Corners (n, 2) at the saddle of a paraboloid fitted to the brightness around each, and True where there is one.
 
     L. Lucchese and S. K. Mitra, Using saddle points for subpixel feature detection in camera calibration targets,
-    APCCAS 2002. On rendered boards the errors are a third of those of OpenCV's refinement. Corners without a saddle
-    within `radius` are returned unchanged.
+    APCCAS 2002. On rendered boards the errors are a third of those of OpenCV's refinement. What has no saddle within
+    `radius` is no corner: the middle of an edge, a blank, or a place that was computed from markers far away.
 
     Args:
         levels: the image.
@@ -38,8 +38,7 @@ def refine(levels: Grey, pixels: NDArray[np.float64], radius: int) -> NDArray[np
         step = np.stack([uv * dv - 2 * vv * du, uv * du - 2 * uu * dv], axis=1) / safe[:, None]
         at = at + np.where(is_saddle[:, None], np.clip(step, -1, 1), 0)
     moved = at - first
-    kept = is_saddle & (np.linalg.norm(moved, axis=1) < radius)
-    return pixels + np.where(kept[:, None], moved, 0)
+    return pixels + moved, is_saddle & (np.linalg.norm(moved, axis=1) < radius)
 
 
 def _around(levels: Grey, pixels: NDArray[np.float64], radius: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -37,7 +37,8 @@ _NOTHING: Found = (np.zeros(0, np.intp), np.zeros((0, 2)))
 def find(target: Target, levels: Grey) -> Found:
     """Indices (n,) and pixels (n, 2) of the detected points, in OpenCV's order.
 
-    All boards but ChArUco and AprilGrid are detected completely or not at all; then n is 0.
+    All boards but ChArUco and AprilGrid are detected completely or not at all; then n is 0. Hidden corners of a
+    chessboard or a ChArUco may be where they are expected.
     """
     for image, scale, search in _attempts(target, levels):
         ids, pixels = search(target, _scaled(image, scale))

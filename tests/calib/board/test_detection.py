@@ -245,4 +245,5 @@ def test_a_board_bent_so_much_that_one_search_misses_it_is_found_by_the_other() 
     flags = cv2.CALIB_CB_ACCURACY | cv2.CALIB_CB_NORMALIZE_IMAGE
     assert not cv2.findChessboardCornersSB(as_bytes(image), CHESSBOARD.grid, flags=flags)[0]
     found = detect(CHESSBOARD, as_bytes(image))
-    assert np.median(np.linalg.norm(found.pixels - pixels, axis=1)) < 0.15
+    assert len(found.ids) == 53, "one was guessed, 6 px beside its place"
+    assert np.abs(found.pixels - pixels[found.ids]).max() < 0.2

@@ -1,0 +1,34 @@
+"""Corners that are hidden, such as by a finger, a highlight or a stain."""
+
+import cv2
+import numpy as np
+import pytest
+
+from calib import pose
+from calib.board.corners import errors
+from calib.board.corners.detection import detect
+from calib.board.target import Charuco, Chessboard, Target
+from tests.calib.board.boards import VGA, as_bytes, centered, photograph
+
+BOARDS = [Chessboard(9, 6, 0.03), Charuco(10, 7, 0.03, 0.0225, "4x4_100")]
+
+
+@pytest.mark.parametrize("target", BOARDS, ids=repr)
+@pytest.mark.parametrize("hidden", [0, 8, 22])
+@pytest.mark.parametrize("level", [30, 120, 200])
+def test_a_hidden_corner_is_left_out_and_not_guessed(target: Target, hidden: int, level: int) -> None:
+    """OpenCV's searches fill a chessboard with what they expect, up to 26 px beside it."""
+    T_sb = centered(target, (0.35, -0.4, 0.2), 0.5)
+    image = as_bytes(photograph(target, VGA, T_sb))
+    corners = VGA.project(pose.transform(T_sb, target.points()))
+    square_px = np.linalg.norm(corners[1] - corners[0])
+    middle = np.rint(corners[hidden]).astype(int).tolist()
+    for share in (0.3, 0.45, 0.6):
+        stained = cv2.circle(image.copy(), middle, int(share * square_px), level, -1)
+        try:
+            found = detect(target, stained)
+        except errors.NothingFoundError:
+            continue
+        assert hidden not in found.ids
+        assert len(found.ids) > 0.8 * len(corners)
+        assert np.abs(found.pixels - corners[found.ids]).max() < 0.2
