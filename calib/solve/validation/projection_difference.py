@@ -122,7 +122,7 @@ def chance(
         ).differences
         for _ in range(_DRAWS)
     ]
-    return np.quantile(np.nan_to_num(drawn, nan=np.inf), _CHANCE, axis=0)
+    return np.quantile(np.nan_to_num(drawn, nan=np.inf), _CHANCE, axis=0, method="higher")  # inf minus inf is none
 
 
 def _moved(camera: Camera, steps: Mapping[str, float]) -> Camera:

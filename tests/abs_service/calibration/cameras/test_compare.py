@@ -14,6 +14,7 @@ from abs_service.report.provenance import Provenance
 from abs_service.supervision.exit_codes import Exit
 from calib.board.views import CornerView
 from calib.camera import Camera
+from calib.lenses.fisheye import KannalaBrandt
 from calib.lenses.lens import Lens
 
 CAMERA = Camera(640, 480, 500.0, 501.0, 322.0, 238.0, Lens(np.array([-0.2, 0.03])))
@@ -65,6 +66,20 @@ def test_differences_are_said_beside_those_of_chance(compare, tmp_path: Path):
         assert (image["largest_px"] > image["chance_px"]) == beyond
         assert (image["beyond"] > 0.05) == beyond
         assert " px there (95 %); more than by chance in " in compare(one, path)[1]
+
+
+def test_chance_is_without_bounds_where_a_fisheye_may_have_no_light(compare, tmp_path: Path):
+    """A circle of light within the image, whose radius is as uncertain as the lens."""
+    camera = Camera(748, 480, 208.5, 208.5, 374, 240, KannalaBrandt(np.array([-0.038, 0.005, -0.007, 0.0014])))
+    names = tuple(f"color.{name}" for name in ("fx", "fy", "k1", "k2", "k3", "k4"))
+    covariance = rig_file.Covariance(names, np.diag(np.square([0.3, 0.3, 0.004, 0.01, 0.01, 0.004])))
+    one = tmp_path / "one.toml"
+    sensors = {"color": rig_file.SensorCalibration(camera)}
+    rig_file.write(rig_file.RigCalibration("lab", sensors, Provenance("x", "2026-11-28"), covariance=covariance), one)
+    other = written(tmp_path / "other.toml", color=replace(camera, fx=208.0))
+    code, out, err = compare(one, other)
+    assert (code, err) == (Exit.OK, "")
+    assert "nan" not in out
 
 
 def test_cameras_are_matched_by_name_or_as_told(compare, tmp_path: Path):
