@@ -43,6 +43,13 @@ def last_number(stem: str) -> int | None:
     return int(numbers[-1]) if numbers else None
 
 
+def changing_numbers(stems: Sequence[str]) -> list[tuple[int, ...]]:
+    """Numbers in each name, such as a date and a time, without those that all names have in the same place."""
+    found = [tuple(map(int, re.findall(r"\d+", stem))) for stem in stems]
+    same = {place for place, values in enumerate(zip(*found)) if len({*values}) == 1} if len(found) > 1 else set()
+    return [tuple(value for place, value in enumerate(numbers) if place not in same) for numbers in found]
+
+
 def by_number(folder: Path, pattern: str, rate_hz: float, *, alone: bool = False) -> list[ImageFile]:
     """Files that match a pattern, sorted by the last number in their name, the sequence number.
 

@@ -1,7 +1,7 @@
 """Offline sources of shots: recordings and image folders."""
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,7 +10,7 @@ from abs_service.pairing.synchroniser import Synchroniser
 from calib.camera import Camera
 from drivers.contract.frame import Frame, FrameSet
 from drivers.image_folder import image_file
-from drivers.image_folder.listing import ImageFile, ImageFolderError, by_number
+from drivers.image_folder.listing import ImageFile, ImageFolderError, by_number, changing_numbers, last_number
 from drivers.replay.recording import Recording
 
 #: Largest time difference between images of one shot [ns].
@@ -58,7 +58,8 @@ class RecordingShots:
 class FolderShots:
     """Shots of image folders: files with the same last number in their names belong to one shot.
 
-    Images of one sensor alone may share last numbers, such as the seconds of times of the day.
+    Images of a sensor may share last numbers, such as the seconds of times of the day: then shots are counted from 0 in
+    the order of all numbers in the names, and images of several sensors belong together that agree in all that change.
 
     Attributes:
         patterns: path of each sensor's images, by sensor name; the last part may hold wildcards.
@@ -70,13 +71,14 @@ class FolderShots:
         """Iterates over the images.
 
         Raises:
-            ShotsError: no file matches, or a file has no number or is no image; names it.
+            ShotsError: no file matches, a file has no number or is no image, or nothing tells which images belong
+                together; names it.
         """
-        files = {sensor: self._files(sensor, pattern) for sensor, pattern in self.patterns.items()}
+        files = _numbered({sensor: self._files(sensor, pattern) for sensor, pattern in self.patterns.items()})
         for number in sorted({seq for numbered in files.values() for seq in numbered}):
             yield Shot(number, {s: _look(numbered[number]) for s, numbered in files.items() if number in numbered})
 
-    def _files(self, sensor: str, pattern: str) -> dict[int, ImageFile]:
+    def _files(self, sensor: str, pattern: str) -> list[ImageFile]:
         path = Path(pattern)
         if path.is_dir():
             raise ShotsError(f"images of {sensor}: {path} is a folder: name the images in it, such as '{path}/*.png'")
@@ -86,10 +88,26 @@ class FolderShots:
                 "last '/', may hold wildcards: * ? ["
             )
         try:
-            files = by_number(path.parent, path.name, rate_hz=1.0, alone=len(self.patterns) == 1)
+            return by_number(path.parent, path.name, rate_hz=1.0, alone=True)
         except ImageFolderError as error:
             raise ShotsError(f"images of {sensor}: {error}") from error
-        return {file.seq: file for file in files}
+
+
+def _numbered(files: Mapping[str, Sequence[ImageFile]]) -> dict[str, dict[int, ImageFile]]:
+    """Files by sensor and number of the shot."""
+    repeated = [s for s, own in files.items() if any(file.seq != last_number(file.path.stem) for file in own)]
+    if len(files) == 1 or not repeated:
+        return {sensor: {file.seq: file for file in own} for sensor, own in files.items()}
+    moments = {
+        sensor: dict(zip(changing_numbers([file.path.stem for file in own]), own)) for sensor, own in files.items()
+    }
+    every = sorted({moment for own in moments.values() for moment in own})
+    if len(every) == sum(map(len, moments.values())):
+        raise ShotsError(
+            f"images of {repeated[0]}: their last numbers repeat, such as in {files[repeated[0]][0].path.name}, and no "
+            "other numbers tell which images belong together: let the last one count the exposures"
+        )
+    return {sensor: {every.index(moment): file for moment, file in own.items()} for sensor, own in moments.items()}
 
 
 def _look(file: ImageFile) -> SensorShot:

@@ -129,8 +129,24 @@ def test_images_of_one_sensor_may_have_times_in_their_names(tmp_path: Path) -> N
     alone = {"left": f"{tmp_path}/l_*.png"}
     files = [shot.sensor_shots["left"].file for shot in FolderShots(alone)]
     assert [file and file.name for file in files] == ["l_10-29-50.png", "l_10-30-50.png"]
-    with pytest.raises(ShotsError, match=r"images of left: .*let it count the exposures"):
-        list(FolderShots({**alone, "right": f"{tmp_path}/l_*.png"}))
+    write(tmp_path, "r_10-31-51.png", 0.7)
+    with pytest.raises(ShotsError, match=r"images of left: .* such as in l_10-29-50.png, .*let the last one count"):
+        list(FolderShots({**alone, "right": f"{tmp_path}/r_*.png"}))
+
+
+def test_times_in_names_tell_which_images_of_two_sensors_belong_together(tmp_path: Path) -> None:
+    for name in ("cam0_102950_601", "cam0_103050_601", "cam0_103050_700", "cam1_103050_700", "cam1_103050_601"):
+        write(tmp_path, f"{name}.png", 0.7)
+    write(tmp_path, "cam1_103055_601.png", 0.7)
+    shots = list(FolderShots({"left": f"{tmp_path}/cam0_*.png", "right": f"{tmp_path}/cam1_*.png"}))
+    names = [{sensor: one.file.stem[5:] for sensor, one in shot.sensor_shots.items() if one.file} for shot in shots]
+    assert [shot.number for shot in shots] == [0, 1, 2, 3]
+    assert names == [
+        {"left": "102950_601"},
+        {"left": "103050_601", "right": "103050_601"},
+        {"left": "103050_700", "right": "103050_700"},
+        {"right": "103055_601"},
+    ]
 
 
 def test_what_is_no_image_is_named(tmp_path: Path) -> None:
