@@ -40,11 +40,13 @@ class Groups:
         sensor: its name.
         shots: those of the smaller group.
         shift: of its principal point from that of the others (2,) [px], or, relative, of its focal length (1,).
+        alone: True if there is no other sensor, so that a turn of this one is one of all boards.
     """
 
     sensor: str
     shots: tuple[int, ...]
     shift: Array
+    alone: bool
 
     def __str__(self) -> str:
         """One sentence for people."""
@@ -57,10 +59,11 @@ class Groups:
                 f"stabilisation off. {advice}"
             )
         across, down = self.shift.tolist()
+        turned = "" if self.alone else ", or did a sensor turn, or the board move between the images of a shot"
         return (
             f"{self.sensor}: shots {shots} have a principal point of their own, ({across:+.1f}, {down:+.1f}) px from "
             "that of the others: are these images of two cameras, or were some turned by 180°, mirrored, cropped, "
-            f"stretched or stabilised, or taken in motion? {advice}"
+            f"stretched or stabilised, or taken in motion{turned}? {advice}"
         )
 
 
@@ -81,7 +84,8 @@ def groups(free: FreeShape, needed_px: float) -> list[Groups]:
             shot for shot, is_chosen in zip(free.solution.adjustment.layout.shots, chosen, strict=True) if is_chosen
         ]
         # Scores are derivatives of what is predicted minus what is measured.
-        found.append(Groups(name, tuple(sorted(shots)), -split.change))
+        alone = len(free.solution.task.sensors) == 1
+        found.append(Groups(name, tuple(sorted(shots)), -split.change, alone))
     return found
 
 

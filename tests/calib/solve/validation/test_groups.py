@@ -74,3 +74,17 @@ def test_the_verdict_names_them_and_how_to_leave_them_out() -> None:
     verdict = assess(solved(turned), 1.0, 1.0).verdict
     assert verdict.startswith("Do not trust it yet: color: shots 2,3,7,")
     assert verdict.endswith("leave one out: --skip 2,3,7,11,12,16,20,21")
+
+
+def test_of_several_sensors_one_may_have_turned() -> None:
+    heads = {name: replace(head, depth_sigma=0.0) for name, head in board_views.three_heads().items() if name != "tof"}
+    generator = np.random.default_rng(0)
+    seen = board_views.look(heads, board_views.random_boards(24, generator), generator).corners
+    turned_by_px = [
+        replace(view, pixels=view.pixels + np.array([0, 1.2])) if view.sensor == "color" and view.shot in ODD else view
+        for view in seen
+    ]
+    sensors = {name: SensorTask(head.camera.width, head.camera.height) for name, head in heads.items()}
+    found = groups(free_shape(calibrate(Task(sensors, turned_by_px, (), "color"))), 1.0)
+    assert any("or taken in motion, or did a sensor turn, or the board move" in str(each) for each in found)
+    assert "turn, or the board" not in str(groups(free_shape(solved(of_another_camera)), 1.0)[0])
