@@ -88,8 +88,10 @@ def likelier(stored: Stored, views: Views, sensor: str) -> str:
     given, own = stored.sensors[sensor].camera, [view for view in views.corners if view.sensor == sensor]
     misses = {sensor: corner_fit(stored, views, sensor).rms}
     for name, other in stored.sensors.items():
-        if name != sensor and (other.camera.width, other.camera.height) == (given.width, given.height):
-            misses[name] = corner_fit(stored, Views([replace(view, sensor=name) for view in own], ()), name).rms
+        taken = [replace(view, sensor=name) for view in own]
+        is_like = (other.camera.width, other.camera.height) == (given.width, given.height)
+        if name != sensor and is_like and all(pose_candidates(other.camera, view) for view in taken):
+            misses[name] = corner_fit(stored, Views(taken, ()), name).rms
     best = min(misses, key=lambda name: misses[name])
     return best if misses[best] * LIKELIER < misses[sensor] else ""
 

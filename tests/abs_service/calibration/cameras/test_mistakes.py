@@ -15,7 +15,9 @@ from calib.board.corners import errors
 from calib.board.views import CornerView
 from calib.calibration_check import mistakes
 from calib.calibration_check.stored import Views
+from calib.lenses.lens import Lens
 from calib.pose import Pose
+from calib.solve.start.board_poses import pose_candidates
 from tests.calib.solve.board_views import Head, board_points, look, random_boards, three_heads
 
 ORIGIN = Provenance("x", "2026-11-21")
@@ -94,6 +96,16 @@ def test_the_images_of_another_sensor_are_named_without_common_shots() -> None:
     given = look({"right": two_heads()["right"]}, *_boards()).corners
     stored = new_views.stored_in(calibration())
     assert mistakes.likelier(stored, Views([replace(view, sensor="left") for view in given], ()), "left") == "right"
+    assert not mistakes.likelier(stored, Views(given, ()), "right")
+
+
+def test_a_camera_that_could_not_have_seen_another_ones_corners_is_not_likelier() -> None:
+    right = two_heads()["right"]
+    narrow = replace(two_heads()["left"].camera, lens=Lens(np.array([-0.8])))  # no light beyond 250 px from the middle
+    given = look({"right": right}, *_boards()).corners
+    assert any(not pose_candidates(narrow, view) for view in given)
+    sensors = {"left": rig_file.SensorCalibration(narrow), "right": rig_file.SensorCalibration(right.camera)}
+    stored = new_views.stored_in(rig_file.RigCalibration("lab", sensors, ORIGIN, "good"))
     assert not mistakes.likelier(stored, Views(given, ()), "right")
 
 
