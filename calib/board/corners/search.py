@@ -28,6 +28,9 @@ _MAX_BLOBS = 3
 #: A board goes on beyond the border if its last point is nearer to it than this many distances between points.
 _CUT = 1.1
 
+#: Contrast between the squares of a row, relative to that of the others, below which they are a frame and no squares.
+_FRAME = 0.3
+
 #: A chessboard, for what depends on the kind of board alone.
 _ANY = Chessboard(4, 3, 0.01)
 
@@ -127,21 +130,38 @@ def _by_sectors(target: Chessboard, levels: Grey) -> Found:
 
 def _alternates(lattice: NDArray[np.float64], levels: Grey) -> bool:
     """True if of any two neighbouring cells between the corners one is dark and one bright, as on a chessboard."""
-    u, v = np.moveaxis(cells(lattice), -1, 0)
-    brightness = map_coordinates(levels.astype(np.float32), [v, u], order=1, mode="nearest")
+    brightness = _brightness(lattice, levels)
     signs = 1 - 2.0 * (np.indices(brightness.shape).sum(axis=0) % 2)
     steps = [signs[1:] * np.diff(brightness, axis=0), signs[:, 1:] * np.diff(brightness, axis=1)]
     rises = np.concatenate([step.ravel() for step in steps])
     return bool((rises > 0).all() or (rises < 0).all())
 
 
+def _brightness(lattice: NDArray[np.float64], levels: Grey) -> NDArray[np.floating]:
+    """Brightness (rows - 1, columns - 1) in the middle of the cells between corners (rows, columns, 2)."""
+    u, v = np.moveaxis(cells(lattice), -1, 0)
+    return map_coordinates(levels.astype(np.float32), [v, u], order=1, mode="nearest")
+
+
 def chessboard_size(levels: Grey) -> tuple[int, int]:
     """Numbers of inner corners of the chessboard in an image, the larger first; (0, 0) if there is none.
 
-    Some images show only a part of their board to this search.
+    Some images show only a part of their board to this search. In others it takes the ends of the outermost squares for
+    corners, where a dark frame follows; beyond corners there are squares.
     """
-    longer, shorter = sorted(_part_of_chessboard(_scaled(levels, next(_scales(_ANY, levels)))).shape[:2], reverse=True)
-    return longer, shorter
+    levels = _scaled(levels, next(_scales(_ANY, levels)))
+    corners = _part_of_chessboard(levels)
+    if not corners.size:
+        return 0, 0
+    rim = ((1, 1), (1, 1), (0, 0))
+    beyond = 0.5 * (np.pad(corners, rim, "reflect", reflect_type="odd") + np.pad(corners, rim, "edge"))  # half squares
+    brightness = _brightness(beyond, levels)
+    sizes = []
+    for squares in (brightness, brightness.T):
+        contrasts = np.median(np.abs(np.diff(squares, axis=1)), axis=1)
+        ends = contrasts[[0, -1]] < _FRAME * np.median(contrasts[1:-1])
+        sizes.append(len(squares) - 1 - int(ends.sum()))
+    return (max(sizes), min(sizes)) if min(sizes) > 2 else (0, 0)
 
 
 def _part_of_chessboard(levels: Grey) -> NDArray[np.float64]:

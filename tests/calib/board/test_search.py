@@ -1,8 +1,10 @@
 """Searches for boards in images of several sizes."""
 
+import cv2
 import numpy as np
+import pytest
 
-from calib.board.corners.search import find
+from calib.board.corners.search import chessboard_size, find
 from calib.board.target import Chessboard
 from tests.calib.board.boards import VGA, as_bytes, centered, photograph
 
@@ -16,3 +18,19 @@ def test_a_small_board_in_a_large_image_is_found_though_the_first_searches_reduc
     ids, pixels = find(CHESSBOARD, image)
     assert len(ids) == 54
     np.testing.assert_allclose(pixels - (700, 500), find(CHESSBOARD, board)[1], atol=0.5)
+
+
+@pytest.mark.parametrize("angle", [0, 4, 10])
+def test_a_dark_frame_around_a_chessboard_is_no_further_row_of_squares(angle: int) -> None:
+    """As around the screen of a tablet: 10 × 6, 9 × 7 and 9 × 8 corners were counted, in most of the images."""
+    rows, columns = np.indices((7 * 26, 10 * 26)) // 26
+    board = np.where((rows + columns) % 2 == 0, 30, 220).astype(np.uint8)
+    image = np.pad(np.pad(np.pad(board, 5, constant_values=220), 14, constant_values=25), 60, constant_values=180)
+    size = (image.shape[1], image.shape[0])
+    turn = cv2.getRotationMatrix2D((size[0] / 2, size[1] / 2), angle, 1.0)
+    blurred = cv2.GaussianBlur(cv2.warpAffine(image, turn, size, borderValue=180), (0, 0), 0.8)
+    for seed in range(4):
+        noise = np.random.default_rng(seed).normal(0, 2, image.shape)
+        longer, shorter = chessboard_size(np.clip(blurred + noise, 0, 255).astype(np.uint8))
+        assert longer <= 9
+        assert shorter <= 6
