@@ -24,25 +24,22 @@ class ShapeQuality:
         folded_share: share of the pairs of neighbouring faces that are folded onto each other, 0…1.
         deviation_m: standard deviation of the position of a vertex, median [m].
         single_frame_deviation_m: the same by the measurements of this frame alone, without the past [m].
-        has_back: True for a template, which may have sides that the first image does not show; a mesh made from that
-            image is what faced the sensor in it.
     """
 
     stretch: float = 0.0
     folded_share: float = 0.0
     deviation_m: float = float("nan")
     single_frame_deviation_m: float = float("nan")
-    has_back: bool = False
 
 
 class ShapeComparison:
     """Compares deformed meshes with the undeformed one."""
 
     def __init__(self, mesh: Mesh):
-        self._edges, self._has_back = mesh.edges, mesh.is_complete
+        self._edges = mesh.edges
         self._lengths = edge_lengths(mesh.vertices, self._edges)
         pairs = _neighbors(mesh.faces)
-        normals = _normals(mesh.vertices, mesh.faces)
+        normals = unit(area_vectors(mesh.vertices, mesh.faces))
         even = np.einsum("pi,pi->p", normals[pairs[:, 0]], normals[pairs[:, 1]]) > UNFOLDED_COSINE
         self._pairs = pairs[even]
         self._corners = mesh.faces[self._pairs].reshape(-1, 6)
@@ -64,7 +61,6 @@ class ShapeComparison:
             folded_share=folded / len(self._pairs) if len(self._pairs) else 0.0,
             deviation_m=float(np.sqrt(percentile(variance, 0.5))),
             single_frame_deviation_m=single_frame_deviation_m,
-            has_back=self._has_back,
         )
 
 
@@ -113,11 +109,6 @@ def compare_shapes(
         cosine = normals[0, 0] * normals[1, 0] + normals[0, 1] * normals[1, 1] + normals[0, 2] * normals[1, 2]
         folded += 1 if cosine < FOLDED_COSINE else 0
     return folded
-
-
-def _normals(vertices: NDArray[np.floating], faces: NDArray[np.int32]) -> NDArray[np.floating]:
-    """Unit normals (m, 3) of the faces."""
-    return unit(area_vectors(vertices, faces))
 
 
 def _neighbors(faces: NDArray[np.int32]) -> NDArray[np.intp]:

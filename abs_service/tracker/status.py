@@ -68,7 +68,13 @@ class Settings:
 
 
 def judge(
-    fits: Sequence[SensorFit], missing: Sequence[str], shape: ShapeQuality, innovation: float, limits: Settings
+    fits: Sequence[SensorFit],
+    missing: Sequence[str],
+    shape: ShapeQuality,
+    innovation: float,
+    limits: Settings,
+    *,
+    has_back: bool = False,
 ) -> tuple[Status, tuple[str, ...]]:
     """Status, and the reasons for any other than TRACKING.
 
@@ -78,8 +84,10 @@ def judge(
         shape: quality of the deformed mesh.
         innovation: see `RecentMotion`.
         limits: thresholds.
+        has_back: True for the mesh of a template, which may have sides that the first image does not show; all of a
+            mesh made from that image faced the sensor in it.
     """
-    fits = [_without_back(fit) for fit in fits] if shape.has_back else fits
+    fits = [_without_back(fit) for fit in fits] if has_back else fits
     gone = has_left(fits, limits.degraded_agreeing)
     lost = gone or min(inlier_share(fits), distances_share(fits)) < limits.lost_below
     reasons = [f"no frame from {name}" for name in missing]

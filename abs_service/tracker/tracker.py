@@ -113,7 +113,9 @@ class Tracker:
         shape = self._shape.compare(optimum.vertices, vertex_covariance, single_frame_deviation(optimum, frame.motion))
         fits = outcome.compared(frame).fits
         frame.learn(optimum.surface)
-        verdict, reasons = status.judge(fits, observation.missing, shape, motion.innovation, self._limits)
+        verdict, reasons = status.judge(
+            fits, observation.missing, shape, motion.innovation, self._limits, has_back=self.model.mesh.is_complete
+        )
         if verdict == Status.TRACKING:
             self._last_tracked = optimum.theta
         return Estimate(

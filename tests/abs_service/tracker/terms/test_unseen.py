@@ -30,7 +30,7 @@ def test_a_mesh_beside_the_depth_image_is_lost_if_few_of_its_colors_agree():
     back = VertexCounts(facing=12, agreeing=4, disagreeing=8, turned_away=290)
     both = [replace(depth("tof", 0, 0), counts=back), replace(few, counts=back)]
     assert judge(both, (), SHAPE, 0.0, SETTINGS)[0] == Status.LOST, "it has turned inside out"
-    assert judge(both, (), replace(SHAPE, has_back=True), 0.0, SETTINGS)[0] == Status.DEGRADED
+    assert judge(both, (), SHAPE, 0.0, SETTINGS, has_back=True)[0] == Status.DEGRADED
     hidden = replace(depth("tof", 0, 0), counts=VertexCounts(facing=300, agreeing=5, behind_occluder=295))
     assert judge([hidden, few], (), SHAPE, 0.0, SETTINGS)[0] == Status.DEGRADED, "it may be behind a hand"
 
@@ -42,6 +42,6 @@ def test_a_mesh_that_has_turned_away_from_the_sensors_is_not_tracked():
     assert status == Status.DEGRADED
     assert facts(reasons)[0].startswith("53% of the vertices, all of which faced the depth sensor at first, are turned")
     assert judge([turned, depth("b", 300, 0)], (), SHAPE, 0.0, SETTINGS) == (Status.TRACKING, ())
-    assert judge([turned], (), replace(SHAPE, has_back=True), 0.0, SETTINGS) == (Status.TRACKING, ())
+    assert judge([turned], (), SHAPE, 0.0, SETTINGS, has_back=True) == (Status.TRACKING, ())
     less = replace(turned, counts=VertexCounts(facing=160, agreeing=160, turned_away=140))
     assert judge([less], (), SHAPE, 0.0, SETTINGS) == (Status.TRACKING, ())
