@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from abs_service.pairing.observation import Observation, Source
 from abs_service.tracker.optimizers.base import Stop
 from abs_service.tracker.shape_quality import ShapeQuality
-from abs_service.tracker.terms.base import SensorFit
+from abs_service.tracker.terms.sensor_fit import SensorFit
 
 
 class Status(StrEnum):

@@ -16,7 +16,9 @@ from abs_service.tracker.terms.agreement import (
     MIN_JUDGED,
     distances_share,
     has_left,
+    inlier_share,
     most_agreeing,
+    occluded_share,
     of_distances,
     outside_share,
     rim_distance,
@@ -25,7 +27,7 @@ from abs_service.tracker.terms.agreement import (
     turned_away_share,
     unexplained_share,
 )
-from abs_service.tracker.terms.base import SensorFit, inlier_share, occluded_share
+from abs_service.tracker.terms.sensor_fit import SensorFit
 
 
 @dataclass(frozen=True)

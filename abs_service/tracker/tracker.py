@@ -24,7 +24,7 @@ from abs_service.tracker.posterior.posterior import Posterior
 from abs_service.tracker.posterior.relocation import fit_to_points
 from abs_service.tracker.posterior.search_start import search_start
 from abs_service.tracker.shape_quality import ShapeComparison
-from abs_service.tracker.terms.base import inlier_share
+from abs_service.tracker.terms.agreement import inlier_share
 from abs_service.tracker.terms.patches import patches_of
 
 #: Frames after a start that are searched from scratch: in the first, nothing is known, and in the second, not how fast

@@ -9,7 +9,7 @@ import yaml
 
 from abs_service.tracker import status
 from abs_service.tracker.shape_quality import ShapeQuality
-from abs_service.tracker.terms.base import Remainder, RimFit, SensorFit
+from abs_service.tracker.terms.sensor_fit import Remainder, RimFit, SensorFit
 from abs_service.tracker.terms.vertex_counts import VertexCounts
 
 ROOT = Path(__file__).parents[2]

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from abs_service.pairing.observation import Observation
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import Synthesizer
-from abs_service.tracker.terms.base import SensorFit, Term
+from abs_service.tracker.terms.base import Term
 from abs_service.tracker.terms.linearization import Linear, PointLinearization
 from abs_service.tracker.terms.patches import Patches
+from abs_service.tracker.terms.sensor_fit import SensorFit
 
 
 class Objective(Protocol):

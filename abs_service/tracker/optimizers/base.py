@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.posterior.curvature import Quadratic
 from abs_service.tracker.posterior.linearized_cost import LinearizedCost
-from abs_service.tracker.terms.base import SensorFit
+from abs_service.tracker.terms.sensor_fit import SensorFit
 
 #: Costs (population,) [nats] of candidates (population, dim).
 Costs = NDArray[np.float64]

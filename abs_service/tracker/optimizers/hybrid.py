@@ -20,7 +20,7 @@ from abs_service.tracker.optimizers.search.ask_and_tell import (
 )
 from abs_service.tracker.optimizers.search.levenberg_marquardt import descend
 from abs_service.tracker.posterior.curvature import search_metric
-from abs_service.tracker.terms.base import outlier_share
+from abs_service.tracker.terms.agreement import outlier_share
 
 #: Minimum step size of CMA-ES at the start of a frame, as a share of the initial one.
 MIN_STEP = 0.5

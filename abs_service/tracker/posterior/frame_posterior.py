@@ -14,7 +14,7 @@ from abs_service.tracker.posterior.priors.motion_prediction import MotionPredict
 from abs_service.tracker.posterior.priors.shape_prior import ShapePrior
 from abs_service.tracker.posterior.priors.stretch_prior import StretchPrior
 from abs_service.tracker.posterior.surfaces import FrameSurfaces
-from abs_service.tracker.terms.base import SensorFit
+from abs_service.tracker.terms.sensor_fit import SensorFit
 
 
 @dataclass(frozen=True, slots=True, eq=False)

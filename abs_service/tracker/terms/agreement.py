@@ -4,11 +4,31 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from abs_service.tracker.terms.base import MIN_RIM, RimFit, SensorFit
+from abs_service.tracker.terms.sensor_fit import MIN_RIM, RimFit, SensorFit
 from abs_service.tracker.terms.vertex_counts import VertexCounts
 
 #: Minimum number of vertices that agree or disagree with a sensor, or should, for their share to be judged.
 MIN_JUDGED = 20
+
+
+def inlier_share(fits: Sequence[SensorFit]) -> float:
+    """Share of the vertices visible to any sensor that agree with their measurement; 0 if none is visible."""
+    visible = sum(fit.visible for fit in fits)
+    return sum(fit.inliers for fit in fits) / visible if visible else 0.0
+
+
+def outlier_share(fits: Sequence[SensorFit]) -> float:
+    """Share of the vertices visible to any sensor that do not agree with their measurement; 1 if none is visible."""
+    return 1 - inlier_share(fits)
+
+
+def occluded_share(fits: Sequence[SensorFit]) -> float:
+    """Share of occluded vertices in the sensor with the smallest such share; 0 without a sensor.
+
+    Light barriers are ignored: their single sample is no vertex.
+    """
+    shares = [fit.occluded / (fit.occluded + fit.visible) for fit in fits if fit.occluded + fit.visible > 1]
+    return min(shares, default=0.0)
 
 
 def most_agreeing(fits: Sequence[SensorFit]) -> VertexCounts:

@@ -5,9 +5,10 @@ from numpy.typing import NDArray
 
 from abs_service.pairing.images import BeamReading, Image
 from abs_service.tracker.models.base import SparseJacobian, Surface
-from abs_service.tracker.terms.base import Bounds, SensorFit
+from abs_service.tracker.terms.base import Bounds
 from abs_service.tracker.terms.linearization import NO_ROWS, PointLinearization
 from abs_service.tracker.terms.patches import Patches
+from abs_service.tracker.terms.sensor_fit import SensorFit
 from calib.camera import Camera
 from calib.jit import kernel
 from calib.noise.images.binary import LightBarrier

@@ -1,7 +1,6 @@
-"""Interface of a term, and summary of its agreement with a deformed mesh."""
+"""Interface of a term, and the bounds of its costs."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -12,12 +11,8 @@ from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import View
 from abs_service.tracker.terms.linearization import Linear, PointLinearization
 from abs_service.tracker.terms.patches import Patches
-from abs_service.tracker.terms.vertex_counts import Sight, VertexCounts
+from abs_service.tracker.terms.sensor_fit import SensorFit
 from calib.no_return import CAUTIOUS, NoReturn
-from calib.noise.fit.truncation import deviation_within
-
-#: Residuals up to this many deviations count as explained by the sensor's noise.
-INLIER_DEVIATIONS = 3.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,141 +30,6 @@ class Bounds:
     uniform: float
     outlier: float
     no_return: NoReturn = CAUTIOUS
-
-
-#: With fewer vertices on the free edges, their shares say nothing.
-MIN_RIM = 8
-
-
-@dataclass(frozen=True, slots=True)
-class RimFit:
-    """Numbers of rim vertices of a mesh by class, from the depth image beside them.
-
-    Attributes:
-        visible: on free edges, not behind an occluder, in a hole or behind the mesh's own surface.
-        outside: of these, beside the object: the mesh hangs over the outline.
-        inside: of these, far inside the outline: measured surface of the object continues beyond the mesh.
-        off_m: distance of the visible ones from the outline [m], see `displacement` and `motion` in `rim_motion`.
-        occluded: on free edges, but not visible.
-        covered: on edges that something hid in the first image, or that its border cut.
-        uncovered: of these, measured surface of the object now continues beyond the mesh.
-    """
-
-    visible: int = 0
-    outside: int = 0
-    inside: int = 0
-    off_m: float = 0.0
-    occluded: int = 0
-    covered: int = 0
-    uncovered: int = 0
-
-
-@dataclass(frozen=True, slots=True)
-class Remainder:
-    """Measured surface that continues from the object beyond the mesh, as a share of this surface and the mesh, 0…1.
-
-    Attributes:
-        share: in this image; NaN for a sensor that measures no distances, or if it does not show the object.
-        at_first: in the first image, in which the mesh is right: an object in contact continues in others.
-    """
-
-    share: float = float("nan")
-    at_first: float = float("nan")
-
-    @property
-    def gained(self) -> float:
-        """Increase of the share since the first image, not below 0; 0 if unknown."""
-        return max(float(np.nan_to_num(self.share - self.at_first)), 0.0)
-
-
-@dataclass(frozen=True, slots=True)
-class SensorFit:
-    """Agreement of one sensor with one deformed mesh.
-
-    Attributes:
-        sensor: its name.
-        visible: number of vertices that face the sensor and lie inside its image without a known occluder, and whose
-            appearance is known if it measures that.
-        occluded: number of vertices behind the mesh's own surface, behind an occluder, or in a hole of the measurement;
-            those that are turned away, such as the back of a body, are neither.
-        samples: number of visible vertices with a measurement.
-        inliers: number of samples that their noise explains.
-        mean_log_likelihood: minus the mean cost of a vertex; a log-likelihood if the objective is a likelihood.
-        normalized_residual: standard deviation of the normalised residuals, estimated from the inliers: 1 if the noise
-            model is right, 2 if its σ is half the true one; NaN without inliers or without a noise model.
-        rim: agreement of the mesh's edges with the outline; zeros for a sensor that measures no distances.
-        counts: the vertices by what the sensor's image shows of them; zeros for a light barrier.
-        remainder: measured surface of the object that the mesh leaves unexplained.
-        is_surprised: True for a sensor of distances in whose image nothing was where the object was expected: neither
-            the outline nor what lies beside the mesh is known.
-    """
-
-    sensor: str
-    visible: int
-    occluded: int
-    samples: int
-    inliers: int
-    mean_log_likelihood: float
-    normalized_residual: float
-    rim: RimFit = RimFit()
-    counts: VertexCounts = field(default_factory=VertexCounts)
-    remainder: Remainder = Remainder()
-    is_surprised: bool = False
-
-
-def summarize(
-    sensor: str,
-    sight: Sight,
-    measured: NDArray[np.bool_],
-    residual: NDArray[np.float64],
-    mean_log_likelihood: float,
-    channels: int = 1,
-) -> SensorFit:
-    """Summary of per-vertex arrays (n,).
-
-    Fitting theta reduces the residuals by a few per cent; this is not corrected.
-
-    Args:
-        sensor: its name.
-        sight: the vertices by whether the sensor sees them.
-        measured: mask of the vertices with a measurement.
-        residual: absolute normalised residual, root mean square over the channels.
-        mean_log_likelihood: see `SensorFit`.
-        channels: number of values per measurement.
-    """
-    inlier = measured & (residual < INLIER_DEVIATIONS)
-    square = float(np.mean(residual[inlier] ** 2)) if inlier.any() else float("nan")
-    spread = deviation_within(square, INLIER_DEVIATIONS, channels)
-    return SensorFit(
-        sensor,
-        visible=int(np.count_nonzero(sight.visible)),
-        occluded=sight.occluded,
-        samples=int(np.count_nonzero(measured)),
-        inliers=int(np.count_nonzero(inlier)),
-        mean_log_likelihood=mean_log_likelihood,
-        normalized_residual=spread,
-        counts=sight.count(measured, inlier),
-    )
-
-
-def inlier_share(fits: Sequence[SensorFit]) -> float:
-    """Share of the vertices visible to any sensor that agree with their measurement; 0 if none is visible."""
-    visible = sum(fit.visible for fit in fits)
-    return sum(fit.inliers for fit in fits) / visible if visible else 0.0
-
-
-def outlier_share(fits: Sequence[SensorFit]) -> float:
-    """Share of the vertices visible to any sensor that do not agree with their measurement; 1 if none is visible."""
-    return 1 - inlier_share(fits)
-
-
-def occluded_share(fits: Sequence[SensorFit]) -> float:
-    """Share of occluded vertices in the sensor with the smallest such share; 0 without a sensor.
-
-    Light barriers are ignored: their single sample is no vertex.
-    """
-    shares = [fit.occluded / (fit.occluded + fit.visible) for fit in fits if fit.occluded + fit.visible > 1]
-    return min(shares, default=0.0)
 
 
 def facing(view: View, surface: Surface) -> NDArray[np.bool_]:

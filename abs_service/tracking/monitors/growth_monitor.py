@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from abs_service.tracker.terms.base import SensorFit
+from abs_service.tracker.terms.sensor_fit import SensorFit
 
 #: Share of the covered edges beyond which the object must continue, and their least number.
 MIN_SHARE, MIN_VERTICES = 0.5, 4

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from abs_service.tracker.optimizers.base import Budget, Optimizer, Problem, Search
 from abs_service.tracker.posterior.curvature import Quadratic
 from abs_service.tracker.posterior.linearized_cost import LinearizedCost
-from abs_service.tracker.terms.base import SensorFit
+from abs_service.tracker.terms.sensor_fit import SensorFit
 from abs_service.tracking.plan import OptimizerSettings
 
 Answer = TypeVar("Answer")

@@ -7,7 +7,7 @@ import pytest
 from abs_service.tracker.estimate import Status
 from abs_service.tracker.shape_quality import ShapeQuality
 from abs_service.tracker.status import Settings, judge
-from abs_service.tracker.terms.base import Remainder, RimFit, SensorFit
+from abs_service.tracker.terms.sensor_fit import Remainder, RimFit, SensorFit
 from abs_service.tracker.terms.vertex_counts import VertexCounts
 
 SETTINGS = Settings(degraded_below=0.6, lost_below=0.3)

@@ -11,7 +11,7 @@ from abs_service.tracker.estimate import Estimate, Status
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.optimizers.base import Stop
 from abs_service.tracker.shape_quality import ShapeQuality
-from abs_service.tracker.terms.base import Remainder, RimFit, SensorFit
+from abs_service.tracker.terms.sensor_fit import Remainder, RimFit, SensorFit
 from abs_service.tracker.terms.vertex_counts import VertexCounts
 from abs_service.wire import estimate_messages
 from abs_service.wire.estimate_messages import Effort, Identity

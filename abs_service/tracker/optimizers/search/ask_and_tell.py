@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from abs_service.tracker.optimizers.base import Budget, Costs, Outcome, Problem, Search, StartSearch, Stop
 from abs_service.tracker.optimizers.search.convergence import ConvergenceMonitor
 from abs_service.tracker.posterior.curvature import newton_step, search_metric
-from abs_service.tracker.terms.base import outlier_share
+from abs_service.tracker.terms.agreement import outlier_share
 
 #: Outlier share below which a solution is accepted without further exploration.
 ACCEPTED_OUTLIERS = 0.1

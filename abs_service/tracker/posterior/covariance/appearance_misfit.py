@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 from abs_service.tracker.mesh import Mesh, mean_around
 from abs_service.tracker.posterior.optimum import Optimum
 from abs_service.tracker.terms import chain_rule
-from abs_service.tracker.terms.base import INLIER_DEVIATIONS
 from abs_service.tracker.terms.linearization import PointLinearization
+from abs_service.tracker.terms.sensor_fit import INLIER_DEVIATIONS
 from calib.jit import kernel
 
 #: Distance within which gradients hold, in typical distances between neighbouring vertices.

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.mesh import Mesh, mean_around
-from abs_service.tracker.terms.base import INLIER_DEVIATIONS
+from abs_service.tracker.terms.sensor_fit import INLIER_DEVIATIONS
 
 #: Share of the vertices that miss the measurements above which the mesh may slide, and below which it fits again.
 MAJORITY, HARDLY_ANY = 0.5, 0.1

@@ -10,7 +10,7 @@ from abs_service.pairing.images import DepthImage, Image
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import Synthesis, Synthesizer
 from abs_service.tracker.synthesis.window import WHOLE, Placed, corner
-from abs_service.tracker.terms.base import Bounds, SensorFit, facing, summarize
+from abs_service.tracker.terms.base import Bounds, facing
 from abs_service.tracker.terms.depth.classification.classifier import Classifier
 from abs_service.tracker.terms.depth.classification.visibility import Visibility, where
 from abs_service.tracker.terms.depth.depth_cost import (
@@ -26,6 +26,7 @@ from abs_service.tracker.terms.depth.texels import Unusable, texels
 from abs_service.tracker.terms.gradients import color_rows, depth_rows
 from abs_service.tracker.terms.linearization import NO_ROWS, PointLinearization, Together
 from abs_service.tracker.terms.patches import Patches
+from abs_service.tracker.terms.sensor_fit import SensorFit, summarize
 from abs_service.tracker.terms.vertex_counts import Sight
 from calib import pose
 from calib.camera import Camera

@@ -10,7 +10,7 @@ from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import Synthesis, Synthesizer
 from abs_service.tracker.synthesis.perspective import project_with_jacobian
 from abs_service.tracker.synthesis.window import NOTHING_HAS, Bordered, corner
-from abs_service.tracker.terms.base import Bounds, SensorFit, facing, summarize
+from abs_service.tracker.terms.base import Bounds, facing
 from abs_service.tracker.terms.gradients import channel_gradients, shortened
 from abs_service.tracker.terms.image_noise import NORMAL_MEDIAN, noise_deviation
 from abs_service.tracker.terms.linearization import PointLinearization
@@ -33,6 +33,7 @@ from abs_service.tracker.terms.photometric.texture_registration_noise import (
     NO_WIDENING,
     TextureRegistrationNoise,
 )
+from abs_service.tracker.terms.sensor_fit import SensorFit, summarize
 from abs_service.tracker.terms.vertex_counts import Sight
 from calib.noise.base import LOG_SQRT_2PI, ImageNoise
 

@@ -7,7 +7,7 @@ from abs_service.pairing.images import ColorImage, Image, Window
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import Synthesis, Synthesizer
 from abs_service.tracker.synthesis.window import NOTHING_HAS, Bordered
-from abs_service.tracker.terms.base import Bounds, SensorFit, facing, summarize
+from abs_service.tracker.terms.base import Bounds, facing
 from abs_service.tracker.terms.gradients import noiseless_color_rows
 from abs_service.tracker.terms.linearization import PointLinearization
 from abs_service.tracker.terms.patches import Patches
@@ -19,6 +19,7 @@ from abs_service.tracker.terms.photometric.texture_registration_noise import (
     NO_REGISTRATION_NOISE,
     TextureRegistrationNoise,
 )
+from abs_service.tracker.terms.sensor_fit import SensorFit, summarize
 from abs_service.tracker.terms.vertex_counts import Sight
 from calib.jit import kernel, prange
 from calib.noise.base import LOG_SQRT_2PI

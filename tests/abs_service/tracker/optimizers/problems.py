@@ -10,7 +10,7 @@ from abs_service.tracker.models.base import SparseJacobian
 from abs_service.tracker.optimizers.base import Budget, Outcome, Search
 from abs_service.tracker.posterior.curvature import Quadratic
 from abs_service.tracker.posterior.linearized_cost import LinearizedCost
-from abs_service.tracker.terms.base import SensorFit
+from abs_service.tracker.terms.sensor_fit import SensorFit
 
 #: Step of the central differences.
 STEP = 1e-5

@@ -1,6 +1,6 @@
 """A mesh of a partly occluded object is made anew once more of the object is in view."""
 
-from abs_service.tracker.terms.base import RimFit, SensorFit
+from abs_service.tracker.terms.sensor_fit import RimFit, SensorFit
 from abs_service.tracking.monitors.growth_monitor import GrowthMonitor
 
 SECOND_NS = 10**9

@@ -10,7 +10,7 @@ from abs_service.tracker.estimate import Estimate, Status
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.shape_quality import ShapeQuality
 from abs_service.tracker.status import Settings as Limits
-from abs_service.tracker.terms.base import RimFit, SensorFit
+from abs_service.tracker.terms.sensor_fit import RimFit, SensorFit
 from abs_service.tracking.monitors.loss_monitor import LossMonitor, Settings
 from abs_service.tracking.session import TrackingSession
 from drivers.contract.frame import Frame, Kind

@@ -10,7 +10,7 @@ from abs_service.bus.health import Health
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.tracker.objectives import euclidean
 from abs_service.tracker.optimizers import cma
-from abs_service.tracker.terms.base import SensorFit
+from abs_service.tracker.terms.sensor_fit import SensorFit
 from abs_service.tracking.monitors.noise_monitor import MINIMUM_INLIER_SHARE, MINIMUM_RESIDUALS, WINDOW_NS, NoiseMonitor
 from abs_service.tracking.session import TrackingSession
 from tests.abs_service.bus.loopback import LoopbackBus

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from abs_service.pairing.images import Window
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.window import WHOLE
-from abs_service.tracker.terms.base import RimFit
 from abs_service.tracker.terms.depth.classification.visibility import Visibility
 from abs_service.tracker.terms.linearization import Linearization
+from abs_service.tracker.terms.sensor_fit import RimFit
 
 
 class Outline(Protocol):

@@ -12,7 +12,7 @@ from abs_service.tracker.mesh import Mesh, edge_lengths
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.synthesis.rasterization.raster import Raster
 from abs_service.tracker.synthesis.window import WHOLE
-from abs_service.tracker.terms.base import Remainder
+from abs_service.tracker.terms.sensor_fit import Remainder
 from calib.camera import Camera
 
 #: About how many columns the grid has.

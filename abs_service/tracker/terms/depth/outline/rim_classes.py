@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.models.base import Surface
-from abs_service.tracker.terms.base import MIN_RIM
 from abs_service.tracker.terms.depth.classification.beyond_view import BLIND_SHARE
 from abs_service.tracker.terms.depth.outline.rim import Rim, read
+from abs_service.tracker.terms.sensor_fit import MIN_RIM
 from calib.camera import Camera
 
 #: The object continues beyond the outermost vertices by no more than so many times their distance from the next ones.

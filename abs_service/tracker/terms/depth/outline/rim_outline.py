@@ -13,7 +13,6 @@ from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.perspective import project_with_jacobian
 from abs_service.tracker.synthesis.projection import Projection
 from abs_service.tracker.synthesis.window import WHOLE, corner
-from abs_service.tracker.terms.base import RimFit
 from abs_service.tracker.terms.depth.classification.outline_distance import inwards
 from abs_service.tracker.terms.depth.classification.visibility import Visibility
 from abs_service.tracker.terms.depth.outline.raggedness import Raggedness
@@ -31,6 +30,7 @@ from abs_service.tracker.terms.depth.outline.rim_cost import FARTHEST, rim_cost
 from abs_service.tracker.terms.depth.outline.rim_motion import displacement, motion
 from abs_service.tracker.terms.depth.outline.round_outline import is_round, without_turn
 from abs_service.tracker.terms.linearization import Linearization
+from abs_service.tracker.terms.sensor_fit import RimFit
 from calib.camera import Camera
 
 #: Beside the object, pixels nearer to it than so many deviations are not held against a vertex: the rim is there.

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.synthesis.perspective import project_with_jacobian
-from abs_service.tracker.terms.base import MIN_RIM
 from abs_service.tracker.terms.depth.outline.rim import read
+from abs_service.tracker.terms.sensor_fit import MIN_RIM
 from calib.camera import Camera
 
 #: An outline is round if the squared cosine between its normals and a turn is smaller, on average. That of an ellipse
