@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.terms.vertex_counts import Sight, VertexCounts
+from abs_service.tracker.terms.vertex_counts import VertexCounts, VertexMasks
 from calib.noise.fit.truncation import deviation_within
 
 #: Residuals up to this many deviations count as explained by the sensor's noise.
@@ -93,7 +93,7 @@ class SensorFit:
 
 def summarize(
     sensor: str,
-    sight: Sight,
+    masks: VertexMasks,
     measured: NDArray[np.bool_],
     residual: NDArray[np.float64],
     mean_log_likelihood: float,
@@ -105,7 +105,7 @@ def summarize(
 
     Args:
         sensor: its name.
-        sight: the vertices by whether the sensor sees them.
+        masks: the vertices by whether the sensor sees them.
         measured: mask of the vertices with a measurement.
         residual: absolute normalised residual, root mean square over the channels.
         mean_log_likelihood: see `SensorFit`.
@@ -116,11 +116,11 @@ def summarize(
     spread = deviation_within(square, INLIER_DEVIATIONS, channels)
     return SensorFit(
         sensor,
-        visible=int(np.count_nonzero(sight.visible)),
-        occluded=sight.occluded,
+        visible=int(np.count_nonzero(masks.visible)),
+        occluded=masks.occluded,
         samples=int(np.count_nonzero(measured)),
         inliers=int(np.count_nonzero(inlier)),
         mean_log_likelihood=mean_log_likelihood,
         normalized_residual=spread,
-        counts=sight.count(measured, inlier),
+        counts=masks.count(measured, inlier),
     )

@@ -43,7 +43,7 @@ class VertexCounts:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Sight:
+class VertexMasks:
     """Masks (n,) of samples, without those that are turned away; no sample is in two.
 
     Attributes:
@@ -67,7 +67,7 @@ class Sight:
         missing: NDArray[np.bool_],
         behind_occluder: NDArray[np.bool_],
         unjudged: NDArray[np.bool_],
-    ) -> "Sight":
+    ) -> "VertexMasks":
         """Masks of samples at pixels (n,), see `Synthesis`; an occluder comes before a missing return."""
         inside = pixel > 0
         covered, lost = inside & behind_occluder, inside & missing & ~behind_occluder

@@ -27,7 +27,7 @@ from abs_service.tracker.terms.gradients import color_rows, depth_rows
 from abs_service.tracker.terms.linearization import NO_ROWS, PointLinearization, Together
 from abs_service.tracker.terms.patches import Patches
 from abs_service.tracker.terms.sensor_fit import SensorFit, summarize
-from abs_service.tracker.terms.vertex_counts import Sight
+from abs_service.tracker.terms.vertex_counts import VertexMasks
 from calib import pose
 from calib.camera import Camera
 from calib.noise.base import DepthNoise
@@ -174,11 +174,11 @@ class DepthTerm:
         residual, _, cost = self._residuals(seen)
         measured, pixel = cost < np.inf, np.where(self._outside[seen.pixel[0]], 0, seen.pixel[0])
         free = (self._free_m.ravel()[pixel] > 0) & (pixel > 0)
-        masks = self._lost[pixel], self._covered[pixel], self._doubtful[pixel]
-        sight = Sight.of(pixel, facing(self._view, surface), *masks)
+        missing, hidden, unjudged = self._lost[pixel], self._covered[pixel], self._doubtful[pixel]
+        masks = VertexMasks.of(pixel, facing(self._view, surface), missing, hidden, unjudged)
         mean = -float(self._measured_cost(surface, seen)[0]) / residual.size
         size = np.where(free, np.inf, np.abs(residual))
-        found = summarize(self.sensor, sight, measured | free, size, mean)
+        found = summarize(self.sensor, masks, measured | free, size, mean)
         return replace(
             found,
             normalized_residual=found.normalized_residual * self._fluctuation.scale,  # by the model as it is stated

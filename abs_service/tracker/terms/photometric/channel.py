@@ -34,7 +34,7 @@ from abs_service.tracker.terms.photometric.texture_registration_noise import (
     TextureRegistrationNoise,
 )
 from abs_service.tracker.terms.sensor_fit import SensorFit, summarize
-from abs_service.tracker.terms.vertex_counts import Sight
+from abs_service.tracker.terms.vertex_counts import VertexMasks
 from calib.noise.base import LOG_SQRT_2PI, ImageNoise
 
 #: The texel of no measurement.
@@ -151,9 +151,9 @@ class ChannelTerm:
         residual = self._residuals(seen, surface)[0]
         pixel, known = seen.pixel[0], np.isfinite(seen.attributes[0]).all(axis=0)
         hidden = np.isinf(self._texture[pixel, VALUE])
-        sight = Sight.of(pixel, facing(self._view, surface), np.zeros_like(hidden), hidden, ~known)
+        masks = VertexMasks.of(pixel, facing(self._view, surface), np.zeros_like(hidden), hidden, ~known)
         mean = -float(self.cost(surface)[0]) / len(residual)
-        return summarize(self.sensor, sight, np.isfinite(residual), np.abs(residual), mean)
+        return summarize(self.sensor, masks, np.isfinite(residual), np.abs(residual), mean)
 
     def match(self, surface: Surface, sparse_jacobian: SparseJacobian, patches: Patches) -> PointLinearization:
         """See `Term`."""

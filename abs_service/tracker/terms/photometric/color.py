@@ -20,7 +20,7 @@ from abs_service.tracker.terms.photometric.texture_registration_noise import (
     TextureRegistrationNoise,
 )
 from abs_service.tracker.terms.sensor_fit import SensorFit, summarize
-from abs_service.tracker.terms.vertex_counts import Sight
+from abs_service.tracker.terms.vertex_counts import VertexMasks
 from calib.jit import kernel, prange
 from calib.noise.base import LOG_SQRT_2PI
 from calib.noise.images.color import GaussianColor
@@ -135,10 +135,10 @@ class ColorTerm:
         residual, measured = self._residuals(seen)
         pixel, known = seen.pixel[0], np.isfinite(seen.attributes[0]).all(axis=0)
         hidden = np.isinf(self._texture[pixel, 0])
-        sight = Sight.of(pixel, facing(self._view, surface), np.zeros_like(hidden), hidden, ~known)
+        masks = VertexMasks.of(pixel, facing(self._view, surface), np.zeros_like(hidden), hidden, ~known)
         mean = -float(self._cost_of(seen, surface)[0]) / len(residual)
         size = np.sqrt(np.mean(residual**2, axis=1))
-        return summarize(self.sensor, sight, measured, size, mean, channels=3)
+        return summarize(self.sensor, masks, measured, size, mean, channels=3)
 
     def match(self, surface: Surface, sparse_jacobian: SparseJacobian, patches: Patches) -> PointLinearization:
         """See `Term`."""
