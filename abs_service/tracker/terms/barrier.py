@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from abs_service.pairing.images import BeamReading, Image
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.terms.base import Bounds
-from abs_service.tracker.terms.linearization import NO_ROWS, PointLinearization
+from abs_service.tracker.terms.linearization import PointLinearization
 from abs_service.tracker.terms.patches import Patches
 from abs_service.tracker.terms.sensor_fit import SensorFit
 from calib.camera import Camera
@@ -47,7 +47,7 @@ class BarrierTerm:
 
     def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> PointLinearization:
         """No residuals: the cost is piecewise constant, its derivative zero."""
-        return PointLinearization(*NO_ROWS, sparse_jacobian, np.zeros((0, 3)))
+        return PointLinearization.empty(sparse_jacobian)
 
     def fit(self, surface: Surface) -> SensorFit:
         """Agreement of the single sample with a population of one."""
@@ -56,7 +56,7 @@ class BarrierTerm:
 
     def match(self, surface: Surface, sparse_jacobian: SparseJacobian, patches: Patches) -> PointLinearization:
         """No residuals: there is no appearance."""
-        return PointLinearization(*NO_ROWS, sparse_jacobian, np.zeros((0, 3)))
+        return PointLinearization.empty(sparse_jacobian)
 
     def misfit(self, surface: Surface) -> NDArray[np.float64]:
         """Zero: a beam has no vertex."""

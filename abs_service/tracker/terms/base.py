@@ -31,6 +31,11 @@ class Bounds:
     outlier: float
     no_return: NoReturn = CAUTIOUS
 
+    @property
+    def unseen(self) -> float:
+        """Cost of a sample that the sensor does not see, or whose value is unknown."""
+        return self.inlier + self.uniform
+
 
 def facing(view: View, surface: Surface) -> NDArray[np.bool_]:
     """True for the samples (m,) of a population of one that are turned towards a view's camera."""

@@ -11,9 +11,6 @@ from abs_service.tracker.models.base import SparseJacobian
 from abs_service.tracker.terms import chain_rule
 from abs_service.tracker.terms.grouped import GroupedLinearization
 
-#: Residuals, rows and points of no measurement.
-NO_ROWS = np.zeros(0), np.zeros((0, 3)), np.zeros(0, np.int64)
-
 #: Covariance (n, 3, 3) of the points of a sparse Jacobian, from that of theta.
 AtPoints = Callable[[SparseJacobian], NDArray[np.float64]]
 
@@ -87,6 +84,11 @@ class PointLinearization:
     sparse_jacobian: SparseJacobian
     positions: NDArray[np.floating]
     shared: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
+
+    @classmethod
+    def empty(cls, sparse_jacobian: SparseJacobian) -> "PointLinearization":
+        """That of no measurement."""
+        return cls(np.zeros(0), np.zeros((0, 3)), np.zeros(0, np.int64), sparse_jacobian, np.zeros((0, 3)))
 
     @property
     def jacobian(self) -> NDArray[np.float64]:

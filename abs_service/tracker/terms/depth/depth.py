@@ -24,7 +24,7 @@ from abs_service.tracker.terms.depth.outline.base import NoOutline, Outline
 from abs_service.tracker.terms.depth.outline.continuation import Continuation, NoContinuation
 from abs_service.tracker.terms.depth.texels import Unusable, texels
 from abs_service.tracker.terms.gradients import color_rows, depth_rows
-from abs_service.tracker.terms.linearization import NO_ROWS, PointLinearization, Together
+from abs_service.tracker.terms.linearization import PointLinearization, Together
 from abs_service.tracker.terms.patches import Patches
 from abs_service.tracker.terms.sensor_fit import SensorFit, summarize
 from abs_service.tracker.terms.vertex_counts import VertexMasks
@@ -135,7 +135,7 @@ class DepthTerm:
         missing = self._view.carry(surface, self._missing)
         texture = self._texels.at(seen.pixel)
         depth_cost(seen.pixel, seen.distance, missing, texture, self._bounds.inlier, self._bounds.outlier, out)
-        return self._view.balance(out, surface, self._bounds.inlier + self._bounds.uniform)
+        return self._view.balance(out, surface, self._bounds.unseen)
 
     def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> Together:
         """Normalised residuals of inliers and of samples in free space, and their derivatives with respect to Θ."""
@@ -161,7 +161,7 @@ class DepthTerm:
         away = self._free_m.ravel()[pixel].astype(np.float64)
         out = (pixel > 0) & (away > 0)
         if not out.any():
-            return PointLinearization(*NO_ROWS, samples, np.zeros((0, 3)))
+            return PointLinearization.empty(samples)
         vertices = self._view.spread(surface, surface.vertices[0].T)
         distances = np.ascontiguousarray(self._free_m[1:-1, 1:-1, None])
         weight = 1 / np.sqrt(FREE_SCALE_M * np.maximum(away[out], MIN_FREE_M))
@@ -189,7 +189,7 @@ class DepthTerm:
 
     def match(self, surface: Surface, sparse_jacobian: SparseJacobian, patches: Patches) -> PointLinearization:
         """No residuals: there is no appearance."""
-        return PointLinearization(*NO_ROWS, sparse_jacobian, np.zeros((0, 3)))
+        return PointLinearization.empty(sparse_jacobian)
 
     def misfit(self, surface: Surface) -> NDArray[np.float64]:
         """Signed distance of each vertex from its measurement, and the deviation of that by noise (2, n) [m].

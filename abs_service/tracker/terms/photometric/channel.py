@@ -111,7 +111,7 @@ class ChannelTerm:
         seen = self._synthesize(surface)
         out = np.empty(len(seen.pixel))
         channel_cost(seen.pixel, seen.attributes, *self._measured, out)
-        return self._view.balance(out, surface, self._bounds.inlier + self._bounds.uniform)
+        return self._view.balance(out, surface, self._bounds.unseen)
 
     def _synthesize(self, surface: Surface) -> Synthesis:
         """The values of a population as they look in this light."""
@@ -119,8 +119,8 @@ class ChannelTerm:
 
     @property
     def _measured(self) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], float, float]:
-        uniform = self._bounds.inlier + self._bounds.uniform
-        return self._texture, self._widening.factor, self._widening.log, self._bounds.outlier, uniform
+        widening, bounds = self._widening, self._bounds
+        return self._texture, widening.factor, widening.log, bounds.outlier, bounds.unseen
 
     def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> PointLinearization:
         """Normalised residuals of the inliers and their derivatives with respect to theta.

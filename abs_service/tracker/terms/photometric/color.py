@@ -110,12 +110,11 @@ class ColorTerm:
         """Cost (population,) of what is synthesised."""
         out = np.empty(len(seen.pixel))
         _color_cost(seen.pixel, seen.attributes, *self._measured, out)
-        return self._view.balance(out, surface, self._bounds.inlier + self._bounds.uniform)
+        return self._view.balance(out, surface, self._bounds.unseen)
 
     @property
     def _measured(self) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], float, float]:
-        uniform = self._bounds.inlier + self._bounds.uniform
-        return self._texture, self._inverse, self._normalizer, self._bounds.outlier, uniform
+        return self._texture, self._inverse, self._normalizer, self._bounds.outlier, self._bounds.unseen
 
     def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> PointLinearization:
         """Normalised residuals of the inliers, three channels each, and their derivatives with respect to theta."""
