@@ -114,7 +114,7 @@ def coverage(uri: str, frames: int, sigma: float = DEMO_SIGMA) -> Coverage:
     rows, predicted, true = [], [], []
     for model, estimate, points in list(zip(found.models, found.estimates, found.material))[1:]:
         error, known = points - estimate.vertices, estimate.covariance
-        jacobian = model.jacobian(estimate.theta)
+        jacobian = model.sparse_jacobian(estimate.theta).dense
         off = np.asarray(np.linalg.lstsq(jacobian.reshape(error.size, -1), error.ravel())[0], np.float64)
         sensed = _sensed(known, _prior(model, estimate, jacobian, 1 / simulation.rate_hz))
         within = [

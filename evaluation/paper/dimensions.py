@@ -161,7 +161,7 @@ def control_error_mm(followed: TrackedSequence) -> float:
     """
     errors = []
     for model, estimate, points in list(zip(followed.models, followed.estimates, followed.material))[1:]:
-        jacobian = model.jacobian(estimate.theta)
+        jacobian = model.sparse_jacobian(estimate.theta).dense
         away = (points - estimate.vertices).ravel()
         off = np.linalg.lstsq(jacobian.reshape(away.size, -1), away, rcond=None)[0]
         errors.append(np.linalg.norm(off.reshape(-1, 3), axis=1).mean())

@@ -126,10 +126,6 @@ class DeformationModel(Protocol):
         """Deforms the mesh with every row of `thetas` (population, dim)."""
         ...
 
-    def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Jacobian (n, 3, dim) of the vertices with respect to theta, at theta (dim,)."""
-        ...
-
     def sparse_jacobian(self, theta: NDArray[np.float64]) -> SparseJacobian:
-        """The Jacobian of the vertices in sparse form, at theta (dim,)."""
+        """Jacobian of the vertices with respect to theta, at theta (dim,)."""
         ...

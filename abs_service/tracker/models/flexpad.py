@@ -153,8 +153,8 @@ class FlexPad:
         series = self._series
         return self._pose, self._per_bend, self._half, self._padded, series.coefficients, series.scale
 
-    def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Jacobian (n, 3, 15) of the vertices with respect to theta, at theta (15,); zero for clamped parameters."""
+    def sparse_jacobian(self, theta: NDArray[np.float64]) -> SparseJacobian:
+        """Jacobian of the vertices with respect to theta, at theta (15,): one group; zero for clamped parameters."""
         turn = pose.from_rotation_vector(theta[ROTATION], (0, 0, 0))[:3, :3]
         turned = self.deform(theta[None]).vertices[0].T - (self._center + theta[TRANSLATION])
         result = np.empty((len(turned), 3, DIMENSION))
@@ -162,11 +162,7 @@ class FlexPad:
         bend_jacobian(theta[BENDS], theta[HEIGHT], FULL_HEIGHT, bends.SIDES, *sheet, result)
         result[:, :, ROTATION] = pose.rotated_points_jacobian(theta[ROTATION], turned)
         result[:, :, TRANSLATION] = np.eye(3)
-        return result
-
-    def sparse_jacobian(self, theta: NDArray[np.float64]) -> SparseJacobian:
-        """The dense Jacobian as one group: every parameter moves every vertex."""
-        return SparseJacobian.from_dense(self.jacobian(theta))
+        return SparseJacobian.from_dense(result)
 
 
 def _scales(points: NDArray[np.float64], minimum_radius: float, half: float) -> NDArray[np.float64]:

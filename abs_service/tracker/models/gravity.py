@@ -104,21 +104,18 @@ class Gravity:
         _deform(bends, self._step, self._gripper(thetas), self._along, self._across, vertices, normals)
         return Surface(vertices, normals)
 
-    def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Jacobian (n, 3, dim) of the vertices with respect to theta, at theta (dim,)."""
+    def sparse_jacobian(self, theta: NDArray[np.float64]) -> SparseJacobian:
+        """Jacobian of the vertices with respect to theta, at theta (dim,): one group."""
         gripper = self._gripper(theta[None])[0]
         derivatives = self._column_derivatives(theta[: self.segments])
         in_plane = np.stack([derivatives.real, derivatives.imag], axis=-1) @ gripper[:, [0, 2]].T
         by_bends = np.tile(in_plane.transpose(1, 2, 0), (len(self._across), 1, 1))
         if len(theta) == self.segments:
-            return by_bends
+            return SparseJacobian.from_dense(by_bends)
         arms = self.deform(theta[None]).vertices[0].T - gripper[:, 3]
         turning = pose.rotated_points_jacobian(theta[self.segments : self.segments + 3], arms)
-        return np.concatenate([by_bends, turning, np.broadcast_to(np.eye(3), turning.shape)], axis=2)
-
-    def sparse_jacobian(self, theta: NDArray[np.float64]) -> SparseJacobian:
-        """The dense Jacobian as one group: every parameter moves every vertex."""
-        return SparseJacobian.from_dense(self.jacobian(theta))
+        shifting = np.broadcast_to(np.eye(3), turning.shape)
+        return SparseJacobian.from_dense(np.concatenate([by_bends, turning, shifting], axis=2))
 
     def _column_derivatives(self, bends: NDArray[np.float64]) -> NDArray[np.complex128]:
         """Derivatives (segments, columns) of the columns' coordinates along the gripper's x (real) and z (imaginary).

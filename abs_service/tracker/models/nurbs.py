@@ -192,12 +192,8 @@ class Nurbs:
         vertices = self.deform(self.rest[None]).vertices[0].T.astype(np.float64)
         self.mesh = replace(self.mesh, vertices=vertices, deviation=deviation)
 
-    def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Jacobian (n, 3, dim) of the vertices with respect to theta, at theta (dim,)."""
-        return self.sparse_jacobian(theta).dense
-
     def sparse_jacobian(self, theta: NDArray[np.float64]) -> SparseJacobian:
-        """The Jacobian grouped by knot span: a vertex depends on the control points of its span only."""
+        """Jacobian grouped by knot span: a vertex depends on the control points of its span only."""
         local = np.empty((len(self._offset), 3, self._span_parameters.shape[1]))
         _moves(theta.reshape(-1, 3), self._span_start, self._span_control, self._basis, self._offset, local)
         return SparseJacobian(local, self._span, self._span_parameters, len(theta))

@@ -90,12 +90,8 @@ class Posed:
         _move(motion, self._centroid.astype(np.float32), surface.vertices, surface.normals)
         return surface
 
-    def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Jacobian (n, 3, dim) of the vertices with respect to theta, at theta (dim,): pose, then the rotated shape."""
-        return self.sparse_jacobian(theta).dense
-
     def sparse_jacobian(self, theta: NDArray[np.float64]) -> SparseJacobian:
-        """The Jacobian in the shape's groups: a vertex depends on the pose and on the shape parameters of its group."""
+        """Jacobian in the shape's groups: a vertex depends on the pose and on the shape parameters of its group."""
         R = pose.from_rotation_vector(theta[:3], (0, 0, 0))[:3, :3]
         turned = (self._shape.deform(theta[None, 6:]).vertices[0].T - self._centroid) @ R.T
         shape = self._shape.sparse_jacobian(theta[6:])
@@ -111,7 +107,7 @@ def _gauge(shape: DeformationModel) -> NDArray[np.float64]:
     """Rows (k, dim of the shape) of the prior, one for each of k ≤ 6 rigid motions that the shape contains."""
     count = len(shape.mesh.vertices)
     # Columns: the scaled Jacobian, the displacement of all vertex components when a parameter changes by its scale.
-    motions = shape.jacobian(shape.rest).transpose(1, 0, 2).reshape(3 * count, -1) * shape.scales
+    motions = shape.sparse_jacobian(shape.rest).dense.transpose(1, 0, 2).reshape(3 * count, -1) * shape.scales
     arms = shape.mesh.vertices - shape.mesh.vertices.mean(axis=0)
     turns = [np.cross(axis, arms).T.ravel() for axis in np.eye(3)]
     rigid = np.linalg.qr(np.column_stack([np.kron(np.eye(3), np.ones((count, 1))), *turns]))[0]

@@ -65,12 +65,9 @@ class Rigid:
         vertices += (self._centroid + thetas[:, 3:]).reshape(-1, 1).astype(np.float32)
         return Surface(vertices.reshape(shape), normals.reshape(shape))
 
-    def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Jacobian (n, 3, 6) of the vertices with respect to theta, at theta (6,)."""
+    def sparse_jacobian(self, theta: NDArray[np.float64]) -> SparseJacobian:
+        """Jacobian of the vertices with respect to theta, at theta (6,): one group."""
         turned = pose.transform(pose.from_rotation_vector(theta[:3], (0, 0, 0)), self._arms)
         shifts = np.broadcast_to(np.eye(3), (len(turned), 3, 3))
-        return np.concatenate([pose.rotated_points_jacobian(theta[:3], turned), shifts], axis=2)
-
-    def sparse_jacobian(self, theta: NDArray[np.float64]) -> SparseJacobian:
-        """The dense Jacobian as one group: every parameter moves every vertex."""
-        return SparseJacobian.from_dense(self.jacobian(theta))
+        turns = pose.rotated_points_jacobian(theta[:3], turned)
+        return SparseJacobian.from_dense(np.concatenate([turns, shifts], axis=2))

@@ -45,7 +45,7 @@ class MeshNoise:
         deviation = np.broadcast_to(self._model.mesh.deviation, len(normals))
         inverse = posterior_covariance(frame.linearize(theta).quadratic)
         response = -inverse @ frame.cross_curvature(theta, normals * deviation[:, None])
-        left = uncorrected_variance(normals, deviation, self._model.jacobian(theta), response)
+        left = uncorrected_variance(normals, deviation, self._model.sparse_jacobian(theta).dense, response)
         self._share = left / np.maximum(deviation, np.finfo(float).eps) ** 2
 
 

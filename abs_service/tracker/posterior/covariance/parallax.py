@@ -63,7 +63,7 @@ class FittedParallax:
         """One deviation of the error (n, 3) [m]; none without distances at the vertices."""
         normals = optimum.surface.normals[0].T.astype(np.float64)
         deviation = np.broadcast_to(frame.misfit(optimum.surface)[1], len(normals))
-        across = np.einsum("ni,nid->nd", normals, self._model.jacobian(optimum.theta))
+        across = np.einsum("ni,nid->nd", normals, self._model.sparse_jacobian(optimum.theta).dense)
         measured = deviation > 0
         rows = across[measured] / deviation[measured, None]
         fitted = np.linalg.inv(rows.T @ rows + np.diag(1.0 / self._model.scales**2))  # nothing moves by more than 1 m

@@ -19,5 +19,7 @@ def registration_covariance(model: DeformationModel, deviation: float) -> NDArra
     shifts = np.broadcast_to(np.eye(3), (len(arms), 3, 3))
     turns = np.cross(np.eye(3)[None], arms[:, None] / radius).transpose(0, 2, 1)
     moves = np.concatenate([shifts, turns], axis=2).reshape(-1, 6)
-    changes = np.asarray(np.linalg.lstsq(model.jacobian(model.rest).reshape(len(moves), -1), moves)[0], np.float64)
+    changes = np.asarray(
+        np.linalg.lstsq(model.sparse_jacobian(model.rest).dense.reshape(len(moves), -1), moves)[0], np.float64
+    )
     return deviation**2 * changes @ changes.T

@@ -41,7 +41,7 @@ def test_a_right_prediction_is_kept(observed):
 @pytest.mark.parametrize("jump_m", [(0.01, 0, 0), (0, -0.012, 0), (-0.015, 0.01, 0), (0.02, 0.02, 0)])
 def test_a_print_beside_the_prediction_is_where_the_search_begins(observed, jump_m):
     frame, theta = observed
-    jacobian, vertices = frame.model.jacobian(theta), frame.surfaces.deform(theta[None]).vertices[0].T
+    jacobian, vertices = frame.model.sparse_jacobian(theta).dense, frame.surfaces.deform(theta[None]).vertices[0].T
     moved = theta + np.linalg.lstsq(jacobian.reshape(-1, len(theta)), np.tile(jump_m, len(vertices)), rcond=None)[0]
     calm = predicting(frame, moved)
     under, start = search_start(calm, patches_of(frame.model.mesh))

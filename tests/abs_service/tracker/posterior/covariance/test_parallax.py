@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from abs_service.tracker.mesh import Mesh
-from abs_service.tracker.models.base import Surface
+from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.posterior.covariance.parallax import FittedParallax
 from calib import pose
 from evaluation.method.trust import SCENES
@@ -33,8 +33,8 @@ class Plane:
         self.mesh = Mesh(self.vertices, FACES, np.zeros((25, 3), np.float32), self.vertices[:, :2])
         self.scales = np.ones(1)
 
-    def jacobian(self, theta):
-        return np.tile(self.normal[None, :, None], (25, 1, 1))
+    def sparse_jacobian(self, theta):
+        return SparseJacobian.from_dense(np.tile(self.normal[None, :, None], (25, 1, 1)))
 
     def posed(self, measured=25) -> Any:
         """An estimate of this surface, and its frame."""
