@@ -13,12 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.optimizers.base import Costs
-from abs_service.tracker.optimizers.search.ask_and_tell import (
-    AskAndTell,
-    AskAndTellSettings,
-    Schedule,
-    default_population,
-)
+from abs_service.tracker.optimizers.search.ask_and_tell import AskAndTell, AskAndTellSettings
 
 
 @dataclass(frozen=True)
@@ -28,8 +23,7 @@ class Settings(AskAndTellSettings):
     def build(self, dimension: int, generator: np.random.Generator) -> AskAndTell:
         """A search in `dimension` dimensions that draws from `generator`."""
         make = partial(PycmaSampler, dimension, generator, self.minimum_step)
-        population = self.population or default_population(dimension)
-        return AskAndTell(Schedule("cma", self.generations, self.tolerance), make, population, self.step, self.restarts)
+        return AskAndTell("cma", self, dimension, make)
 
 
 class _Pycma(Protocol):

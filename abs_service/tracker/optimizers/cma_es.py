@@ -7,12 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.optimizers.base import Costs
-from abs_service.tracker.optimizers.search.ask_and_tell import (
-    AskAndTell,
-    AskAndTellSettings,
-    Schedule,
-    default_population,
-)
+from abs_service.tracker.optimizers.search.ask_and_tell import AskAndTell, AskAndTellSettings
 from abs_service.tracker.optimizers.search.cma_update import (
     Constants,
     normal_quantiles,
@@ -29,9 +24,7 @@ class Settings(AskAndTellSettings):
     def build(self, dimension: int, generator: np.random.Generator) -> AskAndTell:
         """A search in `dimension` dimensions that draws from `generator`."""
         make = partial(CmaEsSampler, dimension, generator, self.minimum_step)
-        population = self.population or default_population(dimension)
-        schedule = Schedule("cma_es", self.generations, self.tolerance)
-        return AskAndTell(schedule, make, population, self.step, self.restarts)
+        return AskAndTell("cma_es", self, dimension, make)
 
 
 #: The Cholesky factor is updated when this share of the covariance may have changed.

@@ -93,19 +93,18 @@ class AskAndTell:
     """An `Optimizer` with one sampler; its step size and covariance continue from frame to frame.
 
     Args:
-        schedule: of each frame.
+        name: of the sampler, see `Outcome.searcher`.
+        settings: of the search.
+        dimension: of Θ.
         make: makes samplers.
-        population: candidates per generation.
-        step: initial standard deviation of the candidates, in posterior deviations of the parameters.
-        restarts: maximum number of times that the population doubles in an exploration.
     """
 
-    def __init__(self, schedule: Schedule, make: MakeSampler, population: int, step: float, restarts: int):
-        self._schedule = schedule
+    def __init__(self, name: str, settings: AskAndTellSettings, dimension: int, make: MakeSampler):
+        self._schedule = Schedule(name, settings.generations, settings.tolerance)
         self._make = make
-        self._population = population
-        self._restarts = restarts
-        self._sampler = make(population, step)
+        self._population = settings.population or default_population(dimension)
+        self._restarts = settings.restarts
+        self._sampler = make(self._population, settings.step)
 
     def follow(self, problem: Problem, start: NDArray[np.float64], budget: Budget) -> Search:
         """Searches in the metric of the curvature, from the best of none, half and all of a Newton step."""
