@@ -109,6 +109,15 @@ class Camera:
         """
         return self.lookup.radius * (1 + 2 / min(self.width, self.height)) + 1 / min(self.fx, self.fy)
 
+    def in_field(self, points_r: NDArray[np.floating]) -> NDArray[np.bool_]:
+        """True for rig points (…, 3) [m] in the field of view, of which the image may show a part only.
+
+        Raises:
+            LensError: if the lens has no inverse somewhere on the image.
+        """
+        x, y, depth = np.moveaxis(pose.transform(self.T_sr, np.asarray(points_r, np.float64)), -1, 0)
+        return np.asarray(np.hypot(x, y) < self.field_radius * depth)
+
     def project(self, points_r: NDArray[np.floating]) -> NDArray[np.float64]:
         """Pixel coordinates (…, 2) of rig points (…, 3) [m], eq. 10; NaN for points on or behind the camera plane."""
         points_s = pose.transform(self.T_sr, np.asarray(points_r, np.float64))

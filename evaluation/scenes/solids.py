@@ -69,9 +69,7 @@ def seen_by(
     place = camera.project(points)
     with np.errstate(invalid="ignore"):
         inside = np.all((place >= 0) & (place <= (camera.width - 1, camera.height - 1)), axis=-1)
-    inside &= np.linalg.norm(pose.transform(camera.T_sr, points)[..., :2], axis=-1) < (
-        camera.field_radius * pose.transform(camera.T_sr, points)[..., 2]
-    )
+    inside &= camera.in_field(points)
     direction = pose.transform(camera.T_sr, points)
     length = np.linalg.norm(direction, axis=-1)
     first = cast(camera, direction / length[..., None], solids)

@@ -52,6 +52,14 @@ def test_unprojection_is_the_inverse():
     np.testing.assert_allclose(CAMERA.distance(points), distance, rtol=1e-12)
 
 
+def test_the_field_of_view_ends_before_the_lens_folds_points_into_the_image():
+    camera = Camera(64, 48, 60.0, 60.0, 31.5, 23.5, Lens(np.array([-0.25, 0.0, 0.0, 0.0, 0.0])))
+    points = np.array([[0.0, 0.0, 1.0], [1.9, 0.0, 1.0], [0.1, 0.1, -1.0], [0.0, 0.0, 0.0]])
+    assert 0 < camera.project(points)[1, 0] < 63
+    assert camera.in_field(points).tolist() == [True, False, False, False]
+    assert camera.in_field(camera.unproject(np.ones((48, 64)))).all()
+
+
 def test_no_return_stays_no_return():
     distance = np.ones((24, 32))
     distance[3, 4] = np.nan

@@ -118,9 +118,8 @@ def limited(view: DepthView, within: NDArray[np.bool_]) -> DepthView:
 def at_points(image: NDArray[np.floating], camera: Camera, points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Values (k,) of an image (height, width) at the pixels that show points (k, 3) [m]; NaN outside the image."""
     place = np.floor(camera.project(points) + 0.5)
-    ahead = (points - camera.center) @ camera.T_rs[:3, 2] > 0
     with np.errstate(invalid="ignore"):
-        inside = ahead & np.all((place >= 0) & (place < (camera.width, camera.height)), axis=1)
+        inside = camera.in_field(points) & np.all((place >= 0) & (place < (camera.width, camera.height)), axis=1)
     values = np.full(len(points), np.nan)
     column, row = place[inside].astype(np.intp).T
     values[inside] = image[row, column]

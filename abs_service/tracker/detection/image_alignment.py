@@ -178,8 +178,7 @@ def _seen(
         rays = detection.camera.directions(jumps[:, :2] + steps * jumps[:, 2:])
         return transform(detection.camera.T_rs, distance * rays)
 
-    local = transform(camera.T_sr, points(0.5))
-    is_inside = np.hypot(local[:, 0], local[:, 1]) < camera.field_radius * local[:, 2]
+    is_inside = camera.in_field(points(0.5))
     places, before = (_reduced(camera.project(points(steps)), factor) for steps in (0.5, -0.5))
     is_inside &= np.all((places >= 0) & (places <= np.array(size) - 1), axis=1)
     along, across = np.abs(places - before)[is_inside].T

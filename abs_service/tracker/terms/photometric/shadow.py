@@ -4,7 +4,6 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from calib import pose
 from calib.camera import Camera
 
 
@@ -13,7 +12,6 @@ class Shadow:
 
     def __init__(self, camera: Camera):
         self._camera = camera
-        self._limit = camera.field_radius
 
     def mask(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Pixels (height, width) that points (k, 3) [m], neighbours in another sensor's image, cover.
@@ -22,15 +20,14 @@ class Shadow:
         """
         camera = self._camera
         covered = np.zeros((camera.height, camera.width), np.uint8)
-        local = pose.transform(camera.T_sr, points)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            seen = (local[:, 2] > 0) & (np.linalg.norm(local[:, :2], axis=1) / local[:, 2] < self._limit)
-        pixel = np.floor(camera.project(points[seen]) + 0.5)
+        seen = points[camera.in_field(points)]
+        pixel = np.floor(camera.project(seen) + 0.5)
         inside = np.all((pixel >= 0) & (pixel < (camera.width, camera.height)), axis=1)
         column, row = pixel[inside].astype(int).T
         if not len(row):
             return covered > 0
         covered[row, column] = 1
         gap_m = float(np.median(np.linalg.norm(np.diff(points, axis=0), axis=1))) if len(points) > 1 else 0.0
-        side = 2 * int(np.ceil(gap_m * camera.fx / float(np.median(local[seen, 2])) / 2)) + 1
+        depth_m = float(np.median((seen - camera.center) @ camera.T_rs[:3, 2]))
+        side = 2 * int(np.ceil(gap_m * camera.fx / depth_m / 2)) + 1
         return cv2.dilate(covered, np.ones((side, side), np.uint8)) > 0

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 from abs_service.pairing.images import ChannelImage, ColorImage, Image
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.terms.photometric.demosaicing import demosaiced
-from calib import pose
 from calib.camera import Camera
 
 #: One row per vertex, (n, channels); NaN where unknown.
@@ -51,13 +50,11 @@ def _between(values: NDArray[np.generic], camera: Camera, points: Values) -> Val
 
 def _place(camera: Camera, points: Values) -> Values:
     """Pixel coordinates (n, 2) of points; NaN for what is outside the image, or only folded into it by the lens."""
-    local = pose.transform(camera.T_sr, points)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        aside = np.linalg.norm(local[:, :2], axis=1) / local[:, 2]
-        place = camera.project(points)
-        pixel = np.floor(place + 0.5)
-        seen = (aside < camera.field_radius) & np.all((pixel >= 0) & (pixel < (camera.width, camera.height)), axis=1)
-    return np.where((seen & (local[:, 2] > 0))[:, None], place, np.nan)
+    place = camera.project(points)
+    pixel = np.floor(place + 0.5)
+    with np.errstate(invalid="ignore"):
+        inside = np.all((pixel >= 0) & (pixel < (camera.width, camera.height)), axis=1)
+    return np.where((inside & camera.in_field(points))[:, None], place, np.nan)
 
 
 def known(values: Values, others: Values) -> Values:

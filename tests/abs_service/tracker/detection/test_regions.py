@@ -6,11 +6,12 @@ import cv2
 import numpy as np
 import pytest
 
-from abs_service.tracker.detection.depth_view import DepthView
+from abs_service.tracker.detection.depth_view import DepthView, at_points
 from abs_service.tracker.detection.initial_detection import DetectionError
 from abs_service.tracker.detection.regions import box, mask, nearest
 from calib import pose
 from calib.camera import Camera
+from calib.lenses.lens import Lens
 
 SHAPE = (48, 64)
 CAMERA = Camera(64, 48, 60.0, 60.0, 31.5, 23.5)
@@ -209,3 +210,10 @@ def test_a_mask_that_cannot_be_read_is_named(tmp_path, content):
         path.write_bytes(content)
     with pytest.raises(DetectionError, match=r"file = .*mask\.png': cannot be read"):
         mask.Settings(path).build()
+
+
+def test_a_point_beside_the_field_of_view_has_no_value_where_the_lens_folds_it_into_the_image():
+    camera = Camera(64, 48, 60.0, 60.0, 31.5, 23.5, Lens(np.array([-0.25, 0.0, 0.0, 0.0, 0.0])))
+    values = at_points(np.full(SHAPE, 2.0), camera, np.array([[0.1, 0.1, 1.0], [1.9, 0.0, 1.0]]))
+    assert values[0] == 2.0
+    assert np.isnan(values[1])
