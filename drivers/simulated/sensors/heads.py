@@ -1,10 +1,9 @@
-"""Makes heads from their names and settings."""
+"""Heads by their names."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 from calib.camera import Camera
-from calib.lenses.lens import Lens, LensModel
+from calib.lenses.lens import LensModel
 from drivers.simulated.scene.scene import Scene
 from drivers.simulated.sensors import infrared
 from drivers.simulated.sensors.barrier import Barrier, BarrierNoise
@@ -15,72 +14,52 @@ from drivers.simulated.sensors.infrared import Infrared
 from drivers.simulated.sensors.optics import BEAMS, OPTICS
 from drivers.simulated.sensors.structured_light import StructuredLight, StructuredLightNoise
 from drivers.simulated.sensors.time_of_flight import TimeOfFlight, TimeOfFlightNoise
+from drivers.simulated.settings import SHARP, Settings
 
 
-@dataclass(frozen=True)
-class HeadFactory:
-    """Settings of the heads, and the factory that makes them.
+def make_head(name: str, scene: Scene, settings: Settings, lens: LensModel) -> Head:
+    """The head with a name in `OPTICS` or `BEAMS`, observing a scene; all imaging heads have the lens.
 
-    Attributes:
-        sizes: image sizes [px] of heads that differ from the default.
-        rate_hz: exposures per second.
-        noise: factor on all random errors.
-        offset, wiggle, dark, pattern: offsets of the time-of-flight head; see `Address`.
-        lens: distortion of all imaging heads.
-        mosaic: of the Bayer head.
-        samples, blur_px: rays per pixel and axis, and blur of the lens, of the colour and Bayer heads; see `Picture`.
+    Raises:
+        LensError: the distortion is not invertible in the image.
     """
+    rate_hz, noise = settings.rate, settings.noise
+    if name in BEAMS:
+        beam, usual = BEAMS[name], BarrierNoise()
+        wrong = BarrierNoise(noise * usual.miss, noise * usual.false_alarm)
+        return Barrier(name, beam.camera, beam.length_m, rate_hz, wrong)
+    optics = OPTICS[name]
+    camera = optics.camera(*settings.sizes.get(name, (optics.width, optics.height)), lens)
+    match name:
+        case "tof":
+            return TimeOfFlight(name, camera, scene, rate_hz, _time_of_flight_noise(settings))
+        case "structured_light":
+            random = noise * StructuredLightNoise.random
+            return StructuredLight(name, camera, scene, rate_hz, StructuredLightNoise(random=random))
+        case "ir":
+            return Infrared(name, camera, scene, rate_hz, noise * infrared.SIGMA)
+        case "bayer":
+            mosaic = Mosaic(settings.order, settings.crosstalk)
+            return Bayer(name, _picture(camera, scene, settings), rate_hz, noise * SIGMA, mosaic)
+        case _:
+            return Color(name, _picture(camera, scene, settings), rate_hz, noise * SIGMA)
 
-    sizes: Mapping[str, tuple[int, int]] = field(default_factory=dict)
-    rate_hz: float = 30.0
-    noise: float = 1.0
-    offset: float = 0.0
-    wiggle: float = 0.0
-    dark: float = 0.0
-    pattern: float = 0.0
-    lens: LensModel = field(default_factory=Lens)
-    mosaic: Mosaic = field(default_factory=Mosaic)
-    samples: int = 1
-    blur_px: float = 0.0
 
-    def head(self, name: str, scene: Scene) -> Head:
-        """The head with a name in `OPTICS` or `BEAMS`, observing a scene.
+def _picture(camera: Camera, scene: Scene, settings: Settings) -> Picture:
+    samples = 2 if settings.texture == "fine" or settings.scene in SHARP else 1
+    return Picture(camera, scene, samples, settings.blur)
 
-        Raises:
-            LensError: the distortion is not invertible in the image.
-        """
-        if name in BEAMS:
-            beam, noise = BEAMS[name], BarrierNoise()
-            wrong = BarrierNoise(self.noise * noise.miss, self.noise * noise.false_alarm)
-            return Barrier(name, beam.camera, beam.length_m, self.rate_hz, wrong)
-        optics = OPTICS[name]
-        camera = optics.camera(*self.sizes.get(name, (optics.width, optics.height)), self.lens)
-        match name:
-            case "tof":
-                return TimeOfFlight(name, camera, scene, self.rate_hz, self._time_of_flight_noise())
-            case "structured_light":
-                random = self.noise * StructuredLightNoise.random
-                return StructuredLight(name, camera, scene, self.rate_hz, StructuredLightNoise(random=random))
-            case "ir":
-                return Infrared(name, camera, scene, self.rate_hz, self.noise * infrared.SIGMA)
-            case "bayer":
-                return Bayer(name, self._picture(camera, scene), self.rate_hz, self.noise * SIGMA, self.mosaic)
-            case _:
-                return Color(name, self._picture(camera, scene), self.rate_hz, self.noise * SIGMA)
 
-    def _picture(self, camera: Camera, scene: Scene) -> Picture:
-        return Picture(camera, scene, self.samples, self.blur_px)
-
-    def _time_of_flight_noise(self) -> TimeOfFlightNoise:
-        default = TimeOfFlightNoise()
-        return replace(
-            default,
-            mu_offset=self.offset,
-            mu_wiggle=self.wiggle,
-            mu_amplitude=self.dark,
-            pattern=self.pattern,
-            sigma_offset=self.noise * default.sigma_offset,
-            sigma_distance=self.noise * default.sigma_distance,
-            sigma_amplitude=self.noise * default.sigma_amplitude,
-            amplitude=self.noise * default.amplitude,
-        )
+def _time_of_flight_noise(settings: Settings) -> TimeOfFlightNoise:
+    usual, factor = TimeOfFlightNoise(), settings.noise
+    return replace(
+        usual,
+        mu_offset=settings.offset,
+        mu_wiggle=settings.wiggle,
+        mu_amplitude=settings.dark,
+        pattern=settings.pattern,
+        sigma_offset=factor * usual.sigma_offset,
+        sigma_distance=factor * usual.sigma_distance,
+        sigma_amplitude=factor * usual.sigma_amplitude,
+        amplitude=factor * usual.amplitude,
+    )

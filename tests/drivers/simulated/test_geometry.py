@@ -14,8 +14,8 @@ from drivers.simulated.scene.motion import Placement
 from drivers.simulated.scene.raycast import cast, lookup, shadowed
 from drivers.simulated.scene.scene import REST_Z, WALL_Z, Moment, Scene
 from drivers.simulated.scene.surface import surface_points
-from drivers.simulated.scenes import SceneSettings
 from drivers.simulated.sensors.view import View
+from drivers.simulated.settings import Settings
 from drivers.simulated.shapes.rectangle import PlacedRectangle, Rectangle
 
 CURVATURES = st.sampled_from([0.0, 1e-12, -1e-9, 1e-7, -1e-5]) | st.floats(-4, 4)
@@ -31,7 +31,7 @@ PLACEMENTS = st.builds(
     st.floats(-4, 4),
     st.floats(-0.03, 0.03),
 )
-SHEET, BOARD = scenes.sheet(SceneSettings()), scenes.board(SceneSettings())
+SHEET, BOARD = scenes.sheet(Settings("sheet")), scenes.board(Settings("board"))
 CAMERA = Camera(40, 30, 40.0, 40.0, 19.5, 14.5)
 
 
