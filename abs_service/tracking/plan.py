@@ -12,6 +12,7 @@ from abs_service.tracker.appearance import with_appearance
 from abs_service.tracker.detection.initial_detection import InitialDetection
 from abs_service.tracker.detection.plausibility import ExtentError, warnings
 from abs_service.tracker.detection.regions.base import Region
+from abs_service.tracker.detection.templates import base as templates
 from abs_service.tracker.detection.templates import first_image
 from abs_service.tracker.detection.templates.base import ALL_SEEN, Sight, Template
 from abs_service.tracker.mesh import Mesh
@@ -34,16 +35,12 @@ from calib.noise.scaled import Scaled
 from calib.rig import Rig
 
 
-class ModelSettings(Protocol):
+class ModelSettings(templates.ModelSettings[DeformationModel], Protocol):
     """`Settings` of a module of `abs_service.tracker.models`."""
 
     @property
     def board(self) -> tuple[float, float]:
         """Width and height [m] of a flat board from which `build` can build a model; used by the warm-up."""
-        ...
-
-    def build(self, detection: InitialDetection) -> DeformationModel:
-        """The model of a detected object."""
         ...
 
 

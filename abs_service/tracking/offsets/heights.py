@@ -8,12 +8,10 @@ from numpy.typing import NDArray
 from abs_service.pairing.images import DepthImage
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.synthesis.perspective import project_with_jacobian
+from abs_service.tracker.terms.sensor_fit import INLIER_DEVIATIONS
 from calib.camera import Camera
 from calib.jit import kernel
 from calib.noise.base import DepthNoise
-
-#: A pixel that differs by more standard deviations is an outlier, and a vertex most of whose pixels do is not measured.
-INLIER_DEVIATIONS = 3.0
 
 #: Measurements at a smaller cosine between line of sight and normal are ignored: they hardly constrain the height.
 MIN_COSINE = 0.3
@@ -123,7 +121,7 @@ def _mean_heights(
     height: NDArray[np.float64],
     pixels: NDArray[np.float64],
 ) -> None:
-    """Mean height of the inliers among every vertex's pixels, if they are more than half.
+    """Mean height of the inliers among every vertex's pixels, if they are more than half; else it is not measured.
 
     Args:
         distance: measured distances in a window of the image [m].

@@ -9,7 +9,7 @@ import scipy  # its parts are imported when they are first used
 from numpy.typing import NDArray
 
 from abs_service.tracker.detection.shapes.samples import farthest_first
-from abs_service.tracker.mesh import Mesh, area_vectors, edge_lengths
+from abs_service.tracker.mesh import Mesh, edge_lengths
 
 #: Vertices are chosen among so many; more are slower and no better.
 MAX_CANDIDATES = 12_000
@@ -49,5 +49,4 @@ def triangulated(mesh: Mesh, chosen: NDArray[np.intp]) -> tuple[NDArray[np.intp]
 
 def _places(mesh: Mesh, count: int) -> NDArray[np.float64]:
     """Positions and scaled normals (n, 6) of the vertices, in which the sides of a thin body are apart."""
-    area = float(np.linalg.norm(area_vectors(mesh.vertices, mesh.faces), axis=1).sum() / 2)
-    return np.hstack([mesh.vertices, 0.5 * SIDES_APART * np.sqrt(area / count) * mesh.normals])
+    return np.hstack([mesh.vertices, 0.5 * SIDES_APART * np.sqrt(mesh.area / count) * mesh.normals])

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.detection.initial_detection import DetectionError
+from abs_service.tracker.detection.plausibility import LARGEST_M, SMALLEST_M
 from abs_service.tracker.detection.shapes.paint import NO_PAINT, PointPaint
 from abs_service.tracker.detection.shapes.principal_axes import extents, principal_axes
 from abs_service.tracker.detection.shapes.resampling import evenly_spread, triangulated
@@ -31,9 +32,6 @@ FINENESS, MAX_VERTICES = 0.7, 50_000
 
 #: Vertices this near to each other, as a share of the object's size, are one: of another face, or with another texture.
 SAME = 1e-6
-
-#: Range of the extent of an object [m]; outside, the unit is wrong.
-SMALLEST_M, LARGEST_M = 0.005, 20.0
 
 Colors = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
