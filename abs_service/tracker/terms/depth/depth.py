@@ -63,10 +63,8 @@ class DepthTerm:
         self._missing = np.zeros((1, vertices), np.float32)
         self._fluctuation = Fluctuation()
         self._texels = texels(sensor, synthesizer, noise, bounds)
-        self._images = Placed(np.bool_), Placed(np.bool_), Placed(np.float32), Placed(np.bool_), Placed(np.bool_)
-        self._lost = self._covered = self._outside = np.zeros(0, np.bool_)
-        self._doubtful = np.zeros(0, np.bool_)
-        self._free_m = np.zeros((0, 0), np.float32)
+        self._lost, self._covered, self._outside, self._doubtful = (Placed(np.bool_) for _ in range(4))
+        self._free_m = Placed(np.float32)
         self._window, self._is_surprised, self._begun = WHOLE, False, False
         self._distance, self._foreground = np.zeros((0, 0), np.float32), np.zeros((0, 0), np.bool_)
 
@@ -91,12 +89,12 @@ class DepthTerm:
 
     def _place(self, seen: Visibility, doubtful: NDArray[np.bool_], free_m: NDArray[np.float32]) -> None:
         """Puts what the window shows where samples find it: into images (height + 2, width + 2)."""
-        lost, shape = seen.hole | seen.dropout, self._texels.shape
-        self._lost = self._images[0].put(self._window, lost, *shape).ravel()
-        self._doubtful = self._images[1].put(self._window, doubtful, *shape).ravel()
-        self._free_m = self._images[2].put(self._window, free_m, *shape)
-        self._covered = self._images[3].put(self._window, seen.foreground, *shape).ravel()
-        self._outside = self._images[4].put(self._window, seen.beyond, *shape).ravel()
+        window, shape = self._window, self._texels.shape
+        self._lost.put(window, seen.hole | seen.dropout, *shape)
+        self._covered.put(window, seen.foreground, *shape)
+        self._outside.put(window, seen.beyond, *shape)
+        self._doubtful.put(window, doubtful, *shape)
+        self._free_m.put(window, free_m, *shape)
 
     def foreground(self) -> NDArray[np.float64]:
         """Points (k, 3) [m] of occluders."""
@@ -158,12 +156,12 @@ class DepthTerm:
         The cost d / s of a sample that is d from the object is replaced by a square of the same slope, ½ d² / (s d₀).
         """
         pixel = seen.pixel[0]
-        away = self._free_m.ravel()[pixel].astype(np.float64)
+        away = self._free_m.at(pixel).astype(np.float64)
         out = (pixel > 0) & (away > 0)
         if not out.any():
             return PointLinearization.empty(samples)
         vertices = self._view.spread(surface, surface.vertices[0].T)
-        distances = np.ascontiguousarray(self._free_m[1:-1, 1:-1, None])
+        distances = np.ascontiguousarray(self._free_m.inside[..., None])
         weight = 1 / np.sqrt(FREE_SCALE_M * np.maximum(away[out], MIN_FREE_M))
         rows = color_rows(distances, self._view.camera, vertices[out])[:, 0] * weight[:, None]
         return PointLinearization(away[out] * weight, rows, np.flatnonzero(out), samples, vertices)
@@ -172,9 +170,9 @@ class DepthTerm:
         """Agreement of the sensor with a population of one."""
         seen = self._view.synthesize(surface)
         residual, _, cost = self._residuals(seen)
-        measured, pixel = cost < np.inf, np.where(self._outside[seen.pixel[0]], 0, seen.pixel[0])
-        free = (self._free_m.ravel()[pixel] > 0) & (pixel > 0)
-        missing, hidden, unjudged = self._lost[pixel], self._covered[pixel], self._doubtful[pixel]
+        measured, pixel = cost < np.inf, np.where(self._outside.at(seen.pixel[0]), 0, seen.pixel[0])
+        free = (self._free_m.at(pixel) > 0) & (pixel > 0)
+        missing, hidden, unjudged = (image.at(pixel) for image in (self._lost, self._covered, self._doubtful))
         masks = VertexMasks.of(pixel, facing(self._view, surface), missing, hidden, unjudged)
         mean = -float(self._measured_cost(surface, seen)[0]) / residual.size
         size = np.where(free, np.inf, np.abs(residual))
@@ -204,8 +202,9 @@ class DepthTerm:
         pixel = np.maximum(seen.pixel[0], 0)
         deviation = 1 / np.maximum(inverse, 1e-9)
         signed = np.clip(residual * deviation, -LARGEST_MISFIT_M, LARGEST_MISFIT_M)
-        free = self._free_m.ravel()[pixel].astype(np.float64)
-        usable = (seen.pixel[0] > 0) & ~(self._lost[pixel] | self._covered[pixel] | self._doubtful[pixel])
+        free = self._free_m.at(pixel).astype(np.float64)
+        unknown = self._lost.at(pixel) | self._covered.at(pixel) | self._doubtful.at(pixel)
+        usable = (seen.pixel[0] > 0) & ~unknown
         measured = cost < np.inf
         return np.stack([np.where(measured, signed, free), np.where(measured, deviation, 0.0)]) * usable
 
