@@ -1,7 +1,7 @@
 """FlexPad: a sheet that bends along four directions through its centre, each side separately (Steimle, Jordt, Maes)."""
 
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from annotated_types import Gt, Interval
@@ -145,13 +145,9 @@ class FlexPad:
         """Deforms the mesh with every row of `thetas` (population, 15)."""
         shape = len(thetas), 3, self._points.shape[1]
         vertices, normals = np.empty(shape, np.float32), np.empty(shape, np.float32)
-        self._deform(thetas, *self._arguments, vertices, normals)
+        sheet = self._pose, self._per_bend, self._half, self._padded
+        self._deform(thetas, *sheet, self._series.coefficients, self._series.scale, vertices, normals)
         return Surface(vertices, normals)
-
-    @property
-    def _arguments(self) -> tuple[Any, ...]:
-        series = self._series
-        return self._pose, self._per_bend, self._half, self._padded, series.coefficients, series.scale
 
     def sparse_jacobian(self, theta: NDArray[np.float64]) -> SparseJacobian:
         """Jacobian of the vertices with respect to theta, at theta (15,): one group; zero for clamped parameters."""

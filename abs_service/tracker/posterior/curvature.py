@@ -74,16 +74,23 @@ def whitened(curvature: NDArray[np.float64], right: NDArray[np.float64]) -> NDAr
     Raises:
         LinAlgError: the curvature is not positive definite.
     """
-    factor, is_indefinite = scipy.linalg.lapack.dpotrf(curvature, lower=True)
-    if is_indefinite:
-        raise np.linalg.LinAlgError(NOT_POSITIVE)
-    return np.asarray(scipy.linalg.blas.dtrsm(1.0, factor, right, lower=True), np.float64)
+    return np.asarray(scipy.linalg.blas.dtrsm(1.0, _cholesky(curvature), right, lower=True), np.float64)
 
 
 def posterior_covariance(quadratic: Quadratic) -> NDArray[np.float64]:
-    """Covariance (dim, dim) of Θ given the measurements: the inverse of the curvature at the estimate (Laplace)."""
-    factor, is_indefinite = scipy.linalg.lapack.dpotrf(quadratic.curvature, lower=True)
-    if is_indefinite:
-        raise np.linalg.LinAlgError(NOT_POSITIVE)
+    """Covariance (dim, dim) of Θ given the measurements: the inverse of the curvature at the estimate (Laplace).
+
+    Raises:
+        LinAlgError: the curvature is not positive definite.
+    """
+    factor = _cholesky(quadratic.curvature)
     lower = scipy.linalg.lapack.dpotri(factor, lower=True)[0]  # half the time of a general inverse
     return np.asarray(lower + np.tril(lower, -1).T, np.float64)
+
+
+def _cholesky(curvature: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Lower Cholesky factor (dim, dim), see `whitened`."""
+    factor, is_indefinite = scipy.linalg.lapack.dpotrf(curvature, lower=True)
+    if is_indefinite:
+        raise np.linalg.LinAlgError(NOT_POSITIVE)
+    return factor

@@ -44,7 +44,7 @@ class FramePosterior:
 
     def linearize(self, theta: NDArray[np.float64]) -> LinearizedCost:
         """The cost near theta (dim,)."""
-        surface, sparse_jacobian = self.surfaces.deform(theta[None]), self.surfaces.sparse_jacobian(theta)
+        surface, sparse_jacobian = self.surfaces.with_jacobian(theta)
         terms = self.objective.linearize(surface, sparse_jacobian)
         sensed = [source for term in terms for source in term.sources()]
         priors = self._priors(surface, sparse_jacobian, theta)
@@ -59,16 +59,16 @@ class FramePosterior:
 
     def prior(self, theta: NDArray[np.float64]) -> Quadratic:
         """Gauss–Newton approximation of the priors alone near theta (dim,)."""
-        surface, sparse_jacobian = self.surfaces.deform(theta[None]), self.surfaces.sparse_jacobian(theta)
+        surface, sparse_jacobian = self.surfaces.with_jacobian(theta)
         return self._priors(surface, sparse_jacobian, theta)
 
     def cross_curvature(self, theta: NDArray[np.float64], offsets: NDArray[np.float64]) -> NDArray[np.float64]:
         """JᵀJE (dim, n) at theta (dim,): derivatives with respect to theta, and to an offset (n, 3) [m] per vertex."""
-        surface, each = self.surfaces.deform(theta[None]), np.arange(len(offsets))
+        (surface, sparse_jacobian), each = self.surfaces.with_jacobian(theta), np.arange(len(offsets))
         single = SparseJacobian(
             np.ascontiguousarray(offsets[:, :, None]), each.astype(np.int32), each[:, None], len(each)
         )
-        by_theta = self.objective.linearize(surface, self.surfaces.sparse_jacobian(theta))
+        by_theta = self.objective.linearize(surface, sparse_jacobian)
         by_offset = self.objective.linearize(surface, single)
         pairs = zip(by_offset, by_theta)
         return np.sum([one.transposed_times(other.jacobian, len(each)) for one, other in pairs], axis=0).T

@@ -20,8 +20,7 @@ def search_start(frame: FramePosterior, patches: Patches) -> tuple[FramePosterio
         patches: of the vertices, whose appearance is looked for.
     """
     predicted = frame.motion.theta
-    surface, sparse_jacobian = frame.surfaces.deform(predicted[None]), frame.surfaces.sparse_jacobian(predicted)
-    places = frame.objective.match(surface, sparse_jacobian, patches)
+    places = frame.objective.match(*frame.surfaces.with_jacobian(predicted), patches)
     if not is_beside(places):
         return frame, predicted
     matched, wider = predicted, frame

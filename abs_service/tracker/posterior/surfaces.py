@@ -29,6 +29,10 @@ class FrameSurfaces:
             self._known[key] = self._model.deform(thetas)
         return self._known[key]
 
+    def with_jacobian(self, theta: NDArray[np.float64]) -> tuple[Surface, SparseJacobian]:
+        """The mesh deformed with theta (dim,), a population of one, and the derivatives of its vertices."""
+        return self.deform(theta[None]), self.sparse_jacobian(theta)
+
     def sparse_jacobian(self, theta: NDArray[np.float64]) -> SparseJacobian:
         """Derivatives of the vertices with respect to theta (dim,)."""
         key = theta.tobytes()

@@ -53,12 +53,9 @@ class Patches:
         """Vertices and normals for every row of `thetas` (population, 3 · control points) [m]."""
         shape = len(thetas), 3, self._vertices.shape[1] - LANES
         surface = Surface(np.empty(shape, np.float32), np.empty(shape, np.float32))
-        self._deform(thetas, *self._arguments, surface.vertices, surface.normals)
+        spans = self._control, self._powers, self._start
+        self._deform(thetas, *spans, self._vertices, surface.vertices, surface.normals)
         return surface
-
-    @property
-    def _arguments(self) -> tuple[NDArray[np.generic], ...]:
-        return self._control, self._powers, self._start, self._vertices
 
     def set_offsets(self, offset: NDArray[np.float64]) -> None:
         """Replaces the vertex offsets (n,) [m]."""

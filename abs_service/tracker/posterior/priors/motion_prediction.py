@@ -38,7 +38,7 @@ class MotionPrediction:
     @property
     def reach_m(self) -> float:
         """Radius around the predicted surface within which the surface is searched [m]."""
-        return np.inf if self.is_first else FARTHEST * self.settings.speed * self.elapsed_s
+        return np.inf if self.is_first else FARTHEST * self._widest_m
 
     @property
     def precision(self) -> NDArray[np.float64]:
@@ -48,12 +48,11 @@ class MotionPrediction:
     @property
     def minimum_precision(self) -> NDArray[np.float64]:
         """Inverse covariance (dim, dim) of the widest prior, that of an object whose motion is unknown."""
-        return self.metric.matrix / (self.settings.speed * self.elapsed_s) ** 2
+        return self.metric.matrix / self._widest_m**2
 
     def exchanged(self, share: float) -> NDArray[np.float64]:
         """A share of the widest prior's precision in place of this one's: their difference (dim, dim)."""
-        widest = share / (self.settings.speed * self.elapsed_s) ** 2
-        return self.metric.matrix * (widest - 1 / self._deviation_m**2)
+        return self.metric.matrix * (share / self._widest_m**2 - 1 / self._deviation_m**2)
 
     @property
     def persistence(self) -> float:
@@ -63,6 +62,10 @@ class MotionPrediction:
     @property
     def _deviation_m(self) -> float:
         return self.speed * self.elapsed_s
+
+    @property
+    def _widest_m(self) -> float:
+        return self.settings.speed * self.elapsed_s
 
     def innovation(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         """Difference (dim,) of theta (dim,) and the prediction, as a rate of change of the surface [m/s]."""
