@@ -69,23 +69,31 @@ def look_up(
         gradients[k, 1] = (1 - f) * (c - a) + f * (d - b)
 
 
-@kernel
 def read(
-    image: NDArray[np.float32],
-    corner: NDArray[np.float32],
-    places: NDArray[np.float64],
-    last: NDArray[np.float64],
-    values: NDArray[np.float64],
-) -> None:
+    image: NDArray[np.float32], corner: NDArray[np.float32], places: NDArray[np.float64], last: tuple[int, int]
+) -> NDArray[np.float64]:
     """Values (n,) of the pixels of a part of an image at places (n, 2); −∞ beside the part, NaN beside the image.
 
     Args:
         image: the part (rows, columns).
         corner: column and row of its first pixel (2,).
         places: columns and rows; NaN is beside the image.
-        last: column and row (2,) at which the image ends.
-        values: results.
+        last: column and row at which the image ends.
     """
+    values = np.empty(len(places))
+    _read(image, corner, places, np.array(last, np.float64), values)
+    return values
+
+
+@kernel
+def _read(
+    image: NDArray[np.float32],
+    corner: NDArray[np.float32],
+    places: NDArray[np.float64],
+    last: NDArray[np.float64],
+    values: NDArray[np.float64],
+) -> None:
+    """See `read`."""
     for k in range(places.shape[0]):
         u, v = places[k, 0], places[k, 1]
         if not (u >= 0 and v >= 0 and u < last[0] and v < last[1]):
@@ -100,9 +108,8 @@ def is_behind(
     camera: Camera, points: NDArray[np.float64], surface: NDArray[np.float32], window: Window
 ) -> NDArray[np.bool_]:
     """True for points (k, 3) [m] that a surface hides, whose distances in a window are known (rows, columns) [m]."""
-    in_front, last = np.empty(len(points)), np.array([camera.width, camera.height], np.float64)
     first = np.array(corner(window)[::-1], np.float32)
-    read(surface, first, project_with_jacobian(camera, points)[0], last, in_front)
+    in_front = read(surface, first, project_with_jacobian(camera, points)[0], (camera.width, camera.height))
     behind = in_front < np.linalg.norm(points - camera.center, axis=1) - HIDDEN_BEHIND_M
     return behind & (in_front > -np.inf)
 

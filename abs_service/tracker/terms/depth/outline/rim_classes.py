@@ -154,9 +154,8 @@ def _leaves(camera: Camera, points: NDArray[np.float64], distance: NDArray[np.fl
 
     The median of neighbours is not moved by the noise of the single edges, which extrapolation makes larger.
     """
-    measured, last = np.empty(len(points)), np.array(distance.shape[::-1], np.float64) - 1
-    places = camera.project(points)
-    read(distance, np.zeros(2, np.float32), places, last, measured)
+    (height, width), places = distance.shape, camera.project(points)
+    measured = read(distance, np.zeros(2, np.float32), places, (width - 1, height - 1))
     off = measured - np.linalg.norm(points - camera.center, axis=1)
     known = np.isfinite(off)
     apart = np.linalg.norm(places[:, None] - places[known], axis=2)

@@ -180,9 +180,7 @@ class RimOutline:
 
     def _inside(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
         """`_inside_at` of points at places in the image (k, 2) [px]."""
-        away, last = np.empty(len(places)), np.array([self._camera.width, self._camera.height], np.float64)
-        read(self._inwards, self._corner, places, last, away)
-        return away
+        return read(self._inwards, self._corner, places, (self._camera.width, self._camera.height))
 
     def _points(self, surface: Surface) -> NDArray[np.float32]:
         """Extrapolated rim (1, 3, k) [m]."""

@@ -37,9 +37,7 @@ def is_round(
         return False
     places, by_place = project_with_jacobian(camera, points)
     down, right = np.gradient(cv2.GaussianBlur(inwards, (0, 0), SMOOTH_PX))
-    slopes, last = np.empty((2, len(points))), np.array([camera.width, camera.height], np.float64)
-    for image, along in zip((right, down), slopes):
-        read(image, corner, places, last, along)
+    slopes = np.stack([read(image, corner, places, (camera.width, camera.height)) for image in (right, down)])
     known = np.isfinite(slopes).all(axis=0)
     normals = slopes[:, known].T / np.maximum(np.linalg.norm(slopes[:, known], axis=0), np.finfo(float).tiny)[:, None]
     cosine = np.vecdot(normals, _turn(points, by_place)[known])

@@ -35,8 +35,8 @@ def test_places_read_their_pixel_of_a_part_of_an_image(seed: int):
     image = generator.normal(size=(12, 15)).astype(np.float32)
     (top, left), places = generator.integers(0, 5, 2), generator.uniform(-2, 17, (40, 2))
     places[generator.random(40) < 0.1] = np.nan
-    part, values = image[top : top + 6, left : left + 7], np.empty(40)
-    read(part, np.array([left, top], np.float32), places, np.array([15.0, 12.0]), values)
+    part = image[top : top + 6, left : left + 7]
+    values = read(part, np.array([left, top], np.float32), places, (15, 12))
     for (u, v), value in zip(places, values, strict=True):
         row, column = np.floor(v + 0.5), np.floor(u + 0.5)
         if not (0 <= u < 15 and 0 <= v < 12):
