@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 Grid = NDArray[np.float64]
 
 #: Longest interval over which ground truth is interpolated linearly [ns].
-MAXIMUM_INTERPOLATION_NS = 250_000_000
+MAX_INTERPOLATION_NS = 250_000_000
 #: Step below which the closest-point search has converged [grid cells]; about 0.01 mm on a sheet.
 TOLERANCE = 1e-3
 #: Ground truths kept until their estimates arrive.
-MAXIMUM_TRUTHS = 256
+MAX_TRUTHS = 256
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +53,7 @@ class TruthComparison:
     def add_truth(self, t_host_ns: int, points_r: NDArray[np.floating], surface: int = 0) -> None:
         """Takes the true positions (rows, columns, 3) [m] of a surface's material points at `t_host_ns`."""
         self._truths.setdefault(t_host_ns, {})[surface] = np.asarray(points_r, np.float64)
-        while len(self._truths) > MAXIMUM_TRUTHS:
+        while len(self._truths) > MAX_TRUTHS:
             self._truths.popitem(last=False)
 
     def compare(self, t_host_ns: int, vertices: NDArray[np.floating]) -> Errors | None:
@@ -83,7 +83,7 @@ class TruthComparison:
             return self._truths[t_host_ns]
         before = max((t for t in self._truths if t < t_host_ns), default=None)
         after = min((t for t in self._truths if t > t_host_ns), default=None)
-        if before is None or after is None or after - before > MAXIMUM_INTERPOLATION_NS:
+        if before is None or after is None or after - before > MAX_INTERPOLATION_NS:
             return {}
         share = (t_host_ns - before) / (after - before)
         one, other = self._truths[before], self._truths[after]

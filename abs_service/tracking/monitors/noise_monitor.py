@@ -11,10 +11,10 @@ from abs_service.tracker.estimate import Estimate
 WINDOW_NS = 1_000_000_000
 
 #: With fewer inliers the residuals are not due to noise: the object is lost, occluded, or deforms beyond its model.
-MINIMUM_INLIER_SHARE = 0.6
+MIN_INLIER_SHARE = 0.6
 
 #: A window with fewer residuals is ignored.
-MINIMUM_RESIDUALS = 200
+MIN_RESIDUALS = 200
 
 #: The variance of residuals over deviations is 1 if the noise model is right. A warning begins outside the wider limits
 #: and ends within the narrower ones, a hysteresis.
@@ -45,11 +45,11 @@ class NoiseMonitor:
 
     def add(self, estimate: Estimate) -> None:
         """Adds an estimate's residuals, if its inlier share is sufficient."""
-        if estimate.inlier_share < MINIMUM_INLIER_SHARE:
+        if estimate.inlier_share < MIN_INLIER_SHARE:
             return
         if not 0 <= estimate.t_host_ns - self._begin_ns < WINDOW_NS:
             for sensor, total in self._sums.items():
-                if total.number >= MINIMUM_RESIDUALS:
+                if total.number >= MIN_RESIDUALS:
                     self._check(sensor, total.squares / total.number)
             self._begin_ns = estimate.t_host_ns
             self._sums = {}

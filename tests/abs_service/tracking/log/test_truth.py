@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from abs_service.tracking.log.truth import MAXIMUM_INTERPOLATION_NS, MAXIMUM_TRUTHS, TruthComparison, closest_points
+from abs_service.tracking.log.truth import MAX_INTERPOLATION_NS, MAX_TRUTHS, TruthComparison, closest_points
 
 
 def grid(rows=21, columns=31, bend=0.0):
@@ -82,10 +82,10 @@ def test_the_truth_of_the_mesh_may_come_after_the_mesh():
 
 def test_if_the_truth_of_the_mesh_was_lost_the_surface_was_where_it_passed_between_its_neighbours():
     result = TruthComparison()
-    result.add_topology(inner() + np.array((0.002, 0, 0)), MAXIMUM_INTERPOLATION_NS // 2)
+    result.add_topology(inner() + np.array((0.002, 0, 0)), MAX_INTERPOLATION_NS // 2)
     result.add_truth(0, grid())
     assert result.compare(0, inner()) is None
-    result.add_truth(MAXIMUM_INTERPOLATION_NS, grid() + np.array((0.004, 0, 0)))
+    result.add_truth(MAX_INTERPOLATION_NS, grid() + np.array((0.004, 0, 0)))
     errors = result.compare(0, inner() + np.array((0.003, 0, 0)))
     assert errors is not None
     assert errors.vertex_mm == pytest.approx(3)
@@ -95,7 +95,7 @@ def test_truths_too_far_apart_say_nothing_of_the_time_between():
     result = TruthComparison()
     result.add_topology(inner(), 1)
     result.add_truth(0, grid())
-    result.add_truth(MAXIMUM_INTERPOLATION_NS + 1, grid())
+    result.add_truth(MAX_INTERPOLATION_NS + 1, grid())
     assert result.compare(0, inner()) is None
 
 
@@ -131,7 +131,7 @@ def test_a_new_mesh_takes_the_place_of_the_old_one():
 def test_old_truths_are_forgotten_but_not_where_the_mesh_came_from():
     result = comparison(grid())
     assert result.compare(1, inner()) is not None
-    for t_ns in range(2, MAXIMUM_TRUTHS + 10):
+    for t_ns in range(2, MAX_TRUTHS + 10):
         result.add_truth(t_ns, grid())
     assert result.compare(1, inner()) is None
-    assert result.compare(MAXIMUM_TRUTHS + 9, inner()) is not None
+    assert result.compare(MAX_TRUTHS + 9, inner()) is not None

@@ -11,7 +11,7 @@ from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.tracker.objectives import euclidean
 from abs_service.tracker.optimizers import cma
 from abs_service.tracker.terms.sensor_fit import SensorFit
-from abs_service.tracking.monitors.noise_monitor import MINIMUM_INLIER_SHARE, MINIMUM_RESIDUALS, WINDOW_NS, NoiseMonitor
+from abs_service.tracking.monitors.noise_monitor import MIN_INLIER_SHARE, MIN_RESIDUALS, WINDOW_NS, NoiseMonitor
 from abs_service.tracking.session import TrackingSession
 from tests.abs_service.bus.loopback import LoopbackBus
 from tests.abs_service.tracking.driving import default_plan, drive, rig_of, simulate
@@ -97,15 +97,15 @@ def test_a_few_frames_are_no_evidence():
 
 
 def test_a_few_residuals_are_no_evidence():
-    said = MonitorBench().see(inliers=MINIMUM_RESIDUALS // 40, tof=9.0)
+    said = MonitorBench().see(inliers=MIN_RESIDUALS // 40, tof=9.0)
     assert said.level == OK
     assert not said.gauges
 
 
 def test_estimates_with_few_inliers_are_ignored():
     bench = MonitorBench()
-    assert bench.see(share=MINIMUM_INLIER_SHARE - 0.05, tof=9.0).level == OK
-    assert bench.see(share=MINIMUM_INLIER_SHARE + 0.05, tof=9.0).level == WARNING
+    assert bench.see(share=MIN_INLIER_SHARE - 0.05, tof=9.0).level == OK
+    assert bench.see(share=MIN_INLIER_SHARE + 0.05, tof=9.0).level == WARNING
 
 
 def test_time_that_goes_back_begins_a_new_window():
