@@ -25,8 +25,8 @@ def make_head(name: str, scene: Scene, settings: Settings, lens: LensModel) -> H
     """
     rate_hz, noise = settings.rate, settings.noise
     if name in BEAMS:
-        beam, usual = BEAMS[name], BarrierNoise()
-        wrong = BarrierNoise(noise * usual.miss, noise * usual.false_alarm)
+        beam, typical = BEAMS[name], BarrierNoise()
+        wrong = BarrierNoise(noise * typical.miss, noise * typical.false_alarm)
         return Barrier(name, beam.camera, beam.length_m, rate_hz, wrong)
     optics = OPTICS[name]
     camera = optics.camera(*settings.sizes.get(name, (optics.width, optics.height)), lens)
@@ -51,15 +51,15 @@ def _picture(camera: Camera, scene: Scene, settings: Settings) -> Picture:
 
 
 def _time_of_flight_noise(settings: Settings) -> TimeOfFlightNoise:
-    usual, factor = TimeOfFlightNoise(), settings.noise
+    typical, factor = TimeOfFlightNoise(), settings.noise
     return replace(
-        usual,
+        typical,
         mu_offset=settings.offset,
         mu_wiggle=settings.wiggle,
         mu_amplitude=settings.dark,
         pattern=settings.pattern,
-        sigma_offset=factor * usual.sigma_offset,
-        sigma_distance=factor * usual.sigma_distance,
-        sigma_amplitude=factor * usual.sigma_amplitude,
-        amplitude=factor * usual.amplitude,
+        sigma_offset=factor * typical.sigma_offset,
+        sigma_distance=factor * typical.sigma_distance,
+        sigma_amplitude=factor * typical.sigma_amplitude,
+        amplitude=factor * typical.amplitude,
     )
