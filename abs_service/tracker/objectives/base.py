@@ -11,7 +11,7 @@ from abs_service.pairing.observation import Observation
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.terms.base import Term
-from abs_service.tracker.terms.linearization import Linear, PointLinearization
+from abs_service.tracker.terms.linearization import Part, PointLinearization
 from abs_service.tracker.terms.patches import Patches
 from abs_service.tracker.terms.sensor_fit import SensorFit
 
@@ -37,8 +37,8 @@ class ObservedObjective(Protocol):
         """Cost (population,) of every deformed mesh; lower explains the measurements better."""
         ...
 
-    def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> list[Linear]:
-        """Normalised residuals of a population of one, and their derivatives."""
+    def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> list[Part]:
+        """Normalised residuals of a population of one, and their derivatives, see `Term.linearize`."""
         ...
 
     def fits(self, surface: Surface) -> list[SensorFit]:
@@ -97,9 +97,9 @@ class ObservedTerms:
             return np.zeros(len(surface.vertices))
         return reduce(np.add, (term.cost(surface) for term in self._terms))
 
-    def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> list[Linear]:
+    def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> list[Part]:
         """Normalised residuals of all sensors and their derivatives."""
-        return [term.linearize(surface, sparse_jacobian) for term in self._terms]
+        return [part for term in self._terms for part in term.linearize(surface, sparse_jacobian)]
 
     def fits(self, surface: Surface) -> list[SensorFit]:
         """Agreement of every contributing sensor with a population of one."""

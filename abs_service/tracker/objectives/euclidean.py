@@ -15,7 +15,7 @@ from abs_service.tracker.models.base import ModelError, SparseJacobian, Surface
 from abs_service.tracker.objectives.base import ObservedTerms, TermSum
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.terms.base import Bounds, Term
-from abs_service.tracker.terms.linearization import Linear, PointLinearization
+from abs_service.tracker.terms.linearization import Part, PointLinearization
 from abs_service.tracker.terms.patches import Patches
 from abs_service.tracker.terms.sensor_fit import SensorFit
 from calib.no_return import NEVER
@@ -118,7 +118,7 @@ class ObservedSquares:
         """See `ObservedObjective`."""
         return self.terms.cost(surface)
 
-    def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> list[Linear]:
+    def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> list[Part]:
         """See `ObservedObjective`."""
         return self.terms.linearize(surface, sparse_jacobian)
 

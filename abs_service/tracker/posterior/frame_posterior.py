@@ -45,8 +45,7 @@ class FramePosterior:
     def linearize(self, theta: NDArray[np.float64]) -> LinearizedCost:
         """The cost near theta (dim,)."""
         surface, sparse_jacobian = self.surfaces.with_jacobian(theta)
-        terms = self.objective.linearize(surface, sparse_jacobian)
-        sensed = [source for term in terms for source in term.sources()]
+        sensed = self.objective.linearize(surface, sparse_jacobian)
         priors = self._priors(surface, sparse_jacobian, theta)
         quadratic = priors + gauss_newton(sensed, self.dimension)
         return LinearizedCost(theta, quadratic, priors.curvature, sensed, sparse_jacobian)

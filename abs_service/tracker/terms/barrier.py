@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from abs_service.pairing.images import BeamReading, Image
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.terms.base import Bounds
-from abs_service.tracker.terms.linearization import PointLinearization
+from abs_service.tracker.terms.linearization import Part, PointLinearization
 from abs_service.tracker.terms.patches import Patches
 from abs_service.tracker.terms.sensor_fit import SensorFit
 from calib.camera import Camera
@@ -45,9 +45,9 @@ class BarrierTerm:
         """−log P(reading | mesh crosses the beam or not), (population,)."""
         return self._costs[self._crossing(surface).astype(int)]
 
-    def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> PointLinearization:
+    def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> list[Part]:
         """No residuals: the cost is piecewise constant, its derivative zero."""
-        return PointLinearization.empty(sparse_jacobian)
+        return [PointLinearization.empty(sparse_jacobian)]
 
     def fit(self, surface: Surface) -> SensorFit:
         """Agreement of the single sample with a population of one."""

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from abs_service.pairing.images import Image
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import View
-from abs_service.tracker.terms.linearization import Linear, PointLinearization
+from abs_service.tracker.terms.linearization import Part, PointLinearization
 from abs_service.tracker.terms.patches import Patches
 from abs_service.tracker.terms.sensor_fit import SensorFit
 from calib.no_return import CAUTIOUS, NoReturn
@@ -76,8 +76,8 @@ class Term(Protocol):
         """Cost (population,) of every deformed mesh."""
         ...
 
-    def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> Linear:
-        """Normalised residuals of the inliers and their derivatives; arguments as in `Objective`."""
+    def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> list[Part]:
+        """Normalised residuals of the inliers and their derivatives, by the origin of their errors; always as many."""
         ...
 
     def fit(self, surface: Surface) -> SensorFit:

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,10 +29,6 @@ class Linearization:
     jacobian: NDArray[np.float64]
     places: NDArray[np.floating] = field(default_factory=lambda: np.zeros((0, 3)))
     shared: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
-
-    def sources(self) -> list["Part"]:
-        """A list of this linearisation alone."""
-        return [self]
 
     def moved(self, by: NDArray[np.float64]) -> "Linearization":
         """Linearisation with its residuals extrapolated to first order by a step (dim,) of theta."""
@@ -100,10 +95,6 @@ class PointLinearization:
         """Positions of the points that the residuals belong to (m, 3) [m]."""
         return self.positions[self.points]
 
-    def sources(self) -> list["Part"]:
-        """A list of this linearisation alone."""
-        return [self]
-
     def moved(self, by: NDArray[np.float64]) -> "PointLinearization":
         """Linearisation with its residuals extrapolated to first order by a step (dim,) of theta."""
         residual = np.empty_like(self.residual)
@@ -142,62 +133,7 @@ class PointLinearization:
         return self.sparse_jacobian.group, self.sparse_jacobian.parameters, self.sparse_jacobian.local
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Together:
-    """Concatenation of several linearisations."""
-
-    all: tuple[Linearization | PointLinearization, ...]
-    dimension: int
-
-    @property
-    def residual(self) -> NDArray[np.float64]:
-        """Concatenated residuals (m,)."""
-        return np.concatenate([part.residual for part in self.all])
-
-    @property
-    def jacobian(self) -> NDArray[np.float64]:
-        """Dense Jacobian (m, dim) with respect to theta, in the order of the residuals."""
-        return stack(self.all, self.dimension).jacobian
-
-    def transposed_times(self, values: NDArray[np.float64], dimension: int) -> NDArray[np.float64]:
-        """Jᵀ times values (m, k) of the residuals, in their order (dimension, k)."""
-        ends = np.cumsum([len(part.residual) for part in self.all])[:-1]
-        split_values = zip(self.all, np.split(values, ends))
-        return np.sum([part.transposed_times(own, dimension) for part, own in split_values], axis=0)
-
-    def sources(self) -> list["Part"]:
-        """The linearisations, whose residuals have errors of different origin."""
-        return list(self.all)
-
-
-class Linear(Protocol):
-    """Interface of a linearisation, independent of its storage."""
-
-    @property
-    def residual(self) -> NDArray[np.float64]:
-        """Normalised residuals (m,)."""
-        ...
-
-    @property
-    def jacobian(self) -> NDArray[np.float64]:
-        """Jacobian (m, dim or k) with respect to the parameters that the residuals depend on."""
-        ...
-
-    def transposed_times(self, values: NDArray[np.float64], dimension: int) -> NDArray[np.float64]:
-        """Jᵀ times values (m, k) of the residuals, in their order (dimension, k).
-
-        Args:
-            values: one row per residual (m, k).
-            dimension: number of parameters of the model.
-        """
-        ...
-
-    def sources(self) -> list["Part"]:
-        """The linearisations that this one consists of, by the origin of their errors; always as many."""
-        ...
-
-
-#: What linearisations of measurements consist of.
+#: Linearised residuals whose errors have one origin; those of a sensor are of one or several.
 Part = Linearization | PointLinearization
 
 
@@ -219,7 +155,7 @@ def add_squares(parts: Sequence[Part], weights: Sequence[NDArray[np.float64]], t
         chain_rule.add_squares(squares, samples.group, samples.parameters, samples.local, total)
 
 
-def stack(parts: Sequence[Linear | GroupedLinearization], dimension: int) -> Linearization:
+def stack(parts: Sequence[Part | GroupedLinearization], dimension: int) -> Linearization:
     """Vertically stacked residuals and Jacobians with respect to all parameters."""
     rows = (part.dense(dimension) if isinstance(part, GroupedLinearization) else part.jacobian for part in parts)
     return Linearization(

@@ -24,7 +24,7 @@ from abs_service.tracker.terms.depth.outline.base import NoOutline, Outline
 from abs_service.tracker.terms.depth.outline.continuation import Continuation, NoContinuation
 from abs_service.tracker.terms.depth.texels import Unusable, texels
 from abs_service.tracker.terms.gradients import color_rows, depth_rows
-from abs_service.tracker.terms.linearization import PointLinearization, Together
+from abs_service.tracker.terms.linearization import Part, PointLinearization
 from abs_service.tracker.terms.patches import Patches
 from abs_service.tracker.terms.sensor_fit import SensorFit, summarize
 from abs_service.tracker.terms.vertex_counts import VertexMasks
@@ -135,11 +135,11 @@ class DepthTerm:
         depth_cost(seen.pixel, seen.distance, missing, texture, self._bounds.inlier, self._bounds.outlier, out)
         return self._view.balance(out, surface, self._bounds.unseen)
 
-    def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> Together:
+    def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> list[Part]:
         """Normalised residuals of inliers and of samples in free space, and their derivatives with respect to Θ."""
         samples, seen = self._view.follow(surface, sparse_jacobian), self._view.synthesize(surface)
-        parts = (self._linearize_measured(surface, samples, seen), self._linearize_free(surface, samples, seen))
-        return Together((*parts, self._outline.linearize(surface, sparse_jacobian)), sparse_jacobian.dimension)
+        measured, free = (each(surface, samples, seen) for each in (self._linearize_measured, self._linearize_free))
+        return [measured, free, self._outline.linearize(surface, sparse_jacobian)]
 
     def _linearize_measured(self, surface: Surface, samples: SparseJacobian, seen: Synthesis) -> PointLinearization:
         residual, inverse_deviation, cost = self._residuals(seen)

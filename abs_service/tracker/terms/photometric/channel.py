@@ -13,7 +13,7 @@ from abs_service.tracker.synthesis.window import NOTHING_HAS, Bordered, corner
 from abs_service.tracker.terms.base import Bounds, facing
 from abs_service.tracker.terms.gradients import channel_gradients, shortened
 from abs_service.tracker.terms.image_noise import NORMAL_MEDIAN, noise_deviation
-from abs_service.tracker.terms.linearization import PointLinearization
+from abs_service.tracker.terms.linearization import Part, PointLinearization
 from abs_service.tracker.terms.patches import Patches
 from abs_service.tracker.terms.photometric.channel_cost import (
     CHANNEL,
@@ -122,7 +122,7 @@ class ChannelTerm:
         widening, bounds = self._widening, self._bounds
         return self._texture, widening.factor, widening.log, bounds.outlier, bounds.unseen
 
-    def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> PointLinearization:
+    def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> list[Part]:
         """Normalised residuals of the inliers and their derivatives with respect to theta.
 
         The derivative of the shading is neglected: it is small compared with that of the texture.
@@ -143,7 +143,7 @@ class ChannelTerm:
         rows = shortened(rows, float(noise))
         samples, points = self._view.follow(surface, sparse_jacobian), np.flatnonzero(use)
         bias = self._bias.derivatives(vertices, rows, points)
-        return PointLinearization(residual[use], rows, points, samples, vertices, bias)
+        return [PointLinearization(residual[use], rows, points, samples, vertices, bias)]
 
     def fit(self, surface: Surface) -> SensorFit:
         """Agreement of the sensor with a population of one."""

@@ -9,7 +9,7 @@ from abs_service.tracker.synthesis.base import Synthesis, Synthesizer
 from abs_service.tracker.synthesis.window import NOTHING_HAS, Bordered
 from abs_service.tracker.terms.base import Bounds, facing
 from abs_service.tracker.terms.gradients import noiseless_color_rows
-from abs_service.tracker.terms.linearization import PointLinearization
+from abs_service.tracker.terms.linearization import Part, PointLinearization
 from abs_service.tracker.terms.patches import Patches
 from abs_service.tracker.terms.photometric.illumination import Exposed
 from abs_service.tracker.terms.photometric.matching import matched
@@ -116,7 +116,7 @@ class ColorTerm:
     def _measured(self) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], float, float]:
         return self._texture, self._inverse, self._normalizer, self._bounds.outlier, self._bounds.unseen
 
-    def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> PointLinearization:
+    def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> list[Part]:
         """Normalised residuals of the inliers, three channels each, and their derivatives with respect to theta."""
         residual, measured = self._residuals(self._synthesize(surface))
         use = measured & (self._normalizer + 0.5 * np.sum(residual**2, axis=1) < self._bounds.outlier)
@@ -126,7 +126,7 @@ class ColorTerm:
         points = np.repeat(np.flatnonzero(use), residual.shape[1])
         samples = self._view.follow(surface, sparse_jacobian)
         bias = self._bias.derivatives(vertices, rows, points)
-        return PointLinearization(residual[use].ravel(), rows, points, samples, vertices, bias)
+        return [PointLinearization(residual[use].ravel(), rows, points, samples, vertices, bias)]
 
     def fit(self, surface: Surface) -> SensorFit:
         """Agreement of the sensor with a population of one."""

@@ -13,6 +13,7 @@ from abs_service.tracker.synthesis import dense, sparse, undistorted, warped
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.terms.base import Bounds
 from abs_service.tracker.terms.depth.depth import DepthTerm
+from abs_service.tracker.terms.linearization import stack
 from abs_service.tracker.terms.photometric.channel import ChannelTerm
 from abs_service.tracker.terms.photometric.color import ColorTerm
 from abs_service.tracker.terms.photometric.illumination import Active, Passive
@@ -56,7 +57,7 @@ def slope(term, model: Rigid, theta: np.ndarray, parameter: int, step: float) ->
     """Derivative of the cost with respect to a pose parameter, by finite differences and by linearisation."""
     offset = step * np.eye(6)[parameter]
     ahead, behind = term.cost(model.deform(np.stack([theta + offset, theta - offset])))
-    linear = term.linearize(model.deform(theta[None]), model.sparse_jacobian(theta))
+    linear = stack(term.linearize(model.deform(theta[None]), model.sparse_jacobian(theta)), 6)
     return (ahead - behind) / (2 * step), float(linear.jacobian[:, parameter] @ linear.residual)
 
 

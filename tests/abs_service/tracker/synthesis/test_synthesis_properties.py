@@ -10,6 +10,7 @@ from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.synthesis import dense, sparse, undistorted, warped
 from abs_service.tracker.terms.base import Bounds, Term
 from abs_service.tracker.terms.depth.depth import DepthTerm
+from abs_service.tracker.terms.linearization import stack
 from abs_service.tracker.terms.photometric.channel import ChannelTerm
 from abs_service.tracker.terms.photometric.color import ColorTerm
 from abs_service.tracker.terms.photometric.illumination import Passive
@@ -80,7 +81,7 @@ class Scene:
 
 def residuals(term: Term, scene: Scene) -> np.ndarray:
     """Normalised residuals of all measured samples, none of which is an outlier."""
-    found = term.linearize(scene.surface, Rigid(MESH).sparse_jacobian(np.zeros(6))).residual
+    found = stack(term.linearize(scene.surface, Rigid(MESH).sparse_jacobian(np.zeros(6))), 6).residual
     assert len(found) % term.fit(scene.surface).samples == 0  # a colour has three
     return found
 

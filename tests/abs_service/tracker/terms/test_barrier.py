@@ -120,7 +120,7 @@ def test_it_is_one_sample_that_agrees_or_not_and_has_no_slope():
         assert (fit.visible, fit.occluded, fit.samples, fit.inliers) == (1, 0, 1, int(interrupted))
         assert fit.mean_log_likelihood == pytest.approx(-NOISE.cost(interrupted)[1])
         assert np.isnan(fit.normalized_residual)
-    linear = barrier.linearize(surface, SparseJacobian.from_dense(np.zeros((30, 3, 6))))
+    (linear,) = barrier.linearize(surface, SparseJacobian.from_dense(np.zeros((30, 3, 6))))
     assert linear.jacobian.shape == (0, 6)
     assert barrier.foreground().shape == (0, 3)
 

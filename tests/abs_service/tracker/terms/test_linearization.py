@@ -46,7 +46,7 @@ def test_depth_rows_predict_what_the_plane_s_residuals_do():
     model, term = Rigid(MESH), depth_term()
     theta = np.array([0, 0, 0, 2e-3, -1e-3, 3e-3])
     there = model.deform(theta[None])
-    linear = term.linearize(there, model.sparse_jacobian(theta))
+    linear = stack(term.linearize(there, model.sparse_jacobian(theta)), 6)
     assert len(linear.residual) == len(MESH.vertices)
     for step in np.diag([0.02, 0.02, 0.1, 0.02, 0.04, 5e-3]):
         predicted = linear.jacobian @ step
@@ -58,7 +58,7 @@ def test_depth_rows_predict_what_the_plane_s_residuals_do():
 def test_depth_residuals_are_normalised_differences():
     model, term = Rigid(MESH), depth_term()
     nearer = np.array([0, 0, 0, 0, 0, -SIGMA])
-    linear = term.linearize(model.deform(nearer[None]), model.sparse_jacobian(nearer))
+    linear = stack(term.linearize(model.deform(nearer[None]), model.sparse_jacobian(nearer)), 6)
     sight = MESH.vertices / np.linalg.norm(MESH.vertices, axis=1, keepdims=True)
     gap = SIGMA * NORMAL[2] / (sight @ NORMAL)  # along the ray, from a plane moved by σ along z
     np.testing.assert_allclose(linear.residual, gap / SIGMA, atol=0.04)
@@ -135,7 +135,7 @@ def test_what_costs_less_than_an_outlier_is_linearized_whatever_the_objective(ob
         float(found.cost(as_surface((mesh.vertices * (1 - (0.01 * deviations + by) / along), mesh.normals)))[0])
         for by in (-1e-4, 1e-4)
     ]
-    (linear,) = found.linearize(nearer, SparseJacobian.from_dense((mesh.vertices / along)[:, :, None]))
+    linear = stack(found.linearize(nearer, SparseJacobian.from_dense((mesh.vertices / along)[:, :, None])), 1)
     gradient = -(linear.jacobian.T @ linear.residual)[0]
     np.testing.assert_allclose((costs[1] - costs[0]) / 2e-4, gradient, rtol=0.02, atol=20.0)
 
@@ -150,7 +150,7 @@ def test_only_inliers_and_what_is_in_free_space_are_linearized():
     distance[:240] += 1
     term = DepthTerm("tof", sparse(FINE, mesh), len(mesh.vertices), GaussianPolynomial(((SIGMA,),)), BOUNDS)
     term.observe(depth_image(distance), surface)
-    linear = term.linearize(surface, SparseJacobian.from_dense(np.zeros((len(mesh.vertices), 3, 2))))
+    linear = stack(term.linearize(surface, SparseJacobian.from_dense(np.zeros((len(mesh.vertices), 3, 2)))), 2)
     pixels = FINE.project(mesh.vertices) + 0.5
     inliers = np.count_nonzero((pixels[:, 0] >= 320) & (pixels[:, 1] >= 240))
     free = np.count_nonzero((pixels[:, 0] >= 320) & (pixels[:, 1] < 240))

@@ -43,7 +43,7 @@ def test_color_rows_predict_what_a_ramp_s_residuals_do():
     bounds = LIKELIHOOD.bounds(seen_by(noise))
     term = ColorTerm("color", sparse(COLOR, mesh), colors.astype(np.float32), noise, bounds)
     term.observe(ColorImage(ramp()), as_surface((mesh.vertices, mesh.normals)))
-    linear = term.linearize(model.deform(model.rest[None]), model.sparse_jacobian(model.rest))
+    (linear,) = term.linearize(model.deform(model.rest[None]), model.sparse_jacobian(model.rest))
     np.testing.assert_allclose(linear.residual, 0, atol=1e-6)
     for parameter, step in [(3, 0.02), (4, -0.02), (5, 0.1), (2, 0.15)]:
         theta = np.zeros(6)
@@ -92,7 +92,7 @@ def test_mosaic_rows_are_exact_within_a_pixel_whatever_the_picture(seed, order):
     level, right, down = generator.uniform((100, -0.1, -0.1), (150, 0.1, 0.1))
     picture = level + right * np.arange(COLOR.width) + down * np.arange(COLOR.height)[:, None]
     term.observe(ChannelImage(picture.astype(np.float32), BAYER_ORDERS[order]), model.deform(model.rest[None]))
-    linear = term.linearize(model.deform(model.rest[None]), model.sparse_jacobian(model.rest))
+    (linear,) = term.linearize(model.deform(model.rest[None]), model.sparse_jacobian(model.rest))
     assert len(linear.residual) == len(mesh.vertices)
     for step in np.diag([1e-4, 1e-4, 1e-4, 2e-5, 2e-5, 1e-4]):
         there, back = (model.deform((model.rest + part)[None]) for part in (step, -step))
@@ -113,7 +113,7 @@ def test_colours_are_read_alike_whatever_the_order_of_their_bytes():
         term = ColorTerm("color", sparse(COLOR, mesh), colors.astype(np.float32), noise, bounds)
         for _ in range(2):  # memory is reused
             term.observe(ColorImage(rgb), as_surface((mesh.vertices, mesh.normals)), 0.02)
-        found.append(term.linearize(model.deform(theta[None]), model.sparse_jacobian(theta)))
+        found += term.linearize(model.deform(theta[None]), model.sparse_jacobian(theta))
     np.testing.assert_array_equal(found[0].residual, found[1].residual)
     np.testing.assert_array_equal(found[0].jacobian, found[1].jacobian)
     assert found[0].residual.size > mesh.vertices.size / 2

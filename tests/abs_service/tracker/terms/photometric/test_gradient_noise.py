@@ -11,6 +11,7 @@ from abs_service.tracker.objectives import likelihood
 from abs_service.tracker.synthesis.sparse import Sparse
 from abs_service.tracker.terms.gradients import channel_gradients, color_rows, noiseless_color_rows
 from abs_service.tracker.terms.image_noise import NORMAL_MEDIAN, noise_deviation
+from abs_service.tracker.terms.linearization import PointLinearization
 from abs_service.tracker.terms.photometric.channel import ChannelTerm
 from abs_service.tracker.terms.photometric.illumination import Passive
 from abs_service.tracker.terms.photometric.vertex_values import at_vertices
@@ -102,7 +103,8 @@ def held(print_levels: float, noise: float) -> float:
     bounds = likelihood.Settings().bounds(rig.sensors[name])
     term, surface = ChannelTerm(name, synthesizer, looks, sensor, Passive(), bounds), model.deform(model.rest[None])
     term.observe(now, surface)
-    linear = term.linearize(surface, model.sparse_jacobian(model.rest))
+    (linear,) = term.linearize(surface, model.sparse_jacobian(model.rest))
+    assert isinstance(linear, PointLinearization)
     assert len(linear.residual) > 0.9 * len(model.mesh.vertices)
     return float(np.sqrt(np.mean(linear.rows**2)))
 

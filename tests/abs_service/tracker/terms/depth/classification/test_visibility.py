@@ -15,6 +15,7 @@ from abs_service.tracker.terms.base import Bounds
 from abs_service.tracker.terms.depth.classification.background import MIN_PIXELS, Background
 from abs_service.tracker.terms.depth.classification.visibility import classify, surfaces_of, where
 from abs_service.tracker.terms.depth.depth import FREE_SCALE_M, DepthTerm
+from abs_service.tracker.terms.linearization import stack
 from abs_service.tracker.terms.photometric.color import ColorTerm
 from abs_service.tracker.terms.photometric.shadow import Shadow
 from calib import pose
@@ -163,7 +164,7 @@ def test_the_search_is_told_the_way_back_from_free_space(x):
     term, model = term_before(board(STRAIGHT)), Rigid(MESH)
     theta = np.array([0, 0, 0, x, 0, 0])
     sparse_jacobian = model.sparse_jacobian(theta)
-    linear = term.linearize(model.deform(theta[None]), sparse_jacobian)
+    linear = stack(term.linearize(model.deform(theta[None]), sparse_jacobian), 6)
     ahead, behind = (
         np.mean([term.cost(moved(x + sign * step))[0] for step in np.linspace(0.008, 0.02, 9)]) for sign in (1, -1)
     )
@@ -174,7 +175,7 @@ def test_the_search_is_told_the_way_back_from_free_space(x):
     assert slope == pytest.approx(np.sign(x) * steps / FREE_SCALE_M, rel=0.25)
     assert (ahead - behind) / 0.028 * np.sign(x) > abs(slope)  # and more vertices leave the object
     within = as_surface((MESH.vertices * (0.9, 0.9, 1), MESH.normals))
-    assert term.linearize(within, sparse_jacobian).residual.size == term.fit(within).samples
+    assert stack(term.linearize(within, sparse_jacobian), 6).residual.size == term.fit(within).samples
 
 
 def test_an_occluder_that_a_depth_sensor_sees_hides_colours_from_another_camera():
