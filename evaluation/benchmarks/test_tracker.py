@@ -8,7 +8,7 @@ import pytest
 
 from abs_service.pairing.observation import Observation
 from abs_service.tracker.mesh import Mesh
-from abs_service.tracker.models.nurbs import Nurbs, Settings
+from abs_service.tracker.models.nurbs import Settings
 from abs_service.tracker.objectives.likelihood import Settings as Likelihood
 from abs_service.tracker.posterior.curvature import gauss_newton, search_metric
 from abs_service.tracker.posterior.priors.stretch_prior import StretchPrior
@@ -56,11 +56,15 @@ def test_per_frame_linearize(benchmark, observation):
     surface, sparse_jacobian = model.deform(thetas[:1]), model.sparse_jacobian(thetas[0])
     linearizations = benchmark(observed.linearize, surface, sparse_jacobian)
     assert [linear.jacobian.shape for linear in linearizations] == [(len(one.residual), 48) for one in linearizations]
-    assert len(linearizations) == len(RIG.sensors)
+    assert len(linearizations) >= len(RIG.sensors)  # that of a depth sensor has several parts
+
+
+def closed(model, theta):
+    return model.sparse_jacobian(theta).dense
 
 
 @pytest.mark.parametrize("size", [(17, 18), (32, 32)], ids=["306", "1024"])
-@pytest.mark.parametrize("derivatives", [Nurbs.jacobian, central_differences], ids=["closed", "differences"])
+@pytest.mark.parametrize("derivatives", [closed, central_differences])
 def test_per_frame_jacobian(benchmark, derivatives, size):
     model, thetas = model_and_thetas((4, 4), sheet(*size))
     assert benchmark(derivatives, model, thetas[0]).shape == (size[0] * size[1], 3, 48)
