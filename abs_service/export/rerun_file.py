@@ -1,5 +1,7 @@
 """A recording for the viewer Rerun: mesh, points, images, cameras and plots on one timeline; needs rerun-sdk."""
 
+import errno
+import os
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
@@ -26,6 +28,9 @@ TIMELINE = "time"
 
 JPEG_QUALITY = 90
 
+#: What Rerun writes last, and so what tells that it has written all: of a full disk it logs a line, and raises nothing.
+FOOTER, FOOTER_SIZE = b"RRF2FOOT", 12
+
 #: Colour and radius of measured points [px], which lie around the mesh and leave it in sight.
 POINT, POINT_PX = (110, 130, 170), 0.7
 
@@ -51,6 +56,7 @@ def write(
 
     Raises:
         RecordingError: a part of the recording is damaged.
+        OSError: the file cannot be written.
     """
     file = RerunFile(path, view_hz)
     written = 0
@@ -92,6 +98,7 @@ class RerunFile:
         self._stream = rr.RecordingStream("abs-service")
         self._stream.set_log_time_enabled(False)
         self._stream.set_log_tick_enabled(False)
+        self._path = path
         self._stream.save(path)
         self._view_hz = view_hz
         self._rates: dict[str, ViewRate] = {}
@@ -145,7 +152,11 @@ class RerunFile:
             self._plots.add(f"/{tracker}/{name}")
 
     def finish(self) -> None:
-        """Writes how it is shown, and what is left."""
+        """Writes how it is shown, and what is left.
+
+        Raises:
+            OSError: the file cannot be written.
+        """
         space = rrb.Spatial3DView(origin="/", contents=["+ /**", "- /images/**"], name="rig")
         images = [rrb.Spatial2DView(origin=name, name=name.removeprefix("/images/")) for name in sorted(self._images)]
         plots = [rrb.TimeSeriesView(origin=name, name=name[1:]) for name in sorted(self._plots)]
@@ -153,6 +164,10 @@ class RerunFile:
         columns += [rrb.Vertical(*views) for views in (images, plots) if views]
         self._stream.send_blueprint(rrb.Blueprint(rrb.Horizontal(*columns)))
         self._stream.disconnect()
+        with self._path.open("rb") as written:
+            written.seek(max(0, written.seek(0, os.SEEK_END) - FOOTER_SIZE))
+            if not written.read().startswith(FOOTER):
+                raise OSError(errno.EIO, "Rerun could not write all of it; is the disk full?")
 
     def _add_depth(self, name: str, frame: Frame, camera: Camera | None) -> None:
         try:

@@ -25,8 +25,11 @@ def private(path: str, flags: int) -> int:
 
 
 def open_for_writing(path: Path) -> BinaryIO:
-    """Creates a file that must not exist yet."""
-    return open(path, "xb", opener=private)
+    """Creates a file that must not exist yet.
+
+    Writes go to its end: after it was cut, others would leave a hole as long as what is missing.
+    """
+    return open(path, "xb", opener=lambda name, flags: private(name, flags | os.O_APPEND))
 
 
 class RecordingFile:
@@ -58,6 +61,7 @@ class RecordingFile:
         self._active = self.path.with_name(self.path.name + ACTIVE)
         self._whole = 0  # size of the finished file
         self._begun = 0  # size up to which the disk has been told to write
+        self._flushed = 0  # size at the last flush
         self._stream = open_file(self._active)
         try:
             fcntl.flock(self._stream.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -76,8 +80,10 @@ class RecordingFile:
 
     @property
     def fate(self) -> str:
-        """Change of the unfinished file from outside, "deleted" or "moved"; "" if it is in its place."""
+        """Change of the unfinished file from outside: "cut", "deleted" or "moved"; "" if it is in its place."""
         mine = os.fstat(self._stream.fileno())
+        if mine.st_size < self._flushed:
+            return "cut"
         if mine.st_nlink == 0:
             return "deleted"
         try:
@@ -101,6 +107,7 @@ class RecordingFile:
         """Flushes to the disk (fdatasync): what was written survives a kill and a power failure."""
         self._file.flush()
         os.fdatasync(self._stream.fileno())
+        self._flushed = max(self._flushed, self.size)
         self._let_go()
 
     def _let_go(self) -> None:
@@ -115,7 +122,12 @@ class RecordingFile:
         """Writes `summary` as metadata and the index, closes the file and gives it its final name, which it returns.
 
         Where it or its folder was moved, it gets that name there.
+
+        Raises:
+            OSError: the disk does not take it, or it was cut: what is left is to be recovered, and must not look whole.
         """
+        if self.fate == "cut":
+            raise OSError(f"{self.path.name} was cut while it was written")
         self._file.describe("abs.recording", summary)
         self._file.finish()
         os.fsync(self._stream.fileno())

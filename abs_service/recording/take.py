@@ -64,7 +64,7 @@ class Take:
 
     @property
     def fate(self) -> str:
-        """Change of an unfinished file from outside, "x.mcap was deleted" or "moved"; "" if all are in their places."""
+        """Change of an unfinished file from outside, "x.mcap was deleted", say; see `RecordingFile.fate`."""
         return next((f"{file.path.name} was {file.fate}" for file in (self._all, *self._estimates) if file.fate), "")
 
     def write(self, topic: str, message: str, payload: bytes, stamp_ns: int, seq: int) -> None:

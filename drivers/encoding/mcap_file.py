@@ -60,6 +60,9 @@ class McapFile:
         stream: binary stream opened for writing, at its beginning; closed by the caller.
         compression: of the chunks.
         chunk_size: uncompressed bytes per chunk.
+
+    Attributes:
+        failure: what the stream has failed with; "" if it has not.
     """
 
     def __init__(
@@ -69,7 +72,7 @@ class McapFile:
         self._writer = Writer(stream, chunk_size=chunk_size, compression=CompressionType[compression.name])
         self._schemas: dict[str, int] = {}
         self._channels: dict[str, tuple[str, int]] = {}
-        self._failure = ""
+        self.failure = ""
         self._writer.start(profile="", library="abs-service")
 
     def write(self, topic: str, schema_name: str, payload: bytes, log_time_ns: int, sequence: int) -> None:
@@ -113,12 +116,12 @@ class McapFile:
         self._attempt(self._stream.flush)
 
     def _attempt(self, action: Callable[[], None]) -> None:
-        if self._failure:
-            raise McapFileError(f"an earlier write failed ({self._failure}); start a new file")
+        if self.failure:
+            raise McapFileError(f"an earlier write failed ({self.failure}); start a new file")
         try:
             action()
         except OSError as error:
-            self._failure = str(error)
+            self.failure = str(error)
             raise
 
     def _channel(self, topic: str, schema_name: str) -> int:

@@ -32,6 +32,9 @@ def run(arguments: argparse.Namespace) -> int:
                 arguments.out.mkdir(parents=True, exist_ok=True)
             print(recover(path, arguments.out))
         except (RecoveryError, OSError) as error:
-            print(f"abs-service: error: {error}", file=sys.stderr)
+            reason = error
+            if isinstance(error, OSError):
+                reason = f"{error.filename or arguments.out or path.parent}: cannot be written: {error.strerror}"
+            print(f"abs-service: error: {reason}", file=sys.stderr)
             exit_code = Exit.USER
     return exit_code

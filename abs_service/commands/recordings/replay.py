@@ -172,14 +172,17 @@ def _writing(path: Path, toml: str) -> Iterator[McapFile]:
         stream = active.open("wb")
     except OSError as error:
         raise OptionError(f"--out {path}: cannot be written: {error.strerror}") from None
+    file = None
     try:
         with stream:
             file = McapFile(stream)
             file.attach("rig.toml", "text/toml", toml.encode(), 0)
             yield file
             file.finish()
-    except Exception:
+    except Exception as error:
         active.unlink()
+        if isinstance(error, OSError) and file is not None and file.failure:  # not of standard output
+            raise OptionError(f"--out {path}: cannot be written: {error.strerror}") from None
         raise
     os.replace(active, path)
 

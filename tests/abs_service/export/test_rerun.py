@@ -1,6 +1,8 @@
 """`abs-service export x.rrd`: read with Rerun's own reader, it has what was recorded."""
 
 import io
+import subprocess
+import sys
 from collections import defaultdict
 
 import numpy as np
@@ -91,3 +93,12 @@ def test_estimates_alone_have_no_images(tmp_path):
     found = export(write_without(tmp_path, "image"), tmp_path / "x.rrd")
     assert sorted(found["/sheet/mesh", "vertex_positions"]) == TIMES[1:]
     assert not [entity for entity, _ in found if entity.startswith("/images")]
+
+
+def test_a_disk_that_does_not_take_all_of_it_is_told_and_leaves_no_file(tmp_path):
+    recording = write_estimated(tmp_path / "x.mcap")
+    limit = f"ulimit -f 8; trap '' XFSZ; exec {sys.executable} -m abs_service export {recording} --out {tmp_path}/x.rrd"
+    ended = subprocess.run(["sh", "-c", limit], capture_output=True, text=True, timeout=60, check=False)
+    assert (ended.returncode, ended.stdout) == (Exit.USER, "")
+    assert f"error: {tmp_path}/x.rrd: Rerun could not write all of it; is the disk full?" in ended.stderr
+    assert not list(tmp_path.glob("*.rrd*"))

@@ -3,7 +3,6 @@
 import fcntl
 import os
 import random
-import stat
 
 import numpy as np
 import pytest
@@ -16,7 +15,6 @@ from mcap_protobuf.decoder import DecoderFactory
 
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.capture.mcap_writing import write_frame
-from abs_service.commands.recordings import recover as command
 from abs_service.recording.disk import file_bytes
 from abs_service.recording.recovery import RecoveryError, leftovers, recover, remove_interrupted
 from drivers.contract.frame import Frame, Geometry, Kind
@@ -211,32 +209,6 @@ def test_what_a_killed_recovery_left_is_removed_and_what_a_living_one_writes_is_
         fcntl.flock(writer, fcntl.LOCK_EX)
         remove_interrupted(tmp_path)
         assert sorted(path.name[:4] for path in tmp_path.iterdir()) == ["aliv", "pipe"]
-
-
-def test_results_go_to_another_folder_and_the_originals_stay(tmp_path, capsys):
-    import argparse
-
-    source = write(tmp_path / "a.mcap.active", finish=False)
-    parser = argparse.ArgumentParser()
-    command.add_arguments(parser)
-    assert command.run(parser.parse_args([str(source), "--out", str(tmp_path / "saved" / "here")])) == 0
-    assert source.exists()
-    target = tmp_path / "saved" / "here" / "a.mcap"
-    assert len(read(target)[0]) == 2 * FRAMES
-    assert stat.filemode(target.stat().st_mode) == "-rw-r-----"
-    assert [path.name for path in tmp_path.iterdir() if path.is_file()] == ["a.mcap.active"]
-
-
-def test_the_command_reports_each_file_and_continues_after_an_error(tmp_path, capsys):
-    import argparse
-
-    source = write(tmp_path / "a.mcap.active", finish=False)
-    parser = argparse.ArgumentParser()
-    command.add_arguments(parser)
-    assert command.run(parser.parse_args([str(tmp_path / "none"), str(source)])) == 2
-    output = capsys.readouterr()
-    assert "No such file" in output.err
-    assert "80 messages" in output.out
 
 
 def test_a_pipe_is_refused_instead_of_waited_for(tmp_path):

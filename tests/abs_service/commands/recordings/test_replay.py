@@ -186,6 +186,14 @@ def test_a_folder_that_is_not_there_is_named(recording, tmp_path, capsys):
     assert "cannot be written: No such file or directory" in capsys.readouterr().err
 
 
+def test_a_disk_that_is_full_is_told_with_the_file_and_leaves_none(recording, tmp_path, capsys):
+    out = tmp_path / "out.mcap"
+    out.with_name("out.mcap.active").symlink_to("/dev/full")
+    assert cli.main(["replay", str(recording), "--out", str(out)]) == Exit.USER
+    assert f"--out {out}: cannot be written: No space left on device" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_recording_without_configuration_needs_one(tmp_path, capsys):
     bare = write(tmp_path / "bare.mcap", toml="")
     assert cli.main(["replay", str(bare)]) == Exit.USER

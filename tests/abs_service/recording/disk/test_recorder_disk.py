@@ -1,11 +1,10 @@
 """The recorder with a disk that is slow, nearly full, full or missing."""
 
-import os.path
+import os
 import queue
 import stat
 import threading
 
-import pytest
 from absmsg.v1.health_pb2 import Health
 
 from abs_service.recording.recovery import recover
@@ -190,30 +189,6 @@ def test_a_disk_that_takes_no_beginning_of_a_file_is_not_littered(tmp_path):
     assert not list(tmp_path.iterdir())
     rig.recorder.report()
     assert rig.said.counters[f"dropped.{DEPTH}"] == 1
-
-
-@pytest.mark.parametrize("event", ["deleted", "moved"])
-def test_an_open_file_that_is_taken_away_is_noticed_and_another_one_begun(tmp_path, event):
-    folder, elsewhere = tmp_path / "kept", tmp_path / "elsewhere"
-    rig = Rig(folder, flush_s=0.005)
-    rig.recorder.start()
-    rig.publish_image(depth(1))
-    assert eventually(lambda: rig.written(1))
-    (active,) = folder.glob("*.active")
-    if event == "deleted":
-        active.unlink()
-    else:
-        folder.rename(elsewhere)
-    assert eventually(lambda: rig.recorder.failures == 1)
-    name = active.name.removesuffix(".active")
-    assert rig.said.labels["last_failure"] == f"{name} was {event} while it was written"
-    rig.publish_image(depth(2))
-    assert eventually(lambda: not rig.recorder.failed)
-    rig.recorder.stop(5)
-    assert sequences(folder) == [2]
-    if event == "moved":  # complete where it is now
-        assert metadata(elsewhere / name)["ended"] == "gone"
-        assert sequences(elsewhere) == [1]
 
 
 def test_what_the_disk_does_not_take_in_time_at_the_end_is_a_failure(tmp_path):

@@ -1,0 +1,40 @@
+"""`abs-service recover`: where the results go, and what it says."""
+
+import argparse
+import stat
+
+from abs_service.commands.recordings import recover as command
+from tests.abs_service.recording.test_recovery import FRAMES, read, write
+
+
+def test_results_go_to_another_folder_and_the_originals_stay(tmp_path, capsys):
+    source = write(tmp_path / "a.mcap.active", finish=False)
+    parser = argparse.ArgumentParser()
+    command.add_arguments(parser)
+    assert command.run(parser.parse_args([str(source), "--out", str(tmp_path / "saved" / "here")])) == 0
+    assert source.exists()
+    target = tmp_path / "saved" / "here" / "a.mcap"
+    assert len(read(target)[0]) == 2 * FRAMES
+    assert stat.filemode(target.stat().st_mode) == "-rw-r-----"
+    assert [path.name for path in tmp_path.iterdir() if path.is_file()] == ["a.mcap.active"]
+
+
+def test_the_command_reports_each_file_and_continues_after_an_error(tmp_path, capsys):
+    source = write(tmp_path / "a.mcap.active", finish=False)
+    parser = argparse.ArgumentParser()
+    command.add_arguments(parser)
+    assert command.run(parser.parse_args([str(tmp_path / "none"), str(source)])) == 2
+    output = capsys.readouterr()
+    assert "No such file" in output.err
+    assert "80 messages" in output.out
+
+
+def test_the_command_names_what_a_full_disk_does_not_take(tmp_path, capsys):
+    source, saved = write(tmp_path / "a.mcap"), tmp_path / "saved"
+    saved.mkdir()
+    (saved / "a.recovered.mcap.recovering").symlink_to("/dev/full")
+    parser = argparse.ArgumentParser()
+    command.add_arguments(parser)
+    assert command.run(parser.parse_args([str(source), "--out", str(saved)])) == 2
+    assert f"error: {saved}: cannot be written: No space left on device" in capsys.readouterr().err
+    assert not list(saved.iterdir())

@@ -1,0 +1,54 @@
+"""What others do to the file that is being written."""
+
+import os
+
+import pytest
+
+from drivers.encoding.mcap_file import Compression
+from tests.abs_service.recording.recorder_rig import Rig, depth, metadata, sequences
+from tests.waiting import eventually
+
+
+@pytest.mark.parametrize("event", ["deleted", "moved"])
+def test_an_open_file_that_is_taken_away_is_noticed_and_another_one_begun(tmp_path, event):
+    folder, elsewhere = tmp_path / "kept", tmp_path / "elsewhere"
+    rig = Rig(folder, flush_s=0.005)
+    rig.recorder.start()
+    rig.publish_image(depth(1))
+    assert eventually(lambda: rig.written(1))
+    (active,) = folder.glob("*.active")
+    if event == "deleted":
+        active.unlink()
+    else:
+        folder.rename(elsewhere)
+    assert eventually(lambda: rig.recorder.failures == 1)
+    name = active.name.removesuffix(".active")
+    assert rig.said.labels["last_failure"] == f"{name} was {event} while it was written"
+    rig.publish_image(depth(2))
+    assert eventually(lambda: not rig.recorder.failed)
+    rig.recorder.stop(5)
+    assert sequences(folder) == [2]
+    if event == "moved":  # complete where it is now
+        assert metadata(elsewhere / name)["ended"] == "gone"
+        assert sequences(elsewhere) == [1]
+
+
+@pytest.mark.parametrize("left", [0, 2000])
+def test_a_file_that_somebody_cuts_is_noticed_and_does_not_look_complete(tmp_path, left):
+    rig = Rig(tmp_path, compression=Compression.NONE, flush_s=0.005)
+    rig.recorder.start()
+    for seq in range(20):
+        rig.publish_image(depth(seq))
+    assert eventually(lambda: rig.written(20))
+    (active,) = tmp_path.glob("*.active")
+    assert eventually(lambda: active.stat().st_size > 20_000)
+    os.truncate(active, left)
+    rig.publish_image(depth(20))
+    assert eventually(lambda: rig.recorder.failures == 1)
+    name = active.name.removesuffix(".active")
+    assert rig.said.labels["last_failure"] == f"{name} was cut while it was written"
+    rig.publish_image(depth(21))
+    assert eventually(lambda: not rig.recorder.failed)
+    rig.recorder.stop(5)
+    assert active.exists()
+    assert sequences(tmp_path)[-1:] == [21]
