@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, cast
 
 from drivers.encoding.mcap_file import CHUNK_SIZE, Compression, McapFile
 
@@ -30,6 +30,22 @@ def open_for_writing(path: Path) -> BinaryIO:
     Writes go to its end: after it was cut, others would leave a hole as long as what is missing.
     """
     return open(path, "xb", opener=lambda name, flags: private(name, flags | os.O_APPEND))
+
+
+class _Counted:
+    """A stream that counts the bytes that it is given, since the size of the file may be another's doing."""
+
+    def __init__(self, stream: BinaryIO) -> None:
+        self._stream = stream
+        self.size = 0
+        self.fileno, self.flush, self.close = stream.fileno, stream.flush, stream.close
+
+    def write(self, data: bytes) -> int:
+        self.size += len(data)
+        return self._stream.write(data)
+
+    def tell(self) -> int:
+        return self.size
 
 
 class RecordingFile:
@@ -61,11 +77,10 @@ class RecordingFile:
         self._active = self.path.with_name(self.path.name + ACTIVE)
         self._whole = 0  # size of the finished file
         self._begun = 0  # size up to which the disk has been told to write
-        self._flushed = 0  # size at the last flush
-        self._stream = open_file(self._active)
+        self._stream = _Counted(open_file(self._active))
         try:
             fcntl.flock(self._stream.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
-            self._file = McapFile(self._stream, compression, chunk_size)
+            self._file = McapFile(cast(BinaryIO, self._stream), compression, chunk_size)
             for attachment, text in attachments.items():
                 self._file.attach(attachment, "text/toml", text.encode(), wall_ns)
             self.flush()
@@ -76,14 +91,12 @@ class RecordingFile:
     @property
     def size(self) -> int:
         """Bytes written so far, but for the open chunk; of a finished file, all."""
-        return self._whole or self._stream.tell()
+        return self._whole or self._stream.size
 
     @property
     def fate(self) -> str:
-        """Change of the unfinished file from outside: "cut", "deleted" or "moved"; "" if it is in its place."""
+        """Change of the unfinished file from outside, "deleted" or "moved"; "" if it is in its place."""
         mine = os.fstat(self._stream.fileno())
-        if mine.st_size < self._flushed:
-            return "cut"
         if mine.st_nlink == 0:
             return "deleted"
         try:
@@ -104,11 +117,19 @@ class RecordingFile:
         self._file.attach(name, media_type, text.encode(), stamp_ns)
 
     def flush(self) -> None:
-        """Flushes to the disk (fdatasync): what was written survives a kill and a power failure."""
+        """Flushes to the disk (fdatasync): what was written survives a kill and a power failure.
+
+        Raises:
+            OSError: the disk does not take it, or another program has cut the file or added to it.
+        """
         self._file.flush()
         os.fdatasync(self._stream.fileno())
-        self._flushed = max(self._flushed, self.size)
+        self._check_size()
         self._let_go()
+
+    def _check_size(self) -> None:
+        if os.fstat(self._stream.fileno()).st_size != self._stream.size:
+            raise OSError(f"{self.path.name} was changed by another program while it was written")
 
     def _let_go(self) -> None:
         """Begins to write pages to the disk, and leaves those that are there to others, since nobody reads them soon.
@@ -124,13 +145,12 @@ class RecordingFile:
         Where it or its folder was moved, it gets that name there.
 
         Raises:
-            OSError: the disk does not take it, or it was cut: what is left is to be recovered, and must not look whole.
+            OSError: as `flush`; what is left is to be recovered, and must not look complete.
         """
-        if self.fate == "cut":
-            raise OSError(f"{self.path.name} was cut while it was written")
         self._file.describe("abs.recording", summary)
         self._file.finish()
         os.fsync(self._stream.fileno())
+        self._check_size()
         self._whole = self.size
         now = Path(os.readlink(f"/proc/self/fd/{self._stream.fileno()}"))
         self._stream.close()

@@ -33,8 +33,8 @@ def test_an_open_file_that_is_taken_away_is_noticed_and_another_one_begun(tmp_pa
         assert sequences(elsewhere) == [1]
 
 
-@pytest.mark.parametrize("left", [0, 2000])
-def test_a_file_that_somebody_cuts_is_noticed_and_does_not_look_complete(tmp_path, left):
+@pytest.mark.parametrize("change", [b"", b"half", b"more"])
+def test_a_file_that_another_program_changes_is_noticed_and_does_not_look_complete(tmp_path, change):
     rig = Rig(tmp_path, compression=Compression.NONE, flush_s=0.005)
     rig.recorder.start()
     for seq in range(20):
@@ -42,11 +42,15 @@ def test_a_file_that_somebody_cuts_is_noticed_and_does_not_look_complete(tmp_pat
     assert eventually(lambda: rig.written(20))
     (active,) = tmp_path.glob("*.active")
     assert eventually(lambda: active.stat().st_size > 20_000)
-    os.truncate(active, left)
+    if change == b"more":
+        with active.open("ab") as stream:
+            stream.write(change)
+    else:
+        os.truncate(active, 500 * len(change))
     rig.publish_image(depth(20))
     assert eventually(lambda: rig.recorder.failures == 1)
     name = active.name.removesuffix(".active")
-    assert rig.said.labels["last_failure"] == f"{name} was cut while it was written"
+    assert rig.said.labels["last_failure"] == f"{name} was changed by another program while it was written"
     rig.publish_image(depth(21))
     assert eventually(lambda: not rig.recorder.failed)
     rig.recorder.stop(5)
