@@ -2,6 +2,7 @@
 
 import json as json_library
 import re
+import sys
 import tomllib
 from typing import Any
 
@@ -18,7 +19,7 @@ def toml(text: str) -> dict[str, Any]:
     """The tables of a TOML text.
 
     Raises:
-        ValueError: `tomllib.TOMLDecodeError`, or tables that are nested too deeply.
+        ValueError: `tomllib.TOMLDecodeError`, tables that are nested too deeply, or an integer that is too long.
     """
     if _DOTTED.search(text):
         raise ValueError(f"a key of more than {MAX_PARTS} parts; {_TOO_DEEP}")
@@ -26,6 +27,10 @@ def toml(text: str) -> dict[str, Any]:
         return tomllib.loads(text)
     except RecursionError:
         raise ValueError(_TOO_DEEP) from None
+    except tomllib.TOMLDecodeError:
+        raise
+    except ValueError:  # of `int`, with a call of Python as the remedy
+        raise ValueError(f"an integer of more than {sys.get_int_max_str_digits()} digits") from None
 
 
 def json(text: str) -> Any:

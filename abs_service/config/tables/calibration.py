@@ -6,7 +6,7 @@ from pydantic import Field, FiniteFloat
 
 from abs_service.config.tables.camera import CameraTable
 from abs_service.config.tables.table import Table
-from abs_service.config.tables.values import Name, NoiseSettings, SettingsOf
+from abs_service.config.tables.values import Name, NoiseSettings, OffsetMs, SettingsOf
 
 #: Keys of a sensor in a calibration file that are keys of the same sensor in a rig file.
 SHARED = ("camera", "noise", "texture", "outlier_share", "range_m", "no_return", "depth", "time_offset_ms")
@@ -90,7 +90,7 @@ class CalibratedSensor(SensorEvidence):
     range_m: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = None
     no_return: Annotated[Any, SettingsOf("calib.no_return")] | None = None
     depth: DepthTable | None = None
-    time_offset_ms: FiniteFloat | None = None
+    time_offset_ms: OffsetMs | None = None
 
 
 class CalibrationFile(Table):

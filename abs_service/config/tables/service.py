@@ -3,13 +3,25 @@
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, FiniteFloat
+from pydantic import Field
 
 from abs_service.config.tables.bus import BusTable
 from abs_service.config.tables.calibration import CalibrationOrigin, DepthTable
 from abs_service.config.tables.camera import CameraTable
 from abs_service.config.tables.table import Table
-from abs_service.config.tables.values import DeviceUri, Name, NoiseSettings, Plugin, RelativePath, SettingsOf, Stream
+from abs_service.config.tables.values import (
+    LONGEST_S,
+    DeviceUri,
+    Milliseconds,
+    Name,
+    NoiseSettings,
+    OffsetMs,
+    Plugin,
+    RelativePath,
+    Seconds,
+    SettingsOf,
+    Stream,
+)
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Rate = Annotated[float, Field(ge=0, le=1000, allow_inf_nan=False)]
@@ -55,7 +67,7 @@ class SensorTable(Table):
     no_return: Annotated[Any, SettingsOf("calib.no_return")] = Field(default={})
     depth: DepthTable = DepthTable()
     view_hz: Rate = 0.0
-    time_offset_ms: FiniteFloat = 0.0
+    time_offset_ms: OffsetMs = 0.0
 
 
 class SynchronisationTable(Table):
@@ -67,7 +79,7 @@ class SynchronisationTable(Table):
     """
 
     reference: Stream | Literal[""] = ""
-    tolerance_ms: Positive = 12.0
+    tolerance_ms: Milliseconds = 12.0
 
 
 class MeshTable(Table):
@@ -116,7 +128,7 @@ class TrackerTable(Table):
     status: Annotated[Any, SettingsOf("abs_service.tracker.status")] = Field(default={})
     reinitialization: Annotated[Any, SettingsOf("abs_service.tracking.monitors.loss_monitor")] = Field(default={})
     optimizer: Annotated[Any, Plugin("abs_service.tracker.optimizers")] = Field(default={"type": "hybrid"})
-    budget_ms: Positive = 24.0
+    budget_ms: Milliseconds = 24.0
     budget_evaluations: Annotated[int, Field(ge=1)] = 100_000
     view_hz: Rate = 0.0
 
@@ -156,20 +168,20 @@ class RecordTable(Table):
     directory: RelativePath = Path("recordings")
     begin: Literal["start", "tracking"] = "start"
     when: Literal["always", "asked", "not_tracking"] = "always"
-    pre_roll_s: Annotated[float, Field(ge=0)] = 10.0
+    pre_roll_s: Annotated[float, Field(ge=0, le=LONGEST_S)] = 10.0
     pre_roll_bytes: Annotated[int, Field(ge=0)] = 1 << 30
-    post_roll_s: Positive = 10.0
+    post_roll_s: Seconds = 10.0
     depth_codec: Literal["raw", "lossless"] = "raw"
     color_codec: Literal["raw", "lossless", "jpeg"] = "raw"
     compression: Literal["none", "lz4", "zstd"] = "lz4"
     chunk_bytes: Annotated[int, Field(ge=4096, le=1 << 30)] = 1 << 20
-    flush_s: Positive = 1.0
+    flush_s: Seconds = 1.0
     rotate_bytes: Annotated[int, Field(ge=1 << 16)] = 4_000_000_000
-    rotate_s: Positive = 3600.0
-    retain_s: Positive | None = None
+    rotate_s: Seconds = 3600.0
+    retain_s: Seconds | None = None
     retain_bytes: Annotated[int, Field(ge=1 << 16)] | None = None
     estimates: bool = False
-    retain_estimates_s: Positive | None = None
+    retain_estimates_s: Seconds | None = None
     retain_estimates_bytes: Annotated[int, Field(ge=1 << 16)] | None = None
     minimum_free_bytes: Annotated[int, Field(ge=0)] = 1_000_000_000
     queue_bytes: Annotated[int, Field(ge=1 << 20)] = 256 << 20
@@ -184,17 +196,17 @@ class RunTable(Table):
         restart_window_s: time over which the restarts of a process are counted [s].
         startup_timeout_s: longest time without health of a process that starts or compiles its kernels [s]; of one
             in which nothing runs meanwhile, `stall_timeout_s`.
-        stall_timeout_s: longest time without health afterwards [s]; a process that exceeds either is restarted. The
-            time that it waited for a processor is added, up to `startup_timeout_s`.
+        stall_timeout_s: longest time without health afterwards [s], which is sent once a second; a process that
+            exceeds either is restarted. The time that it waited for a processor is added, up to `startup_timeout_s`.
         stop_timeout_s: time that all processes together have to end in order before they are killed [s].
         metrics_port: port of 127.0.0.1 at which Prometheus reads `/metrics`; 0: none. Needs the extra `metrics`.
     """
 
     max_restarts: Annotated[int, Field(ge=0)] = 5
-    restart_window_s: Positive = 60.0
-    startup_timeout_s: Positive = 180.0
-    stall_timeout_s: Positive = 10.0
-    stop_timeout_s: Positive = 4.0
+    restart_window_s: Seconds = 60.0
+    startup_timeout_s: Seconds = 180.0
+    stall_timeout_s: Annotated[float, Field(ge=2, le=LONGEST_S)] = 10.0
+    stop_timeout_s: Seconds = 4.0
     metrics_port: Annotated[int, Field(ge=0, le=65535)] = 0
 
 

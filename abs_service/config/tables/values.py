@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Annotated, Any
 from urllib.parse import quote, unquote, urlsplit
 
-from pydantic import AfterValidator, GetCoreSchemaHandler, ValidationInfo
+from pydantic import AfterValidator, Field, GetCoreSchemaHandler, ValidationInfo
 from pydantic_core import CoreSchema, core_schema
 
 from abs_service.bus import keys
@@ -19,6 +19,10 @@ from abs_service.config import plugins
 FILE_SCHEMES = frozenset({"replay"})
 #: Longest name of a file or folder [bytes]: Linux allows no more.
 LONGEST_NAME = 255
+#: Longest path [bytes], likewise.
+LONGEST_PATH = 4095
+#: Longest time [s], 31 years: clocks count nanoseconds in 64 bits, and threads wait no longer than that.
+LONGEST_S = 1_000_000_000
 #: Pattern of every address of a device.
 URI = re.compile(r"[a-z][a-z0-9_]*:\S+")
 
@@ -51,6 +55,8 @@ def _from_file(value: Any, base: Path) -> Path:
     path = base / value
     if "\0" in str(path) or max(len(os.fsencode(part)) for part in path.parts) > LONGEST_NAME:
         raise ValueError(f"must be a path whose names have no zero byte and at most {LONGEST_NAME} bytes")
+    if len(os.fsencode(path)) > LONGEST_PATH:
+        raise ValueError(f"must be a path of at most {LONGEST_PATH} bytes, this file's folder included")
     if str(value).startswith("~"):
         raise ValueError('must be a path; "~" is not replaced by a home folder, which differs from user to user')
     return path
@@ -97,6 +103,9 @@ def _plain(load: Callable[[Any, Path], Any], dump: Callable[[Any], Any]) -> Core
     )
 
 
+Seconds = Annotated[float, Field(gt=0, le=LONGEST_S)]
+Milliseconds = Annotated[float, Field(gt=0, le=LONGEST_S * 1000)]
+OffsetMs = Annotated[float, Field(ge=-LONGEST_S * 1000, le=LONGEST_S * 1000)]
 Name = Annotated[str, AfterValidator(keys.check_name)]
 Endpoint = Annotated[str, AfterValidator(_endpoint)]
 DeviceUri = Annotated[str, AfterValidator(_uri)]

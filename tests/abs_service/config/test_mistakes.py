@@ -30,8 +30,21 @@ CASES = {
         f'[record]\ndirectory = "{"x" * 300}"\n',
         "whose names have no zero byte and at most 255 bytes",
     ),
+    "a path too long": (f'[record]\ndirectory = "{"d/" * 2500}"\n', "must be a path of at most 4095 bytes"),
     "a path in a home folder": ('[record]\ndirectory = "~/takes"\n', '"~" is not replaced by a home folder'),
     "a value out of range": ("[record]\nflush_s = 0\n", "record.flush_s = 0: must be greater than 0"),
+    "a time that no clock counts to": (
+        "[record]\nflush_s = 1e300\n",
+        "record.flush_s = 1e+300: must be less than or equal to 1000000000",
+    ),
+    "a time offset that no clock counts to": (
+        '[sensors.ir]\ndevice = "sim"\ntime_offset_ms = -1e300\n',
+        "sensors.ir.time_offset_ms = -1e+300: must be greater than or equal to -1000000000000",
+    ),
+    "a stall that each process would be": (
+        "[run]\nstall_timeout_s = 1.0\n",
+        "run.stall_timeout_s = 1.0: must be greater than or equal to 2",
+    ),
     "a number as text": ('[record]\nflush_s = "1"\n', 'record.flush_s = "1": must be a valid number'),
     "a value that is none of those allowed": (
         '[record]\ncompression = "gzip"\n',

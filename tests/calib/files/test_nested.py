@@ -13,6 +13,11 @@ def test_toml_that_is_nested_too_deeply_is_refused(text: str) -> None:
         nested.toml(text)
 
 
+def test_toml_with_an_integer_that_is_too_long_is_refused_in_words_of_toml() -> None:
+    with pytest.raises(ValueError, match=r"^an integer of more than 4300 digits$"):
+        nested.toml("a = " + "1" * 5000)
+
+
 def test_json_and_yaml_that_are_nested_too_deeply_are_refused() -> None:
     for read in (nested.json, nested.yaml):
         with pytest.raises(ValueError, match="nested too deeply"):
