@@ -81,7 +81,7 @@ def run(arguments: argparse.Namespace) -> int:
     stop = rig_process.stop_on_signals()
     with (
         rig_process.open_bus_at(rig.bus.endpoint, SessionMode.ROUTER, rig, arguments) as bus,
-        in_memory(rig) as file,
+        in_memory(rig, config.named(arguments.config)) as file,
         choice.shown(as_json=arguments.json) as display,
         _logging_to(display, logs.on_stderr(arguments)) if not arguments.log_file else nullcontext(),
         metrics.served(rig.run.metrics_port) as measure,
@@ -103,9 +103,7 @@ def run(arguments: argparse.Namespace) -> int:
         lost = display.close(last)
     refused = supervisor.misconfigured()
     if refused is not None:
-        # The child has read a temporary file of ours.
-        reason = log_lines.final_error(refused.reason)
-        raise ChildError(reason.replace(str(file.path), str(arguments.config or "demo.toml")))
+        raise ChildError(log_lines.final_error(refused.reason))
     return supervisor.exit_code() or (Exit.FAILED if lost else outcome.code(last, stop.is_set()))
 
 

@@ -4,7 +4,7 @@ Only commands see these objects; everything behind them takes plain arguments.
 """
 
 from abs_service.config.errors import ConfigError
-from abs_service.config.loading import from_tables, load, load_default, loads, to_toml
+from abs_service.config.loading import from_tables, load, load_default, loads, named, to_toml
 from abs_service.config.merging import load_calibration
 from abs_service.config.tables.calibration import CalibrationFile, CalibrationOrigin, DepthTable
 from abs_service.config.tables.camera import CameraTable, PoseTable
@@ -41,5 +41,6 @@ __all__ = [
     "load_calibration",
     "load_default",
     "loads",
+    "named",
     "to_toml",
 ]

@@ -1,6 +1,7 @@
 """TOML text to configuration and back."""
 
 import json
+import os
 from functools import partial
 from importlib import resources
 from pathlib import Path
@@ -16,6 +17,24 @@ from abs_service.config.problems import ProblemsError, from_pydantic
 from abs_service.config.tables.service import ServiceConfig
 from calib.files import limited, nested
 
+_MEMORY = "/memfd:"  # where Linux says that files in memory are
+
+
+def named(path: Path | None) -> str:
+    """What messages call the file of a configuration.
+
+    Args:
+        path: the file; of one in memory, which `run` has for its processes, the name is that of the file it comes
+            from. None for the simulated rig.
+    """
+    if path is None:
+        return "demo.toml"
+    try:
+        target = os.readlink(path)
+    except OSError:
+        return str(path)
+    return target.removeprefix(_MEMORY).removesuffix(" (deleted)") if target.startswith(_MEMORY) else str(path)
+
 
 def load(path: Path) -> ServiceConfig:
     """The configuration in a file; relative paths in it start from the file's folder.
@@ -28,16 +47,16 @@ def load(path: Path) -> ServiceConfig:
     try:
         text = limited.text(path)
     except OSError as error:
-        raise ConfigError(f"{path}: cannot be read: {error.strerror}") from None
+        raise ConfigError(f"{named(path)}: cannot be read: {error.strerror}") from None
     except UnicodeDecodeError as error:
         raise ConfigError(f"{path}: TOML is UTF-8 text, byte {error.start} is not") from None
-    return loads(text, str(path), path.resolve().parent)
+    return loads(text, named(path), path.resolve().parent)
 
 
 def load_default() -> ServiceConfig:
     """The simulated rig that comes with the service; it records below the current directory."""
     text = resources.files("abs_service.config").joinpath("demo.toml").read_text(encoding="utf-8")
-    return loads(text, "demo.toml", Path.cwd())
+    return loads(text, named(None), Path.cwd())
 
 
 def loads(text: str, source: str, base: Path) -> ServiceConfig:

@@ -11,6 +11,9 @@ from abs_service.config import changes
 from abs_service.supervision.exit_codes import is_for_user
 from abs_service.wire.commands import RefusedError
 
+#: Longest name that Linux lets a file in memory have [bytes].
+LONGEST_NAME = 249
+
 
 class RigInMemory:
     """A configuration as a file.
@@ -68,7 +71,12 @@ class RigInMemory:
 
 
 @contextmanager
-def in_memory(rig: config.ServiceConfig) -> Iterator[RigInMemory]:
-    """A configuration as a file of which nothing is left when this process ends, however it ends."""
-    with open(os.memfd_create(rig.name), "wb") as stream:
+def in_memory(rig: config.ServiceConfig, source: str) -> Iterator[RigInMemory]:
+    """A configuration as a file of which nothing is left when this process ends, however it ends.
+
+    Args:
+        rig: the configuration.
+        source: the file that it comes from, for messages (`config.named`); of a long path, they have the end.
+    """
+    with open(os.memfd_create(os.fsencode(source)[-LONGEST_NAME:].decode(errors="ignore")), "wb") as stream:
         yield RigInMemory(rig, stream)

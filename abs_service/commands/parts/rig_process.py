@@ -92,7 +92,7 @@ def open_bus_at(
             security = rig.bus.security(*names, roles.RIG)
             bus = ZenohBus.open(rig.name, endpoint, mode, rig.bus.shared_memory, security, rig.bus.routers)
         except TlsError as error:
-            raise SecurityError(f"{arguments.config or 'demo.toml'}: {error}") from None
+            raise SecurityError(f"{config.named(arguments.config)}: {error}") from None
         with CheckedBus(bus, time.monotonic_ns) as checked:
             yield checked
 

@@ -58,7 +58,7 @@ def run(arguments: argparse.Namespace) -> int:
             name: PointCloudPublisher(bus, clock, view_hz, metadata.camera, publisher)
             for name, publisher in publishers.items()
         }
-        source = str(arguments.config or "demo.toml")
+        source = config.named(arguments.config)
         answer = partial(control_commands.answer_controls, bus, headers=headers, health=health)
         supervisors = [_supervisor(name, rig, source, metadata, points[name], health, answer) for name in rig.devices]
         for supervisor in supervisors:

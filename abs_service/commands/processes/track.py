@@ -61,7 +61,7 @@ def run(arguments: argparse.Namespace) -> int:
     name = arguments.tracker or next(iter(settings.trackers), "")
     plan, noises = wiring.plan(settings, name), wiring.noises(settings, name)
     if problem := wiring.reference_problem(settings, name, noises):
-        raise wiring.PlanError(f"{arguments.config or 'demo.toml'}: {problem}")
+        raise wiring.PlanError(f"{config.named(arguments.config)}: {problem}")
     stop = rig_process.stop_on_signals()
     while not stop.is_set():
         with rig_process.open_bus(settings, arguments, "tracker") as bus:

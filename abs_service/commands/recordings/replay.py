@@ -190,7 +190,7 @@ def _writing(path: Path, toml: str) -> Iterator[McapFile]:
 def _live(settings: config.ServiceConfig, arguments: argparse.Namespace) -> int:
     """Plays the recording as the only device of the rig, through `run`."""
     recording_uri = f"replay://{quote(str(arguments.recording.resolve()))}?speed={arguments.speed:g}&delay={START_S:g}"
-    with in_memory(_played(settings, recording_uri)) as file:
+    with in_memory(_played(settings, recording_uri), config.named(arguments.config or arguments.recording)) as file:
         options = ["--json"] if arguments.json else []
         options += ["--out", str(arguments.out)] if arguments.out else ["--no-record"]
         parser = argparse.ArgumentParser()

@@ -25,15 +25,26 @@ def test_the_file_of_the_children_says_the_same_and_leaves_nothing_behind(rig, t
     folder = tmp_path / "temporary"
     folder.mkdir()
     monkeypatch.setattr(tempfile, "tempdir", str(folder))
-    with in_memory(rig) as file:
+    with in_memory(rig, "rig.toml") as file:
         assert config.load(file.path) == rig
         assert not list(folder.iterdir()), "which would stay after a kill"
     assert not file.path.exists()
 
 
+@pytest.mark.parametrize("source", ["/a b/rig.toml", "/" + "ä" * 3000])
+def test_a_child_names_the_file_that_its_configuration_comes_from(rig, source):
+    with in_memory(rig, source) as file:
+        name = config.named(file.path)
+        assert len(name) > 10
+        assert source.endswith(name)
+        file.path.write_text("x")
+        with pytest.raises(config.ConfigError, match=f"^{name}: "):
+            config.load(file.path)
+
+
 def test_another_configuration_takes_its_place_and_a_shorter_one_leaves_no_rest(rig, tmp_path):
     longer = rig.model_copy(update={"record": rig.record.model_copy(update={"directory": tmp_path / ("x" * 200)})})
-    with in_memory(rig) as file:
+    with in_memory(rig, "rig.toml") as file:
         assert file.exchange(lambda: longer).components == ("record",)
         assert config.load(file.path) == longer
         assert file.exchange(lambda: rig).components == ("record",)
@@ -43,7 +54,10 @@ def test_another_configuration_takes_its_place_and_a_shorter_one_leaves_no_rest(
 
 def test_a_file_name_that_is_not_utf_8_is_named(rig, tmp_path):
     record = rig.record.model_copy(update={"directory": tmp_path / "o\udcff"})
-    with pytest.raises(config.ConfigError, match=r"directory = .*: this name is not UTF-8"), in_memory(rig) as file:
+    with (
+        pytest.raises(config.ConfigError, match=r"directory = .*: this name is not UTF-8"),
+        in_memory(rig, "rig.toml") as file,
+    ):
         file.write(rig.model_copy(update={"record": record}))
 
 
@@ -52,7 +66,7 @@ def test_what_cannot_be_used_is_refused_and_changes_nothing(rig):
     def wrong():
         raise config.ConfigError("rig.toml: trackers.sheet.budget_ms = -1 is wrong")
 
-    with in_memory(rig) as file:
+    with in_memory(rig, "rig.toml") as file:
         with pytest.raises(RefusedError, match="budget_ms = -1 is wrong"):
             file.exchange(wrong)
         with pytest.raises(RefusedError, match="name: can change only when the rig is stopped"):
@@ -61,7 +75,7 @@ def test_what_cannot_be_used_is_refused_and_changes_nothing(rig):
 
 
 def test_a_rig_that_ends_takes_nothing_over(rig):
-    with in_memory(rig) as file:
+    with in_memory(rig, "rig.toml") as file:
         pass
     with pytest.raises(RefusedError, match="the rig ends"):
         file.exchange(lambda: rig)
@@ -71,7 +85,7 @@ def test_a_mistake_of_ours_is_not_taken_for_one_of_the_file(rig):
     def wrong():
         raise ZeroDivisionError
 
-    with in_memory(rig) as file, pytest.raises(ZeroDivisionError):
+    with in_memory(rig, "rig.toml") as file, pytest.raises(ZeroDivisionError):
         file.exchange(wrong)
 
 
