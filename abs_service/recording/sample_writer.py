@@ -1,7 +1,7 @@
 """Writes the messages of a rig to one file after the other, and counts them."""
 
 import threading
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Iterable, Mapping
 
 from absmsg.v1.sensor_model_pb2 import SensorModel
@@ -12,7 +12,7 @@ from abs_service.bus import keys
 from abs_service.bus.contract import Sample
 from abs_service.bus.health import Health
 from abs_service.bus.sequence_gaps import SequenceGaps
-from abs_service.bus.stamps import WallClock
+from abs_service.bus.stamps import STEP_NS, WallClock
 from abs_service.recording.take import Take
 from abs_service.wire import message_header as header
 from drivers.contract.host_clock import host_clock
@@ -22,6 +22,9 @@ from drivers.encoding.parsing import CodecError
 
 #: Messages repeated at the start of each file, so that every file is self-contained.
 _LATCHED = frozenset({header.CALIBRATION, header.CONFIG, header.MODEL, header.TOPOLOGY, header.TRANSFORMS})
+
+#: Offsets of the wall clock that are remembered: a step that a process has not noticed may be followed by others.
+_OFFSETS = 8
 
 
 class SampleWriter:
@@ -38,6 +41,7 @@ class SampleWriter:
         self._health = health
         self._clock = clock
         self._offset_ns = clock.wall(0)  # of the open file
+        self._offsets_ns = deque([self._offset_ns], _OFFSETS)  # the last one is that of now
         self._host_clock = host_clock()
         self._lock = threading.Lock()
         self._latched: dict[str, Sample] = {}
@@ -122,9 +126,21 @@ class SampleWriter:
         if about.host_clock == self._host_clock:
             stamp_ns = about.t_host_ns + self._offset_ns
         elif stamp_ns and not about.host_clock:
-            stamp_ns -= self._clock.wall(0) - self._offset_ns
+            stamp_ns += self._offset_ns - self._offset_of(stamp_ns)
         is_usable = about.stamp_ns > 0 and 0 < stamp_ns < 1 << 63 and not is_repeated
         return stamp_ns if is_usable else self._clock.monotonic() + self._offset_ns
+
+    def _offset_of(self, stamp_ns: int) -> int:
+        """Offset of the wall clock by which the stamp of a present moment was made, by the nearest of the last ones.
+
+        Each process notices a step within a second; this one may be earlier or later than the one that made the stamp.
+        """
+        self._clock.measure()
+        offset_ns, now_ns = self._clock.wall(0), self._clock.monotonic()
+        if abs(offset_ns - self._offsets_ns[-1]) <= STEP_NS:
+            self._offsets_ns.pop()
+        self._offsets_ns.append(offset_ns)
+        return min(self._offsets_ns, key=lambda one: abs(stamp_ns - one - now_ns))
 
     def _count(self, topic: str, about: header.MessageHeader) -> None:
         self._counts[f"messages.{topic}"] += 1
