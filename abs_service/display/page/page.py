@@ -19,6 +19,7 @@ from abs_service.display.page.acting.gestures import Gestures, Ray
 from abs_service.display.page.acting.recording import ask, unavailable
 from abs_service.display.page.acting.reinitialization import Reinitialization
 from abs_service.display.page.feed import Feed
+from abs_service.display.page.own_pages import own_pages_only
 from abs_service.display.page.panel import Button, Panel
 from abs_service.display.page.readouts import status, table, words
 from abs_service.display.page.readouts.neighbours import Neighbour, links
@@ -63,7 +64,7 @@ class Page:
         self, feed: Feed, silence: str, port: int, view_only: bool, commands: Commands, clock: Callable[[], int]
     ) -> None:
         self._feed, self._silence, self._references, self._clock = feed, silence, commands.references, clock
-        with _quiet():
+        with _quiet(), own_pages_only():
             self._server = viser.ViserServer(HOST, port, label="abs-service", verbose=False)
         self.neighbours: Sequence[Neighbour] = ()
         self._scene = Scene(self._server)
