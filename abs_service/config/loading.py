@@ -21,7 +21,7 @@ _MEMORY = "/memfd:"  # where Linux says that files in memory are
 
 
 def named(path: Path | None) -> str:
-    """What messages call the file of a configuration.
+    """The name of a configuration's file in messages.
 
     Args:
         path: the file; of one in memory, which `run` has for its processes, the name is that of the file it comes

@@ -1,4 +1,4 @@
-"""What others do to the file that is being written."""
+"""The recorder and what others do to the file that it writes."""
 
 import os
 
