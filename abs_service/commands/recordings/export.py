@@ -94,7 +94,7 @@ def run(arguments: argparse.Namespace) -> int:
         finally:
             active.unlink(missing_ok=True)
     except OSError as error:
-        raise ExportError(f"{error.filename or path}: {error.strerror}") from None
+        raise ExportError(f"{str(error.filename or path).removesuffix('.active')}: {error.strerror}") from None
     print(f"{path}: {done}, {path.stat().st_size / 1e6:.1f} MB")
     return Exit.OK
 

@@ -167,6 +167,12 @@ def test_a_missing_file_is_named(tmp_path, capsys):
     assert "none.mcap: No such file" in capsys.readouterr().err
 
 
+def test_a_folder_that_is_missing_is_told_with_the_name_that_was_given(recording, tmp_path, capsys):
+    out = tmp_path / "none" / "out.mcap"
+    assert cli.main(["export", str(recording), "--out", str(out)]) == Exit.USER
+    assert f"error: {out}: No such file" in capsys.readouterr().err
+
+
 def test_a_suffix_is_one_of_those_that_are_allowed(capsys):
     with pytest.raises(SystemExit, match="2"):
         cli.main(["export", "x.mcap", "--out", "x.usd"])
