@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.models.base import Surface
-from abs_service.tracker.terms.depth.classification.beyond_view import BLIND_SHARE
+from abs_service.tracker.terms.depth.classification.beyond_view import BLIND_SHARE, MIN_RETURNS
 from abs_service.tracker.terms.depth.outline.rim import Rim, read
 from abs_service.tracker.terms.sensor_fit import MIN_RIM
 from calib.camera import Camera
@@ -121,13 +121,16 @@ def _is_within(camera: Camera, places: NDArray[np.float64], margin: float = 0.0)
 
 
 def _ends_at_border(places: NDArray[np.float64], distance: NDArray[np.float32]) -> NDArray[np.bool_]:
-    """True for places (k, 2) at the border of what is measured of an image (height, width): an end there is none."""
+    """True for places (k, 2) at the border of what is measured of an image (height, width): an end there is none.
+
+    Its rows and columns are measured for the most part: what is alone before no return ends by itself.
+    """
     known = np.isfinite(distance)
     at_border = np.zeros(len(places), np.bool_)
     for axis, size in enumerate(known.shape[::-1]):
-        lines = np.flatnonzero(known.any(axis=axis))
-        first = lines[0] if lines[0] <= BLIND_SHARE * size else 0
-        last = lines[-1] if lines[-1] >= (1 - BLIND_SHARE) * size else size - 1
+        lines = np.flatnonzero(known.mean(axis=axis) >= MIN_RETURNS)
+        first = min(lines[lines <= BLIND_SHARE * size], default=0)
+        last = max(lines[lines >= (1 - BLIND_SHARE) * size], default=size - 1)
         at_border |= (places[:, axis] < first + LARGEST_MISS_PX) | (places[:, axis] > last - LARGEST_MISS_PX)
     return at_border
 

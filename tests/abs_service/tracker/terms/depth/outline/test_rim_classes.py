@@ -132,6 +132,16 @@ def test_an_edge_before_columns_in_which_nothing_is_measured_is_cut_by_the_borde
     assert not np.any(found.classes[~right] == RimClass.BORDER)
 
 
+def test_a_sheet_that_is_alone_before_no_return_ends_by_itself_near_the_border_too():
+    """A blind border would have cut other things as well."""
+    rays = CAMERA.unproject(np.ones((CAMERA.height, CAMERA.width)))
+    shift = (rays[..., 0] / rays[..., 2])[0, -6] - MESH.vertices[:, 0].max()
+    aside = replace(MESH, vertices=MESH.vertices + np.array([shift, 0, 0]))
+    alone = picture(aside)
+    alone[alone > 1.3] = np.nan
+    assert np.all(outline(alone, aside).classes == RimClass.FREE)
+
+
 def test_an_edge_up_to_two_cells_before_the_border_is_cut_by_it_until_the_object_comes_into_the_image():
     """Half of the sheet is to the right of the image; the mesh ends a cell before its last column."""
     rays = CAMERA.unproject(np.ones((CAMERA.height, CAMERA.width)))
