@@ -78,7 +78,7 @@ def alignment_warnings(detection: InitialDetection, images: Mapping[str, Image],
 
 
 def _doubt(detection: InitialDetection, image: ColorImage | ChannelImage, camera: Camera) -> str:
-    """Where the edges of an image lie, if not where they should."""
+    """The place of an image's edges in words, "" if it is right or unknown."""
     found = displacement(detection, image, camera)
     if _is_small(found, image):
         return ""
@@ -112,7 +112,7 @@ def _factor(image: ColorImage | ChannelImage) -> int:
 
 
 def displacement(detection: InitialDetection, image: ColorImage | ChannelImage, camera: Camera) -> Displacement | None:
-    """How far the edges of an image are displaced from the jumps of the distances; None if too little tells.
+    """Displacement of an image's edges from the jumps of the distances, of any length; None if too little tells.
 
     Args:
         detection: the distances, of the same moment.

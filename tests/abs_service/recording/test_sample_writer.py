@@ -1,6 +1,7 @@
 """Times of messages in a recording, of which some have a stamp of the wall clock alone."""
 
 import itertools
+from typing import Any
 
 import pytest
 from foxglove_schemas_protobuf.PointCloud_pb2 import PointCloud
@@ -30,7 +31,8 @@ def test_a_step_that_sender_and_recorder_notice_at_different_times_changes_no_or
     writer = SampleWriter(
         lambda image: ("", image), Health(LoopbackBus(), "record", HeaderFactory("demo", clock)), clock
     )
-    take, points = Stamps(), PointCloud(frame_id="tof")
+    take: Any = Stamps()
+    points = PointCloud(frame_id="tof")
     writer.begin(take)
 
     def put():

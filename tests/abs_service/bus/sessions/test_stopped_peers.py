@@ -32,6 +32,7 @@ def test_six_stopped_subscribers_keep_nobody_from_the_router(endpoint):
         for code in (ROUTER, *[PEER] * PEERS):
             process = subprocess.Popen([sys.executable, "-c", code, endpoint], stdout=subprocess.PIPE, text=True)
             processes.append(process)
+            assert process.stdout
             assert process.stdout.readline() == "ready\n"
         with (
             closing(open_session(endpoint, SessionMode.CLIENT, shared_memory=False)) as sender,
