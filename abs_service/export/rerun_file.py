@@ -31,6 +31,9 @@ JPEG_QUALITY = 90
 #: What Rerun writes last, and so what tells that it has written all: of a full disk it logs a line, and raises nothing.
 FOOTER, FOOTER_SIZE = b"RRF2FOOT", 12
 
+#: Longest time in which a disk takes what is left [s]. After a full one, `disconnect` may wait for ever.
+FLUSH_S = 30.0
+
 #: Colour and radius of measured points [px], which lie around the mesh and leave it in sight.
 POINT, POINT_PX = (110, 130, 170), 0.7
 
@@ -163,6 +166,10 @@ class RerunFile:
         columns = [rrb.Vertical(space, rrb.TextLogView(origin="/"), row_shares=[3, 1])]
         columns += [rrb.Vertical(*views) for views in (images, plots) if views]
         self._stream.send_blueprint(rrb.Blueprint(rrb.Horizontal(*columns)))
+        try:
+            self._stream.flush(timeout_sec=FLUSH_S)
+        except RuntimeError as error:
+            raise OSError(errno.EIO, f"{error}; is the disk full?") from error
         self._stream.disconnect()
         with self._path.open("rb") as written:
             written.seek(max(0, written.seek(0, os.SEEK_END) - FOOTER_SIZE))

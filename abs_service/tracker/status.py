@@ -1,7 +1,4 @@
-"""Status of an estimate: its agreement with the measurements, with the outline, and with itself.
-
-A reason says what is the matter, and after a dash what to do about it.
-"""
+"""Status of an estimate by agreement with measurements, outline and itself. A reason: what is wrong – what to do."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -29,6 +26,9 @@ from abs_service.tracker.terms.agreement import (
 )
 from abs_service.tracker.terms.sensor_fit import SensorFit
 
+#: The limits on the deviation of vertices shrink with the side of an object that is smaller [m].
+SMALL_M = 0.06
+
 
 @dataclass(frozen=True)
 class Settings:
@@ -51,9 +51,9 @@ class Settings:
             motion prior, above which it is DEGRADED: the prior has held the mesh back.
         degraded_folded: share of folded faces above which an estimate is DEGRADED.
         degraded_deviation_m: standard deviation of the position of a vertex, median over the mesh, above which an
-            estimate is DEGRADED [m].
+            estimate is DEGRADED [m]. Of a mesh smaller than 6 × 6 cm, as much less as its side (root of its area) is.
         degraded_single_frame_deviation_m: the same standard deviation from the measurements of one frame alone, without
-            the past, above which an estimate is DEGRADED [m].
+            the past, above which an estimate is DEGRADED; likewise less for a small mesh [m].
     """
 
     degraded_below: Annotated[float, Interval(gt=0, lt=1)] = 0.6
@@ -67,6 +67,12 @@ class Settings:
     degraded_folded: Annotated[float, Interval(gt=0, le=1)] = 0.05
     degraded_deviation_m: Annotated[float, Gt(0)] = 0.015
     degraded_single_frame_deviation_m: Annotated[float, Gt(0)] = 0.02
+
+    def for_side(self, side_m: float) -> "Settings":
+        """The same for a mesh with a side [m]: what is little of a large one may be most of a small one."""
+        scale = min(1.0, side_m / SMALL_M)
+        known, by_one = scale * self.degraded_deviation_m, scale * self.degraded_single_frame_deviation_m
+        return replace(self, degraded_deviation_m=known, degraded_single_frame_deviation_m=by_one)
 
 
 def judge(
@@ -89,7 +95,7 @@ def judge(
         has_back: True for the mesh of a template, which may have sides that the first image does not show; all of a
             mesh made from that image faced the sensor in it.
     """
-    fits = [_without_back(fit) for fit in fits] if has_back else fits
+    fits = [fit.without_back() for fit in fits] if has_back else fits
     gone = has_left(fits, limits.degraded_agreeing)
     lost = gone or min(inlier_share(fits), distances_share(fits)) < limits.lost_below
     reasons = [f"no frame from {name}" for name in missing]
@@ -134,11 +140,6 @@ def _seen(fits: Sequence[SensorFit], lost: bool, limits: Settings) -> Iterator[s
             f"{outside:.0%} of the vertices that should be in sight are outside the depth image, where nothing says "
             "how far they are – bring the object back into it"
         )
-
-
-def _without_back(fit: SensorFit) -> SensorFit:
-    """Agreement of a mesh of which a part has always been turned away."""
-    return replace(fit, counts=replace(fit.counts, turned_away=0))
 
 
 def _left(fits: Sequence[SensorFit]) -> str:

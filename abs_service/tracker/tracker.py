@@ -57,7 +57,7 @@ class Tracker:
         self._posterior = posterior
         self._optimizer = optimizer
         self._evaluations = evaluations
-        self._limits = limits
+        self._limits = limits.for_side(np.sqrt(model.mesh.area))
         self._theta_covariance = ThetaCovariance(model, registration_m)
         self._vertex_covariance = VertexCovariance(model, registration_m, centers)
         self._patches = patches_of(model.mesh)

@@ -1,6 +1,6 @@
 """Agreement of one sensor with one deformed mesh."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -89,6 +89,10 @@ class SensorFit:
     counts: VertexCounts = field(default_factory=VertexCounts)
     remainder: Remainder = Remainder()
     is_surprised: bool = False
+
+    def without_back(self) -> "SensorFit":
+        """The agreement of a mesh of which a part has always been turned away."""
+        return replace(self, counts=replace(self.counts, turned_away=0))
 
 
 def summarize(

@@ -232,3 +232,13 @@ def test_an_object_that_was_not_where_it_was_expected_is_not_said_to_be_tracked(
     assert status == Status.DEGRADED
     assert facts(reasons)[0].startswith("nothing was where the object was expected")
     assert judge([surprised, depth("b", 300, 0)], (), SHAPE, 0.0, SETTINGS) == (Status.TRACKING, ())
+
+
+@pytest.mark.parametrize("name", ["deviation_m", "single_frame_deviation_m"])
+def test_a_small_mesh_has_to_be_known_better(name):
+    """4 mm are little of 30 cm, and much of 1 cm."""
+    shape = replace(SHAPE, **{name: 0.004})
+    assert judge([fit(1.0)], (), shape, 1.0, SETTINGS.for_side(0.3))[0] == Status.TRACKING
+    verdict, (reason,) = judge([fit(1.0)], (), shape, 1.0, SETTINGS.for_side(0.01))
+    assert verdict == Status.DEGRADED
+    assert reason.startswith("nothing holds the surface along itself")
