@@ -6,7 +6,11 @@ import sys
 import time
 from contextlib import closing
 
+import pytest
+
 from abs_service.bus.session import SessionMode, open_session
+
+pytestmark = [pytest.mark.slow, pytest.mark.realtime]
 
 PEERS, SECONDS = 6, 15  # longer than the lease of 10 s that zenoh has by default
 ROUTER = """
