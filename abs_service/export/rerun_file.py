@@ -1,7 +1,7 @@
 """A recording for the viewer Rerun: mesh, points, images, cameras and plots on one timeline; needs rerun-sdk."""
 
-import errno
 import os
+import threading
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
@@ -27,12 +27,6 @@ from drivers.replay import RecordingError
 TIMELINE = "time"
 
 JPEG_QUALITY = 90
-
-#: What Rerun writes last, and so what tells that it has written all: of a full disk it logs a line, and raises nothing.
-FOOTER, FOOTER_SIZE = b"RRF2FOOT", 12
-
-#: Longest time in which a disk takes what is left [s]. After a full one, `disconnect` may wait for ever.
-FLUSH_S = 30.0
 
 #: Colour and radius of measured points [px], which lie around the mesh and leave it in sight.
 POINT, POINT_PX = (110, 130, 170), 0.7
@@ -101,8 +95,9 @@ class RerunFile:
         self._stream = rr.RecordingStream("abs-service")
         self._stream.set_log_time_enabled(False)
         self._stream.set_log_tick_enabled(False)
-        self._path = path
-        self._stream.save(path)
+        self._output = _Output(path)
+        self._stream.save(self._output.pipe)
+        self._output.begin()
         self._view_hz = view_hz
         self._rates: dict[str, ViewRate] = {}
         self._images: set[str] = set()
@@ -166,15 +161,8 @@ class RerunFile:
         columns = [rrb.Vertical(space, rrb.TextLogView(origin="/"), row_shares=[3, 1])]
         columns += [rrb.Vertical(*views) for views in (images, plots) if views]
         self._stream.send_blueprint(rrb.Blueprint(rrb.Horizontal(*columns)))
-        try:
-            self._stream.flush(timeout_sec=FLUSH_S)
-        except RuntimeError as error:
-            raise OSError(errno.EIO, f"{error}; is the disk full?") from error
         self._stream.disconnect()
-        with self._path.open("rb") as written:
-            written.seek(max(0, written.seek(0, os.SEEK_END) - FOOTER_SIZE))
-            if not written.read().startswith(FOOTER):
-                raise OSError(errno.EIO, "Rerun could not write all of it; is the disk full?")
+        self._output.finish()
 
     def _add_depth(self, name: str, frame: Frame, camera: Camera | None) -> None:
         try:
@@ -192,3 +180,47 @@ class RerunFile:
             self._stream.log(
                 f"/points/{frame.sensor}", rr.Points3D(points, colors=POINT, radii=rr.Radius.ui_points(POINT_PX))
             )
+
+
+class _Output:
+    """A file that Rerun writes through a pipe.
+
+    What Rerun writes by itself to a disk that is full, it ends as if all were well, or never.
+
+    Attributes:
+        pipe: path of the pipe's end for Rerun.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._file = path.open("wb")
+        self._read, self._write = os.pipe()
+        self.pipe = f"/proc/self/fd/{self._write}"
+        self._thread = threading.Thread(target=self._copy, name="rerun file", daemon=True)
+        self._failure: OSError | None = None
+
+    def begin(self) -> None:
+        """Begins to write the file; Rerun has opened its end."""
+        os.close(self._write)
+        self._thread.start()
+
+    def finish(self) -> None:
+        """Closes the file, after Rerun has closed its end.
+
+        Raises:
+            OSError: it could not be written.
+        """
+        self._thread.join()
+        if self._failure is not None:
+            raise self._failure
+
+    def _copy(self) -> None:
+        """Reads to the end, also when nothing can be written any more: Rerun would wait."""
+        with open(self._read, "rb", buffering=0) as pipe:
+            try:
+                with self._file:
+                    while data := pipe.read(1 << 20):
+                        self._file.write(data)
+            except OSError as error:
+                self._failure = error
+            while pipe.read(1 << 20):
+                pass
