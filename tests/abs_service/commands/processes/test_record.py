@@ -110,7 +110,7 @@ def test_what_a_failing_disk_leaves_is_recovered_when_there_is_room_without_anot
     thread.start()
     RecordingFile(tmp_path / "a.mcap", 0, {}).abandon()
     os.utime(tmp_path / "a.mcap.active", (1e9, 1e9))
-    recorder.failures, recorder.failed = 1, "the disk is full"
+    recorder.failed, recorder.failures = "the disk is full", 1  # in this order: the thread looks at any moment
     assert not eventually(lambda: "recovered" in health_now(health, bus).message, 0.1)
     recorder.failed = ""
     assert eventually(lambda: health_now(health, bus).message.endswith("cannot be recovered: No space left on device"))
