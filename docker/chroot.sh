@@ -3,7 +3,8 @@
 # is imported, and a simulated rig runs, is asked for its status and has a subscriber, all without root.
 #   docker/chroot.sh FOLDER    as root, on Linux with debootstrap; FOLDER is made, takes 3 GB, and is not removed
 # Exits with 3 if no base could be made.
-# The base differs from the image's in where Python comes from: here it is Debian's, in python:slim its own build.
+# The base differs from the image's in where Python comes from: here it is Debian's, whose shared library, which genicam
+# asks for, is a package of its own; in python:slim it is its own build, with the library.
 set -euo pipefail
 root=$(realpath -m "${1:?usage: docker/chroot.sh FOLDER}")
 cd "$(dirname "$0")/.."
@@ -18,7 +19,7 @@ inside() {
 }
 
 if [ ! -e "$root/etc/debian_version" ]; then
-  debootstrap --variant=minbase --include=python3,python3-venv,ca-certificates trixie "$root" > "$root.log" ||
+  debootstrap --variant=minbase --include=python3,libpython3.13,python3-venv,ca-certificates trixie "$root" > "$root.log" ||
     { echo "chroot.sh: debootstrap made no base, see $root.log" >&2; exit 3; }
 fi
 mkdir -p "$root/src" "$root/dev/shm"
