@@ -90,6 +90,7 @@ def _settings(defaults: Any, changes: Sequence[str]) -> Any:
             raise EvaluateOptionError(f"--set {change}: must be KEY=VALUE, such as frames=100") from error
         if key not in known:
             raise EvaluateOptionError(f"--set {change}: there is no such setting; there are: {', '.join(known)}")
+        value = float(value) if known[key] is float and type(value) is int else value
         values[key] = tuple(value) if isinstance(value, list) else value
         if not isinstance(values[key], known[key]):
             raise EvaluateOptionError(

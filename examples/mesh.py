@@ -21,7 +21,7 @@ try:
     states = abs_client.subscribe(arguments.endpoint, arguments.rig, arguments.tracker)
 except abs_client.ClientError as error:
     raise SystemExit(str(error)) from error
-with suppress(KeyboardInterrupt), states:
+with suppress(KeyboardInterrupt, BrokenPipeError), states:
     for state in states:
         if not state.usable:
             print(state.status, *state.reasons, flush=True)

@@ -28,7 +28,8 @@ try:
 except zenoh.ZError as error:
     raise SystemExit(f"nothing answers at {arguments.endpoint}: is abs-service running?") from error
 newest = zenoh.handlers.RingChannel(30)  # a reader slower than the tracker loses the oldest, and is never a second late
-with suppress(KeyboardInterrupt), session, session.declare_subscriber(arguments.topic, newest) as states:
+with suppress(KeyboardInterrupt, BrokenPipeError), session:
+    states = session.declare_subscriber(arguments.topic, newest)
     for sample in islice(states, arguments.count):
         state = DeformationState.FromString(sample.payload.to_bytes())
         age_ms = (time.monotonic_ns() - state.header.t_host_ns) * 1e-6

@@ -22,6 +22,7 @@ class Settings:
     """Of the experiment under test."""
 
     frames: int = 500
+    duration_s: float = 20.0
 
 
 @pytest.fixture
@@ -60,7 +61,7 @@ def test_a_report_has_verdicts_numbers_and_how_it_was_made(experiment, tmp_path:
     assert report["values"] | {"commit": "", "seconds": 0} == {
         "commit": "",
         "seed": 7,
-        "settings": {"frames": 3},
+        "settings": {"frames": 3, "duration_s": 20.0},
         "seconds": 0,
         "ratios": [2.5, 1.5],
         "goals": [
@@ -93,10 +94,10 @@ def test_json_is_one_line_for_each_experiment(experiment, tmp_path: Path, capsys
 
 def test_settings_of_one_experiment_can_be_changed(experiment, tmp_path: Path) -> None:
     experiment("good", found(2.5))
-    given = ["good", "--out", str(tmp_path), "--quick", "--set", "frames=40"]
+    given = ["good", "--out", str(tmp_path), "--quick", "--set", "frames=40", "--set", "duration_s=5"]
     assert __main__.main(given) == Exit.OK
     report = json.loads((tmp_path / "good" / "report.json").read_text(encoding="utf-8"))
-    assert report["values"]["settings"] == {"frames": 40}
+    assert report["values"]["settings"] == {"frames": 40, "duration_s": 5.0}
     assert "--set frames=40" in report["provenance"]["command"]
 
 
@@ -105,8 +106,9 @@ def test_settings_of_one_experiment_can_be_changed(experiment, tmp_path: Path) -
     [
         ("frames", "KEY=VALUE"),
         ("frames=", "KEY=VALUE"),
-        ("shots=3", "there are: frames"),
+        ("shots=3", "there are: frames, duration_s"),
         ("frames='x'", "must be int"),
+        ("duration_s=true", "must be float"),
     ],
 )
 def test_settings_that_cannot_be_are_named(experiment, given: str, said: str, tmp_path: Path, capsys) -> None:

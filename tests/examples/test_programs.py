@@ -47,6 +47,17 @@ def test_the_subscriber_ends_at_once_with_ctrl_c(endpoint, open_bus):
     assert (reader.returncode, errors) == (0, "")
 
 
+def test_the_subscriber_ends_silently_when_its_reader_has_seen_enough(endpoint, open_bus):
+    states = open_bus().publisher(keys.state("sheet"), DeformationState.DESCRIPTOR.full_name, STATE)
+    with reading(python("subscribe.py", "--endpoint", endpoint)) as reader, putting(states, golden(DeformationState)):
+        assert next(printed(reader))
+        assert reader.stdout
+        assert reader.stderr
+        reader.stdout.close()
+        assert reader.stderr.read() == ""
+        assert reader.wait(TIMEOUT_S) == 0
+
+
 def test_the_subscriber_reports_a_missing_service(endpoint):
     with reading(python("subscribe.py", "--endpoint", endpoint)) as reader:
         _, errors = reader.communicate(timeout=TIMEOUT_S)

@@ -9,13 +9,15 @@ WINDOW_NS = 60_000_000_000
 
 
 class RateMeter:
-    """Average rate of a total over the last minute."""
+    """Average rate of a total over the last minute, or since it began to grow from 0."""
 
     def __init__(self) -> None:
         self._points: deque[tuple[int, float]] = deque()
 
     def add(self, t_ns: int, total: float) -> float:
         """Adds a value at a time [ns]; returns the rate [1/s], 0 at first."""
+        if not total:  # nothing is written yet, as while kernels are compiled: not part of the average
+            self._points.clear()
         self._points.append((t_ns, total))
         while self._points[0][0] < t_ns - WINDOW_NS:
             self._points.popleft()

@@ -70,6 +70,12 @@ def test_the_rate_is_that_of_the_last_minute():
     assert rates[-1] == 2.0
 
 
+def test_the_time_before_the_first_byte_is_no_part_of_the_rate():
+    meter = forecast.RateMeter()
+    assert [meter.add(second * 10**9, 0.0) for second in range(40)] == [0.0] * 40
+    assert meter.add(40 * 10**9, 7.0) == 7.0
+
+
 class Watch:
     """A disk watch with a clock and a disk of its own, which sees 10 MB/s written."""
 
