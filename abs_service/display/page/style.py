@@ -25,7 +25,8 @@ STYLE = f"""<style>
 .abs-gone {{ visibility: hidden; max-height: 0; animation: abs-gone 0s {GONE_S}s forwards; background: {STALE_COLOR};
   color: white; border-radius: 6px; overflow: hidden }}
 .abs-status {{ animation: abs-old 0s {GONE_S}s forwards }}
-div:has(> .abs-status) {{ height: 8.5em; overflow-y: auto; overscroll-behavior: contain; scrollbar-width: thin }}
+div:has(> .abs-status) {{ height: 8.5em; overflow-y: auto; overscroll-behavior: contain; scrollbar-width: thin;
+  box-sizing: border-box; padding-bottom: 1.2em; mask-image: linear-gradient(black calc(100% - 1.2em), transparent) }}
 {_NEXT}, {_NEXT} + div:has(> .mantine-Button-root) {{ display: inline-block; box-sizing: border-box; width: 50%;
   margin-inline: 0 !important; padding-inline: 8px }}
 pre {{ white-space: pre-wrap !important }}
