@@ -9,6 +9,9 @@ from abs_service.tracker.terms.median import median
 #: Edges that face one side of the image are judged together if there are so many of them.
 MIN_OF_A_SIDE = 8
 
+#: The ends of a strip have fewer; if all of one end inside the object, and all of the other beside it, it has slid.
+MIN_OF_AN_END = 2
+
 #: Share of the squared distances from the outline that a motion of the mesh explains at least, if it has moved.
 MIN_EXPLAINED = 0.7
 
@@ -20,22 +23,32 @@ MIN_PX = 2.0
 #: an arc about its centre, show nothing of themselves; a turn of a hexagon shows 0.3.
 MIN_SHOWN = 0.25
 
+#: Turns directions in the image by an eighth, from its corners to its sides.
+_EIGHTH = np.sqrt(0.5) * np.array([[1.0, -1.0], [1.0, 1.0]])
 
-def displacement(away: NDArray[np.float64], directions: NDArray[np.float64]) -> float:
+
+def displacement(away: NDArray[np.float64], directions: NDArray[np.float64], beyond: float) -> float:
     """Distance of edges from the outline: the mean of all, or what shows that the mesh has slid if that is larger.
 
     A slide is seen by the edges across it only: those of one side end inside the object, those of the other beside it.
-    Where only one of the two sides is in sight, that side tells it. The median of a side is taken, and both sides must
-    agree, because something may lie against the edges of a side.
+    Where only one of the two sides is in sight, that side tells it. The median of a side is taken, or of two ends with
+    few edges the one that tells least, and both sides must agree, because something may lie against the edges of a
+    side. Sides face those of the image or its corners, so that a strip's ends are judged without its long edges.
 
     Args:
-        away: signed distances (k,) of the edges from the outline.
+        away: signed distances (k,) of the edges from the outline, −∞ for those outside it by an unknown distance.
         directions: out of the mesh, in the image (k, 2).
+        beyond: that unknown distance is at least so long.
     """
     if not away.any():
         return 0.0
-    right, down, left, up = (_typical(away[side]) for side in by_side(directions))
-    return max(float(np.mean(np.abs(away))), _slide(right, left), _slide(down, up))
+    right, down, left, up = sides = by_side(directions)
+    lower_right, lower_left, upper_left, upper_right = by_side(directions @ _EIGHTH)
+    pairs = ((right, left), (down, up), (lower_right, upper_left), (lower_left, upper_right))
+    slides = [_slide(away[one], away[other]) for one, other in pairs]
+    alone = [_alone(away[one], away[other]) for one, other in zip(sides, sides[[2, 3, 0, 1]], strict=True)]
+    mean = float(np.mean(np.abs(np.maximum(away, -beyond))))
+    return max(mean, *(slide if np.isfinite(slide) else beyond for slide in (*slides, *alone)))
 
 
 def motion(away: NDArray[np.float64], directions: NDArray[np.float64], places: NDArray[np.float64]) -> float:
@@ -85,13 +98,17 @@ def _shown_by(directions: NDArray[np.float64], arms: NDArray[np.float64]) -> NDA
     return np.stack([right, down, down * arms[:, 0] - right * arms[:, 1]], axis=1)
 
 
-def _typical(away: NDArray[np.float64]) -> float:
-    """Median of the edges of a side; NaN if there are too few."""
-    return median(away) if len(away) >= MIN_OF_A_SIDE else np.nan
+def _slide(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
+    """Slide that the distances of two opposite sides show, infinite if nothing tells how far; 0 if they disagree."""
+    few = max(len(one), len(other)) < MIN_OF_A_SIDE
+    if min(len(one), len(other)) < (MIN_OF_AN_END if few else MIN_OF_A_SIDE):
+        return 0.0
+    (least, most), (other_least, other_most) = (
+        (float(side.min()), float(side.max())) if few else (median(side), median(side)) for side in (one, other)
+    )
+    return max(0.0, min(least, -other_most), min(-most, other_least))
 
 
-def _slide(one: float, other: float) -> float:
-    """Slide that two opposite sides show by their signed distances, of which one may be unknown; 0 if they disagree."""
-    if np.isnan(one) or np.isnan(other):
-        return float(np.nan_to_num(np.fmax(abs(one), abs(other))))
-    return max(0.0, min(one, -other), min(-one, other))
+def _alone(side: NDArray[np.float64], opposite: NDArray[np.float64]) -> float:
+    """Slide that one side shows, infinite if nothing tells how far; 0 if the opposite one tells as well."""
+    return abs(median(side)) if len(side) >= MIN_OF_A_SIDE > len(opposite) else 0.0

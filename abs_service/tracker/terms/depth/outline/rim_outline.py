@@ -159,9 +159,10 @@ class RimOutline:
         known = ~np.isnan(away)
         directions = self._directions(surface, places)[known]
         # Outside, distances are known up to there; how much farther, nothing tells.
-        off_m = np.where(np.abs(away) > self._far, np.maximum(away, -self._far), 0.0) * pixel_m
+        off_px = np.where(away < -self._far, -np.inf, np.where(away > self._far, away, 0.0))
         moved = motion(np.clip(away[known], -self._bound, self._bound), directions, places[known])
-        return max(displacement(off_m[known], directions), moved * float(np.mean(pixel_m)))
+        typical_m = float(np.mean(pixel_m))
+        return max(displacement(off_px[known] * pixel_m[known], directions, self._far * typical_m), moved * typical_m)
 
     def _directions(self, surface: Surface, places: NDArray[np.float64]) -> NDArray[np.float64]:
         """Directions out of the mesh in the image (k, 2), at the edges' places (k, 2) [px]."""

@@ -10,7 +10,6 @@ from abs_service.tracker.terms.depth.classification.visibility import classify, 
 from abs_service.tracker.terms.depth.outline.rim import Rim
 from abs_service.tracker.terms.depth.outline.rim_classes import RimClass
 from abs_service.tracker.terms.depth.outline.rim_cost import FARTHEST
-from abs_service.tracker.terms.depth.outline.rim_motion import displacement
 from tests.abs_service.tracker.scenes import flat, sheet, sparse
 from tests.abs_service.tracker.terms.depth.outline.outline_scene import (
     BESIDE_M,
@@ -210,24 +209,3 @@ def test_the_surface_hides_its_own_edge():
     distance = picture()
     result.observe(distance, classify(surfaces_of(distance), expected, CAMERA.fx), expected, moved(rolled, 0.0))
     assert result.fit(moved(rolled, 0.0)).occluded >= 11
-
-
-def test_a_slide_is_what_opposite_sides_agree_on():
-    right, left, down = (np.tile(direction, (10, 1)) for direction in ((1.0, 0.1), (-1.0, 0.1), (0.1, 1.0)))
-    directions = np.concatenate([right, left, down])
-    slid = np.repeat([0.03, -0.02, 0.0], 10)
-    assert displacement(slid, directions) == pytest.approx(0.02)
-    leant_against = np.repeat([0.03, 0.0, 0.0], 10)
-    assert displacement(leant_against, directions) == pytest.approx(0.01)  # the mean of all
-    held_by_two_hands = np.repeat([0.03, 0.03, 0.0], 10)
-    assert displacement(held_by_two_hands, directions) == pytest.approx(0.02)
-
-
-def test_one_side_tells_a_slide_if_the_opposite_one_is_out_of_sight():
-    right, down = np.tile([1.0, 0.1], (10, 1)), np.tile([0.1, 1.0], (30, 1))
-    directions = np.concatenate([right, down])
-    assert displacement(np.repeat([0.03, 0.0], [10, 30]), directions) == 0.03
-    few_of_it = np.repeat([0.03, 0.0], [4, 36])
-    assert displacement(few_of_it, directions) == pytest.approx(0.003)
-    assert displacement(np.full(5, 0.03), right[:5]) == pytest.approx(0.03)
-    assert displacement(np.zeros(0), np.zeros((0, 2))) == 0

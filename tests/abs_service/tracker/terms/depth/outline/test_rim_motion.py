@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 
-from abs_service.tracker.terms.depth.outline.rim_motion import motion
+from abs_service.tracker.terms.depth.outline.rim_motion import displacement, motion
 
 ALONG = np.linspace(-30, 30, 15)
+#: Least distance of an edge outside the outline if nothing tells how far [m].
+BEYOND_M = 0.004
 #: Edges of a square of 60 pixels: places and directions out of it, right, down, left and up.
 PLACES = 100 + np.concatenate([
     np.stack([np.full(15, 30), ALONG], axis=1), np.stack([ALONG, np.full(15, 30)], axis=1),
@@ -48,3 +50,48 @@ def test_edges_show_no_motion_along_the_outline():
         assert motion(off_by, out, 100 + 20 * arc) == 0
         assert motion(off_by, out - arc + OUT[:9], PLACES[:9]) == 0
         assert motion(3 * arc[:, 0], out, 100 + 20 * arc) == pytest.approx(3, rel=0.1)  # a slide across it is one
+
+
+def test_a_slide_is_what_opposite_sides_agree_on():
+    right, left, down = (np.tile(direction, (10, 1)) for direction in ((1.0, 0.1), (-1.0, 0.1), (0.1, 1.0)))
+    directions = np.concatenate([right, left, down])
+    slid = np.repeat([0.03, -0.02, 0.0], 10)
+    assert displacement(slid, directions, BEYOND_M) == pytest.approx(0.02)
+    leant_against = np.repeat([0.03, 0.0, 0.0], 10)
+    assert displacement(leant_against, directions, BEYOND_M) == pytest.approx(0.01)  # the mean of all
+    held_by_two_hands = np.repeat([0.03, 0.03, 0.0], 10)
+    assert displacement(held_by_two_hands, directions, BEYOND_M) == pytest.approx(0.02)
+
+
+def test_one_side_tells_a_slide_if_the_opposite_one_is_out_of_sight():
+    right, down = np.tile([1.0, 0.1], (10, 1)), np.tile([0.1, 1.0], (30, 1))
+    directions = np.concatenate([right, down])
+    assert displacement(np.repeat([0.03, 0.0], [10, 30]), directions, BEYOND_M) == 0.03
+    few_of_it = np.repeat([0.03, 0.0], [4, 36])
+    assert displacement(few_of_it, directions, BEYOND_M) == pytest.approx(0.003)
+    assert displacement(np.full(5, 0.03), right[:5], BEYOND_M) == pytest.approx(0.03)
+    assert displacement(np.zeros(0), np.zeros((0, 2)), BEYOND_M) == 0
+
+
+def strip(turn: float, left: list[float], right: list[float]) -> float:
+    """Displacement of a strip with 60 edges along each side on the outline, and with few at its ends [m]."""
+    long = [[0.0, 1.0], [0.0, -1.0]] * 60
+    directions = np.array([*long, *[[-1.0, 0.1]] * len(left), *[[1.0, -0.1]] * len(right)])
+    turned = directions @ np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
+    return displacement(np.array([*np.zeros(120), *left, *right]), turned, BEYOND_M)
+
+
+def test_the_ends_of_a_strip_tell_that_it_has_slid_however_it_lies():
+    """A belt that waved was TRACKING with a mesh that had slid by five widths: its ends had three and two edges."""
+    for turn in np.linspace(0, 2 * np.pi, 17):
+        assert strip(turn, [0.013, 0.02, 0.014], [-np.inf, -np.inf]) == pytest.approx(0.013)
+        assert strip(turn, [0.03, 0.03], [-0.01, -0.02]) == pytest.approx(0.01)
+        for held in ([0.013, 0.02, 0.0], [0.03]):  # an edge in its place contradicts, and one alone tells nothing
+            assert strip(turn, held, [-np.inf, -np.inf]) < 0.002
+        assert strip(turn, [0.03, 0.03, 0.03], [0.03, 0.03]) < 0.002  # two hands hold it
+
+
+def test_far_outside_counts_as_least_as_far_as_is_known():
+    sides = np.repeat([[1.0, 0.0], [-1.0, 0.0]], 10, axis=0)
+    assert displacement(np.repeat([0.02, -np.inf], 10), sides, BEYOND_M) == pytest.approx(0.02)
+    assert displacement(np.full(10, -np.inf), sides[:10], BEYOND_M) == pytest.approx(BEYOND_M)
