@@ -178,8 +178,8 @@ _UNMEASURED = "no sensor delivered all its images, so that nothing was measured 
 
 #: What may have happened where the free edges lie off the outline, and what to do.
 _SLID = (
-    "the mesh has slid or turned on it – it is made anew if that lasts; a print that a colour camera sees would hold it, "
-    "or more control points, if waves run along it"
+    "the mesh has slid or turned on it – it is made anew if that lasts; a print that a colour camera sees would hold "
+    "it, or more control points, if waves run along it"
 )
 _GOES_ON = (
     "nearly all of these end inside it, as where a side comes into sight that the first image did not show, where "

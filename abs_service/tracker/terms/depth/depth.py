@@ -59,7 +59,7 @@ class DepthTerm:
         self._view = synthesizer.view(sensor, np.zeros((vertices, 0), np.float32))
         self._outline = outline(self._view.camera)
         self._continuation = continuation(self._view.camera)
-        self._classifier = Classifier(self._view.camera.fx)
+        self._classifier = Classifier(self._view.camera)
         self._missing = np.zeros((1, vertices), np.float32)
         self._fluctuation = Fluctuation()
         self._texels = texels(sensor, synthesizer, noise, bounds)

@@ -10,6 +10,7 @@ from abs_service.tracker.detection.dropouts import dropouts
 from abs_service.tracker.terms.depth.classification.background import Background
 from abs_service.tracker.terms.depth.classification.beyond_view import BeyondView
 from abs_service.tracker.terms.depth.classification.interruption import interruptions
+from abs_service.tracker.terms.depth.classification.nearest_range import NearestRange
 from abs_service.tracker.terms.depth.classification.separation import separates, separating_step
 from abs_service.tracker.terms.depth.classification.visibility import (
     AGREEMENT_M,
@@ -18,18 +19,20 @@ from abs_service.tracker.terms.depth.classification.visibility import (
     classify,
     surfaces_of,
 )
+from calib.camera import Camera
 
 
 class Classifier:
-    """Knows from the first image where the background gives no return, and where the field of view and the object end.
+    """Knows from the first image where the background gives no return, and where field of view, range and object end.
 
     Args:
-        focal: focal length of the camera [px].
+        camera: the depth camera.
     """
 
-    def __init__(self, focal: float) -> None:
-        self._focal = focal
+    def __init__(self, camera: Camera) -> None:
+        self._focal = camera.fx
         self._background, self._beyond_view = Background(), BeyondView()
+        self._nearest_range = NearestRange(camera)
         self._begun, self._is_interrupted, self._step = False, True, LARGEST_STEP_M
 
     def classify(
@@ -45,6 +48,7 @@ class Classifier:
         """
         missing, silhouette = np.isnan(distance), np.isfinite(expected)
         beyond, single = self._beyond_view.observe(missing, silhouette, window), dropouts(missing)
+        beyond = beyond | self._nearest_range.observe(distance, missing & ~(single | beyond), silhouette, window)
         if not self._begun:
             self._step = separating_step(distance, silhouette)
         # A flat thing that is lifted ends as others do, and its surface may be steep then.

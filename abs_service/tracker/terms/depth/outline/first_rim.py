@@ -25,7 +25,7 @@ def classified_rim(
         distance: radial distances (height, width) [m] without mean offset, NaN without return.
     """
     expected = Raster(camera, mesh.faces).render(surface.vertices[0])
-    seen = Classifier(camera.fx).classify(distance, expected, WHOLE, distance.shape)
+    seen = Classifier(camera).classify(distance, expected, WHOLE, distance.shape)
     rim = Rim.of(mesh)
     # The classes do not depend on the standard deviation, which says how far from the outline distances are known.
     outline = RimOutline(camera, rim, deviation=1.0)

@@ -75,7 +75,7 @@ def test_a_stripe_of_the_first_image_is_no_background_of_the_later_ones():
     striped, expected = longer_sheet(), np.where(np.abs(RIGHT) < 0.15, ASIDE, np.inf).astype(np.float32)
     stripe = (RIGHT > 0.153) & (RIGHT < 0.175) & np.isfinite(ASIDE)
     striped[stripe] = np.nan
-    classifier = Classifier(CAMERA.fx)
+    classifier = Classifier(CAMERA)
     first = classifier.classify(striped, expected, WHOLE, striped.shape)
     assert first.hole[stripe].all()
     later = classifier.classify(striped, expected, WHOLE, striped.shape)

@@ -8,7 +8,9 @@ from abs_service.tracker.synthesis.window import WHOLE
 from abs_service.tracker.terms.depth.classification.classifier import Classifier
 from abs_service.tracker.terms.depth.classification.separation import separating_step
 from abs_service.tracker.terms.depth.classification.visibility import LARGEST_STEP_M
+from calib.camera import Camera
 
+CAMERA = Camera(160, 120, 140.0, 140.0, 79.5, 59.5)
 TABLE_M = 0.7
 THING, MESH = np.s_[30:90, 40:120], np.s_[33:87, 43:117]
 
@@ -41,7 +43,7 @@ def test_the_usual_step_is_kept_for_a_mesh_out_of_sight():
 def test_a_table_beside_a_flat_thing_is_not_the_object(nearer_m):
     distance, silhouette = scene(0.01)
     expected = np.where(silhouette, np.float32(TABLE_M - 0.01), np.float32(np.inf))
-    classifier = Classifier(140.0)
+    classifier = Classifier(CAMERA)
     first = classifier.classify(distance, expected, WHOLE, distance.shape)
     assert first.object[60, 80]
     assert first.free_m[60, 20] > 0
@@ -52,7 +54,7 @@ def test_a_table_beside_a_flat_thing_is_not_the_object(nearer_m):
 
 def test_a_flat_thing_that_is_lifted_is_classified_as_others_are():
     distance, silhouette = scene(0.01)
-    classifier = Classifier(140.0)
+    classifier = Classifier(CAMERA)
     for lifted_m, agreeing_m in ((0.0, 0.0), (0.1, 0.02)):  # farther off than the finer agreement
         distance[THING] -= np.float32(lifted_m)
         expected = np.where(silhouette, distance + np.float32(agreeing_m), np.float32(np.inf))
