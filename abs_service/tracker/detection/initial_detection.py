@@ -29,6 +29,8 @@ class InitialDetection:
         deviation: standard deviation of a distance of the object, median [m]; 0 if unknown. By the sensor's noise
             model, unless the image scatters much more.
         noise_scale: the deviation over that by the noise model.
+        fitting_scale: factor by which distances would have to be multiplied to scatter as the noise model says, if they
+            scatter otherwise and one of 0.1 and 10 is such a factor; else 1.
     """
 
     distance: NDArray[np.float32]
@@ -37,6 +39,7 @@ class InitialDetection:
     surroundings: NDArray[np.float32] = field(default_factory=lambda: np.zeros((0, 0), np.float32))
     deviation: float = 0.0
     noise_scale: float = 1.0
+    fitting_scale: float = 1.0
 
     @property
     def points(self) -> NDArray[np.float64]:

@@ -170,7 +170,14 @@ def left_out_warnings(detection: InitialDetection, mesh: Mesh) -> tuple[str, ...
 
 
 def noise_warnings(detection: InitialDetection) -> tuple[str, ...]:
-    """Doubts about the noise model of the distances, if it is not the one in use."""
+    """Doubts about the noise model of the distances, if it is not the one in use, or about their unit."""
+    if detection.fitting_scale != 1:
+        factor = "ten times" if detection.fitting_scale < 1 else "a tenth of"
+        return (
+            f"distances scatter as if they were {factor} the true ones, by the sensor's noise model: is the depth "
+            "scale right? The device, depth_scale of imported images or the sensor's depth.scale determines it; "
+            "if it is, the noise model is another sensor's",
+        )
     if detection.noise_scale == 1:
         return ()
     return (

@@ -19,6 +19,10 @@ from calib.rig import Rig
 #: differ from the object's by less than this share, because deviations change with the distance.
 TOO_MUCH_SCATTER, AS_FAR = 1.5, 0.25
 
+#: Distances that scatter by less or more than these factors of what their noise model says may have the wrong unit, if
+#: in another one they scatter by at most that factor otherwise: structured light has 0.6 to 2.1 times its model's.
+DOUBTFUL, FITTING, OTHER_SCALES = (0.25, 8.0), 2.5, (0.1, 10.0)
+
 
 def detect_object(
     observation: Observation, rig: Rig, reference: str, region: Region, vertices: resolution.Vertices
@@ -43,16 +47,18 @@ def detect_object(
     own = np.where(inside, distance, np.nan).astype(np.float32)
     deviation = _median_deviation(sensor.noise, image, inside)
     count = resolution.vertices(int(np.isfinite(own).sum())) if vertices == "auto" else vertices
-    scale = _noise_scale(sensor.noise, image, distance, inside)
-    return InitialDetection(own, sensor.camera, count, distance, scale * deviation, scale)
+    scatters, fitting = _scatter(sensor.noise, image, distance, inside)
+    scale = scatters if scatters > TOO_MUCH_SCATTER else 1.0
+    return InitialDetection(own, sensor.camera, count, distance, scale * deviation, scale, fitting)
 
 
-def _noise_scale(
+def _scatter(
     noise: DepthNoise, image: DepthImage, distance: NDArray[np.float32], inside: NDArray[np.bool_]
-) -> float:
-    """Factor on the noise model's deviation if distances of flat surfaces scatter much more than it states; else 1.
+) -> tuple[float, float]:
+    """Scatter of the distances of flat surfaces over that which the noise model states, and `fitting_scale`.
 
     The noise model weighs all measurements: with too small a deviation, many of a good mesh would seem to disagree.
+    Both are 1 if nothing is known.
 
     Args:
         noise: the model.
@@ -62,14 +68,23 @@ def _noise_scale(
     """
     own = distance[inside & np.isfinite(distance)]
     if not own.size:
-        return 1.0
+        return 1.0, 1.0
     middle = float(np.median(own))
     as_far = np.abs(distance - middle) < AS_FAR * middle
     deviation = _median_deviation(noise, image, as_far)
-    if not deviation:
-        return 1.0
-    factor = scatter(np.where(as_far, distance, np.nan)) * middle**2 / deviation
-    return factor if factor > TOO_MUCH_SCATTER else 1.0
+    seen = scatter(np.where(as_far, distance, np.nan)) * middle**2
+    if not (deviation and seen > 0):
+        return 1.0, 1.0
+    if DOUBTFUL[0] < seen / deviation < DOUBTFUL[1]:
+        return seen / deviation, 1.0
+    for scale in OTHER_SCALES:
+        scaled = DepthImage(image.distance * np.float32(scale), image.amplitude)
+        otherwise = _median_deviation(noise, scaled, as_far)
+        # Time of flight errs about as much at any distance, so its scatter tells nothing of the unit.
+        is_square = 1 / FITTING < otherwise / (scale**2 * deviation) < FITTING
+        if is_square and 1 / FITTING < scale * seen / otherwise < FITTING:
+            return seen / deviation, scale
+    return seen / deviation, 1.0
 
 
 def _deviations(noise: DepthNoise, image: DepthImage) -> NDArray[np.float32]:

@@ -56,6 +56,14 @@ def test_distances_that_scatter_more_than_their_noise_model_says_are_told():
     )
 
 
+@pytest.mark.parametrize(("fitting", "words"), [(0.1, "ten times the true ones"), (10.0, "a tenth of the true ones")])
+def test_a_unit_that_the_scatter_contradicts_is_told_instead_of_noise(fitting, words):
+    detection = replace(detect(SHEET, nearest.Settings().build()), noise_scale=11.0, fitting_scale=fitting)
+    (doubt,) = noise_warnings(detection)
+    assert doubt.startswith(f"distances scatter as if they were {words}")
+    assert "is the depth scale right?" in doubt
+
+
 def test_a_mesh_of_two_pieces_is_told_unless_a_file_has_it_so():
     distance = np.full((48, 64), 2.0, np.float32)
     distance[5:43, 6:58] = 1.0
