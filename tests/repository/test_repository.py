@@ -39,6 +39,8 @@ COLLECTIONS = (
 # Where a path means the same on every Linux machine.
 STANDARD = re.compile(r"/(bin|dev|etc|lib|opt|proc|run|sbin|srv|sys|usr|var)/")
 ABSOLUTE_PATH = re.compile(r"(?<![\w./:~$}-])(?:/[\w.+-]+){2,}")
+#: Images within a drawing.
+IMAGE_DATA = re.compile(r"(?<=;base64,)[A-Za-z0-9+/=\s]+")
 HOME = re.compile(r"/(home/\w+|root|Users/\w+)/")
 PACKAGE_INDEX = re.compile(r"index[-_]url|find[-_]links|trusted[-_]host|\b(pypi|pythonhosted|npmjs)[.](org|com)", re.I)
 
@@ -47,7 +49,7 @@ def test_every_file_is_portable() -> None:
     found = [
         f"{path}:{number}: {complaint}"
         for path, text in _tracked_texts()
-        for number, line in enumerate(text.splitlines(), start=1)
+        for number, line in enumerate(IMAGE_DATA.sub("", text).splitlines(), start=1)
         for complaint in _not_portable(line)
     ]
     assert found == []

@@ -16,12 +16,12 @@ HALF_M, NEAREST_M = np.array([0.1, 0.2]), 0.5
 BELOW = 97, 80
 
 
-def leaning(lean: float, roll: float = 0.0, noise_m: float = 0.0) -> np.ndarray:
-    """Distances of a sheet, turned in its plane, 0.6 m away in its middle, whose lower end leans to the camera [m]."""
+def leaning(lean: float, roll: float = 0.0, noise_m: float = 0.0, away_m: float = 0.6) -> np.ndarray:
+    """Distances of a sheet, turned in its plane, so far away in its middle, whose lower end leans to the camera [m]."""
     turn = np.array([[np.cos(roll), -np.sin(roll), 0], [np.sin(roll), np.cos(roll), 0], [0, 0, 1]])
     lower = np.array([[1, 0, 0], [0, np.cos(lean), np.sin(lean)], [0, -np.sin(lean), np.cos(lean)]])
     axes = lower @ turn
-    middle = np.array([0.0, 0.0, 0.6])
+    middle = np.array([0.0, 0.0, away_m])
     depth = (middle @ axes[:, 2]) / (RAYS @ axes[:, 2])
     on = np.all(np.abs((RAYS * depth[..., None] - middle) @ axes[:, :2]) < HALF_M, axis=-1)
     depth = depth + np.random.default_rng(1).normal(0, noise_m, depth.shape)
@@ -57,6 +57,11 @@ def test_where_the_range_ends_the_object_goes_on_unseen(lean, noise_m):
 @pytest.mark.parametrize(("lean", "roll"), [(0.0, 0.0), (0.0, 0.3), (0.9, 0.2), (-0.9, 0.3)])
 def test_a_sheet_that_ends_by_itself_ends_there(lean, roll):
     assert not seen(leaning(lean, roll)).beyond.any()
+
+
+def test_what_is_farther_than_any_camera_has_to_be_ends_by_itself():
+    """The near edge of a mat on a table, parallel to the image's rows, has one depth all along as well."""
+    assert not seen(leaning(0.9, away_m=0.9)).beyond.any()
 
 
 def test_nearer_returns_show_that_the_range_goes_on():
