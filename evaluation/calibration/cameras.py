@@ -1,4 +1,4 @@
-"""Joint calibration of cameras on published boards and on simulated rigs: the tables of docs/explanation/calibration.md.
+"""Joint calibration of cameras on published boards and on simulated rigs: tables of docs/explanation/calibration.md.
 
 Statistic: number of rigs whose true parameters lie inside their joint 95 % region; root mean square error of a coarse
 camera's pose by corners over that by corners and planes. Published boards are reported without a goal.
