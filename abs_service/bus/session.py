@@ -42,11 +42,6 @@ _ENDPOINT = re.compile(r"(tcp|tls|quic|udp|ws)/(\[[0-9a-fA-F:.]+\]|[^\s:/?#\[\]]
 LOG_LEVELS = f"{connection.LOG_LEVELS},zenoh_link_tls=warn"
 
 
-#: Threads of a router that receive. Each peer that stands still keeps one when its lease ends, as long as its socket is
-#: full; with the default, two on two cores, six stopped subscribers kept the whole rig from its router.
-RUNTIME = "(rx: (worker_threads: 32))"
-
-
 class BusError(Exception):
     """The bus cannot be opened; the message names the key, its value and the remedy."""
 
@@ -94,8 +89,6 @@ def open_session(
     if not sys.stdout.isatty():
         os.environ.setdefault("NO_COLOR", "1")  # zenoh's lines would have escape sequences
     zenoh.init_log_from_env_or(LOG_LEVELS)
-    if mode is SessionMode.ROUTER:
-        os.environ.setdefault("ZENOH_RUNTIME", RUNTIME)
     try:
         settings = _settings(
             endpoint, mode, pool_bytes() if shared_memory else 0, connect_timeout_ms, security, routers

@@ -9,7 +9,7 @@ from typing import Any, Self
 import zenoh
 from zenoh import ext
 
-from abs_service.bus import keys
+from abs_service.bus import keys, links
 from abs_service.bus.contract import EVENTS, Publisher, Qos, Sample, Subscription
 from abs_service.bus.security import link_log
 from abs_service.bus.security.mutual_tls import NO_SECURITY, MutualTls, NoSecurity
@@ -32,6 +32,7 @@ class ZenohBus:
         self._session = session
         self._rig = keys.check_name(rig)
         self._kept: list[Subscription] = []
+        self._links: Subscription = ExitStack()
 
     @classmethod
     def open(
@@ -46,8 +47,11 @@ class ZenohBus:
         """Opens a session and a bus on it; arguments and errors as in `open_session`."""
         keys.check_name(rig)  # before there is a session to be closed
         bus = cls(open_session(endpoint, mode, shared_memory, security=security, routers=routers), rig)
-        if mode is SessionMode.ROUTER and security.link:
-            bus._keep(from_non_daemon_thread(lambda: link_log.declare(bus._session)))
+        if mode is SessionMode.CLIENT:
+            on_link = links.RouterLog(endpoint, security.refusal).on_event
+        else:
+            on_link = link_log.on_event if security.link else _ignore
+        bus._links = bus._keep(from_non_daemon_thread(lambda: links.watch(bus._session, on_link)))
         return bus
 
     def publisher(self, topic: str, message: str, qos: Qos) -> Publisher:
@@ -148,6 +152,7 @@ class ZenohBus:
 
     def _close_session(self) -> None:
         try:
+            self._links.close()  # what it closes itself is no loss
             self._session.close()
         except zenoh.ZError as error:
             self._warn_of_callback(error)
@@ -179,6 +184,10 @@ class ZenohBus:
             sample.payload.to_bytes(),
             b"" if attachment is None else attachment.to_bytes(),
         )
+
+
+def _ignore(event: zenoh.LinkEvent) -> None:
+    pass
 
 
 def _message(encoding: zenoh.Encoding | None) -> str:

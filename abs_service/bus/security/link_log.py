@@ -1,7 +1,6 @@
 """Lines of the log about who connects to a router with mutual TLS, and with which name."""
 
 import logging
-from typing import Any
 
 import zenoh
 
@@ -11,12 +10,8 @@ from drivers.contract.text import printable
 _log = logging.getLogger(__name__)
 
 
-def declare(session: zenoh.Session) -> Any:
-    """Logs the links of a router until the returned handle is undeclared."""
-    return session.info.declare_link_events_listener(_on_event)
-
-
-def _on_event(event: zenoh.LinkEvent) -> None:
+def on_event(event: zenoh.LinkEvent) -> None:
+    """Takes an event of `links.watch`."""
     name, address = printable(event.link.auth_identifier or ""), event.link.dst
     if event.kind == zenoh.SampleKind.DELETE:
         _log.info("%s disconnected: %s", name, address)

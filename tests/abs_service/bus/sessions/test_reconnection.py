@@ -9,11 +9,15 @@ import zenoh
 from abs_client.connection.session import client_settings
 
 from abs_service.bus.session import SessionMode, open_session
+from abs_service.bus.zenoh_bus import ZenohBus
 from drivers.remote.address import Address
 from drivers.remote.link import open_link
+from tests.system.running import wait_until
 
 #: Longest time between two questions: a try takes 2 s, and another second may pass before the next [s].
 PATIENCE_S = 5.0
+
+CLIENT = SessionMode.CLIENT
 
 CLIENTS = {
     "bus": lambda endpoint: open_session(endpoint, SessionMode.CLIENT),
@@ -33,3 +37,15 @@ def test_a_try_that_gets_no_answer_does_not_keep_from_the_next(client, endpoint)
             first, _ = silent.accept()
             with first, silent.accept()[0] as second:
                 assert second.getpeername() != first.getpeername()
+
+
+def test_the_log_tells_when_a_router_is_gone_and_when_it_is_back(endpoint, caplog):
+    with closing(open_session(endpoint, SessionMode.ROUTER)) as router, ZenohBus.open("demo", endpoint, CLIENT):
+        router.close()
+        wait_until(lambda: f"the connection to {endpoint} is lost" in caplog.text, PATIENCE_S, "a line")
+        with closing(open_session(endpoint, SessionMode.ROUTER)):
+            wait_until(lambda: f"connected to {endpoint} again" in caplog.text, PATIENCE_S, "another line")
+            caplog.clear()
+            with ZenohBus.open("demo", endpoint, CLIENT):
+                pass
+            assert caplog.text == "", "what a process closes itself is no loss"
