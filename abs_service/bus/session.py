@@ -5,13 +5,15 @@ import logging
 import os
 import re
 import sys
+import time
 from collections.abc import Sequence
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, datetime
 from enum import StrEnum
 
 import zenoh
 
 from abs_service.bus.pools import own_size
+from abs_service.bus.security import expiry
 from abs_service.bus.security.mutual_tls import NO_SECURITY, MutualTls, NoSecurity
 from drivers.encoding.message_check import LARGEST_IMAGE
 from drivers.zenoh_session import connection, shared_memory
@@ -29,11 +31,11 @@ SHARED_MEMORY_POOLS = 8
 #: Free shared memory without which none is used: what zenoh needs beside the pools is 1.3 MB a process.
 MIN_SHARED_MEMORY_BYTES = 32 << 20
 
+#: The times that zenoh can write begin in 1970 and are shorter [s]: beyond, each message would end the process.
+WALL_CLOCK_S, WALL_CLOCK = 2**32, "zenoh needs one between 1970 and 2106; set it (timedatectl)"
+
 #: A larger message is refused before it is put together: an image of `message_check.LARGEST_IMAGE` and its attachment.
 LARGEST_MESSAGE_BYTES = LARGEST_IMAGE + (1 << 20)
-
-#: Time before the end of a certificate from which on each start warns of it.
-CERTIFICATE_ENDS = timedelta(days=30)
 
 _ENDPOINT = re.compile(r"(tcp|tls|quic|udp|ws)/(\[[0-9a-fA-F:.]+\]|[^\s:/?#\[\]]+):(?P<port>\d{1,5})([?#]\S*)?")
 
@@ -76,16 +78,18 @@ def open_session(
         routers: endpoints of other routers that a router connects to, whenever they are there.
 
     Raises:
-        BusError: the endpoint is malformed or in use, or its owner refuses this process.
+        BusError: the endpoint is malformed or in use, its owner refuses this process, or the wall clock is absurd.
         UnansweredError: nothing answers there.
         TlsError: a file of `security` cannot be used.
     """
+    if not 0 <= (now_s := time.time()) < WALL_CLOCK_S:
+        raise BusError(f"the wall clock is set to {datetime.fromtimestamp(now_s, UTC):%Y-%m-%d}: {WALL_CLOCK}")
     check_endpoint(endpoint, security)
     for other in routers:
         check_endpoint(other, security, "bus.routers")
     own = security.check(endpoint, mode is SessionMode.ROUTER)
-    if own and own.ends - datetime.now(UTC) < CERTIFICATE_ENDS:
-        _log.warning('the certificate "%s" ends on %s; after that, nobody can connect', own.name, own.ends.date())
+    if warning := expiry.warning(own):
+        _log.warning("%s", warning)
     if not sys.stdout.isatty():
         os.environ.setdefault("NO_COLOR", "1")  # zenoh's lines would have escape sequences
     zenoh.init_log_from_env_or(LOG_LEVELS)

@@ -14,13 +14,14 @@ class CheckedBus:
     Args:
         bus: the bus; closed with this one.
         clock: CLOCK_MONOTONIC [ns].
+        certificate: says what is wrong with that of this process; "" if nothing is.
 
     Attributes:
         trouble: refusals between the last two calls of `report`; "" if there were none.
     """
 
-    def __init__(self, bus: Bus, clock: Callable[[], int]) -> None:
-        self._bus = bus
+    def __init__(self, bus: Bus, clock: Callable[[], int], certificate: Callable[[], str] = str) -> None:
+        self._bus, self._certificate = bus, certificate
         self._edge = Edge(clock)
         self._reported = 0
         self.trouble = ""
@@ -31,13 +32,14 @@ class CheckedBus:
         self.close = bus.close
 
     def report(self, health: Health) -> None:
-        """Adds the refusals to the health of the process; call it before `Health.tick`."""
+        """Adds refusals and certificate to the health of the process; call it before `Health.tick`."""
         refused = self._edge.refused
         health.count_up_to(refused, "refused.")
         total = sum(refused.values())
         new, self._reported = total - self._reported, total
         self.trouble = f"refused {new} messages, the last: {self._edge.last_error}" if new else ""
         health.report("refused", Level.WARNING if new else Level.OK, self.trouble)
+        health.report("certificate", Level.WARNING if (trouble := self._certificate()) else Level.OK, trouble)
 
     def query(self, pattern: str, timeout_s: float) -> list[Sample]:
         """See `contract.Bus.query`."""

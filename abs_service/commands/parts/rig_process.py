@@ -14,6 +14,7 @@ from types import FrameType
 
 from abs_service import config
 from abs_service.bus.security import roles
+from abs_service.bus.security.expiry import Expiry
 from abs_service.bus.security.mutual_tls import TlsError
 from abs_service.bus.session import SessionMode
 from abs_service.bus.zenoh_bus import ZenohBus
@@ -91,9 +92,10 @@ def open_bus_at(
         try:
             security = rig.bus.security(*names, roles.RIG)
             bus = ZenohBus.open(rig.name, endpoint, mode, rig.bus.shared_memory, security, rig.bus.routers)
+            expiry = Expiry(security, endpoint, mode is SessionMode.ROUTER, time.monotonic_ns)
         except TlsError as error:
             raise SecurityError(f"{config.named(arguments.config)}: {error}") from None
-        with CheckedBus(bus, time.monotonic_ns) as checked:
+        with CheckedBus(bus, time.monotonic_ns, expiry.trouble) as checked:
             yield checked
 
 

@@ -27,6 +27,7 @@ from abs_service.commands.parts import rig_devices, rig_process
 from abs_service.supervision.exit_codes import Exit
 from abs_service.supervision.process_setup import process_tuning
 from abs_service.wire import control_commands
+from abs_service.wire.checked_bus import CheckedBus
 from drivers.contract.device import AddressError, Device, Sink
 from drivers.opening import open_device
 
@@ -64,7 +65,7 @@ def run(arguments: argparse.Namespace) -> int:
         for supervisor in supervisors:
             supervisor.start()
         configure = partial(follow, arguments.reconfigured, partial(_configure, metadata, arguments))
-        _watch(stop, supervisors, configure, lambda: tick(metadata, publishers, points, health, clock))
+        _watch(stop, supervisors, configure, lambda: tick(bus, metadata, publishers, points, health, clock))
         _close(supervisors)
         for publisher in (*publishers.values(), *points.values()):
             publisher.close()
@@ -140,6 +141,7 @@ def _close(supervisors: list[DeviceSupervisor]) -> None:
 
 
 def tick(
+    bus: CheckedBus,
     metadata: MetadataPublisher,
     publishers: Mapping[str, FramePublisher],
     points: Mapping[str, PointCloudPublisher],
@@ -158,6 +160,7 @@ def tick(
         health.report("clock", Level.OK)
     _count(publishers, points, health)
     metadata.publish()
+    bus.report(health)
     health.tick()
 
 

@@ -22,6 +22,7 @@ from abs_service.capture.metadata_publisher import MetadataPublisher
 from abs_service.commands.parts import rig_devices
 from abs_service.commands.parts.rig_devices import HeadError
 from abs_service.commands.processes import capture as command
+from abs_service.wire.checked_bus import CheckedBus
 from abs_service.wire.message_header import MESSAGES
 from calib import pose
 from calib.lenses.fisheye import KannalaBrandt
@@ -134,7 +135,7 @@ def test_a_step_of_the_wall_clock_is_reported_once(metadata):
     for step_ns in (0, 3600 * 10**9, 0):
         now["monotonic"] += 10**9
         now["wall"] += 10**9 + step_ns
-        command.tick(metadata, {}, {}, health, clock)
+        command.tick(CheckedBus(bus, clock.monotonic), metadata, {}, {}, health, clock)
         levels.append((health.level, health_now(health, bus).counters["clock_steps"]))
     assert levels == [(Level.OK, 0), (Level.WARNING, 1), (Level.OK, 1)]
     said = [Message.FromString(sample.payload).message for sample in bus.sent if sample.topic == "health/capture"]

@@ -177,6 +177,13 @@ class TestABusThatIsChecked:
         checked.report(health)  # nothing new
         assert health_now(health, health_bus).level == Health.LEVEL_OK
 
+    def test_tells_what_is_wrong_with_the_certificate_of_the_process(self):
+        bus = LoopbackBus()
+        health = HealthPublisher(bus, "capture", HeaderFactory("demo", WallClock()))
+        CheckedBus(bus, lambda: 0, lambda: "it ends tomorrow").report(health)
+        said = health_now(health, bus)
+        assert (said.level, said.message) == (Health.LEVEL_WARNING, "it ends tomorrow")
+
     def test_answers_are_checked_too(self):
         bus = LoopbackBus()
         bus.answer_queries("tof/model", "absmsg.v1.SensorModel", lambda: SensorModel().SerializeToString())

@@ -7,10 +7,14 @@ from datetime import UTC, datetime, timedelta
 import pytest
 
 from abs_service import cli
-from abs_service.bus import session
-from abs_service.bus.security.mutual_tls import MutualTls, TlsError
+from abs_service.bus import links, session
+from abs_service.bus.security import expiry
+from abs_service.bus.security.expiry import Expiry
+from abs_service.bus.security.mutual_tls import Certificate, MutualTls, TlsError
 from abs_service.bus.session import BusError, SessionMode, check_endpoint, open_session
+from abs_service.bus.zenoh_bus import ZenohBus
 from tests.conftest import encrypted
+from tests.system.running import wait_until
 
 
 @pytest.fixture
@@ -99,7 +103,7 @@ def test_a_name_that_is_no_role_is_refused(lab):
 def test_a_certificate_that_ends_soon_is_warned_of(keys, endpoint, caplog, monkeypatch):
     open_session(encrypted(endpoint), SessionMode.ROUTER, security=tls(keys, "rig")).close()
     assert caplog.text == ""
-    monkeypatch.setattr(session, "CERTIFICATE_ENDS", timedelta(days=400))
+    monkeypatch.setattr(expiry, "ENDS", timedelta(days=400))
     open_session(encrypted(endpoint), SessionMode.ROUTER, security=tls(keys, "rig")).close()
     assert 'the certificate "rig" ends on 20' in caplog.text
 
@@ -132,3 +136,43 @@ def test_a_client_without_tls_is_refused(secured, endpoint, monkeypatch):
     secured("rig", SessionMode.ROUTER)
     with pytest.raises(BusError, match="nothing answers there"):
         open_session(endpoint.replace("127.0.0.1", "localhost"), SessionMode.CLIENT)
+
+
+def test_the_end_of_a_certificate_is_told_while_a_process_runs_until_there_is_a_new_one(lab, monkeypatch):
+    now_ns, long_ns = 0, expiry.PERIOD_NS
+    client = Expiry(tls(lab), "tls/localhost:1", False, lambda: now_ns)
+    router = Expiry(tls(lab, "rig"), "tls/localhost:1", True, lambda: now_ns)
+    assert client.trouble() == router.trouble() == ""
+    monkeypatch.setattr(expiry, "ENDS", timedelta(days=400))
+    assert client.trouble().startswith('the certificate "viewer" ends on 20')
+    assert router.trouble().startswith('the certificate "rig" ends on 20')
+    monkeypatch.setattr(expiry, "ENDS", timedelta(days=30))
+    for name in ("viewer", "rig"):
+        expire(lab, name)
+    now_ns += long_ns
+    assert client.trouble().endswith("certificate has expired")  # with which it cannot connect again
+    assert router.trouble() == "", "a router goes on with the one that it has read when it started"
+    assert cli.main(["keys", str(lab / "new"), "--only", "viewer", "--authority", str(lab)]) == 0
+    for file in ("viewer.pem", "viewer.key"):
+        shutil.copy(lab / "new" / file, lab / file)
+    assert client.trouble() == ""
+
+
+def test_a_certificate_that_has_ended_is_told_so():
+    yesterday = datetime.now(UTC) - timedelta(days=1)
+    assert expiry.warning(Certificate("rig", yesterday)).startswith(
+        f'the certificate "rig" has ended on {yesterday:%Y}'
+    )
+    assert expiry.warning(None) == ""
+
+
+def test_the_log_says_why_a_router_that_was_lost_cannot_be_reached(tmp_path, keys, endpoint, caplog, monkeypatch):
+    monkeypatch.setattr(links, "PATIENCE_S", 1.0)
+    assert cli.main(["keys", str(tmp_path / "new"), "--only", "rig", "--host", "localhost"]) == 0
+    address = encrypted(endpoint)
+    router = open_session(address, SessionMode.ROUTER, security=tls(keys, "rig"))
+    with ZenohBus.open("demo", address, SessionMode.CLIENT, security=tls(keys)):
+        router.close()
+        other = open_session(address, SessionMode.ROUTER, security=tls(tmp_path / "new", "rig"))
+        wait_until(lambda: "its certificate is refused here" in caplog.text, 10.0, "the reason")
+        other.close()

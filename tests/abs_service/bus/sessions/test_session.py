@@ -4,6 +4,8 @@ import os
 import subprocess
 import sys
 import threading
+import time
+from datetime import UTC, datetime
 
 import pytest
 import zenoh
@@ -76,3 +78,10 @@ def test_lines_of_zenoh_have_no_escape_sequences_where_no_terminal_is(endpoint):
     said = done.stdout + done.stderr
     assert "zenoh" in said
     assert "\x1b" not in said
+
+
+@pytest.mark.parametrize("year", [1969, 2107])
+def test_a_wall_clock_beyond_the_times_of_zenoh_is_told(year, endpoint, monkeypatch):
+    monkeypatch.setattr(time, "time", lambda: datetime(year, 1, 1, tzinfo=UTC).timestamp())
+    with pytest.raises(BusError, match=f"the wall clock is set to {year}-01-01: zenoh needs one between"):
+        open_session(endpoint, SessionMode.ROUTER)
