@@ -1,4 +1,4 @@
-"""Faults of other programs on the bus: messages that no rig sends, and a subscriber that stands still."""
+"""Faults of other programs on the bus: messages that no rig sends, and subscribers that stand still."""
 
 import math
 import random
@@ -6,12 +6,14 @@ import signal
 import subprocess
 import sys
 import time
+from functools import partial
 
 from absmsg.v1.frame_info_pb2 import FrameInfo
 from absmsg.v1.health_pb2 import Health
 
 from abs_service.bus import keys
 from abs_service.bus.contract import EVENTS
+from abs_service.bus.session import BusError, SessionMode, open_session
 from abs_service.bus.zenoh_bus import ZenohBus
 from evaluation.service.faults.fault import Fault, Made
 from evaluation.service.faults.listener import DEPTH
@@ -21,13 +23,14 @@ from evaluation.service.live.subscriber import connect
 
 #: Messages on every key, and on the one key that is flooded.
 GARBAGE, FLOOD = 20, 5000
-#: For how long a subscriber is stopped [s].
-STOP_S = 3.0
-#: A subscriber of everything, as an application would be one.
-SUBSCRIBER = """
+#: For how long a subscriber is stopped, and several, which is longer than their lease [s].
+STOP_S, LONG_STOP_S = 3.0, 6.0
+#: Subscribers of everything, as applications of another host would be: without shared memory, sockets fill.
+SUBSCRIBERS = """
 import sys, time
-from evaluation.service.live.subscriber import connect
-connect(sys.argv[1], sys.argv[2]).subscribe("**", lambda sample: None)
+from abs_service.bus.session import SessionMode, open_session
+sessions = [open_session(sys.argv[1], SessionMode.CLIENT, shared_memory=False) for _ in range(int(sys.argv[3]))]
+subscribers = [session.declare_subscriber(f"abs/{sys.argv[2]}/**", lambda sample: None) for session in sessions]
 time.sleep(600)
 """
 
@@ -74,16 +77,20 @@ def forged_epoch(rig: RunningRig) -> Made:
     return _left(rig, bus, begin_ns)
 
 
-def stopped_subscriber(rig: RunningRig) -> Made:
-    """A subscriber of everything is stopped, and killed in the end."""
-    arguments = [sys.executable, "-c", SUBSCRIBER, rig.endpoint, NAME]
-    with subprocess.Popen(arguments) as subscriber:
-        time.sleep(STOP_S)  # until it has subscribed
-        begin_ns = rig.now_ns()
-        subscriber.send_signal(signal.SIGSTOP)
-        time.sleep(STOP_S)
-        subscriber.kill()
-        return Made(begin_ns, rig.now_ns())
+def stopped_subscribers(rig: RunningRig, number: int, stop_s: float) -> Made:
+    """So many subscribers of everything are stopped, and killed in the end."""
+    arguments = [sys.executable, "-c", SUBSCRIBERS, rig.endpoint, NAME, str(number)]
+    with subprocess.Popen(arguments) as subscribers:
+        time.sleep(STOP_S)  # until they have subscribed
+        begin_ns, broken = rig.now_ns(), ""
+        subscribers.send_signal(signal.SIGSTOP)
+        time.sleep(stop_s)
+        try:
+            open_session(rig.endpoint, SessionMode.CLIENT, shared_memory=False).close()
+        except BusError as error:
+            broken = str(error)
+        subscribers.kill()
+        return Made(begin_ns, rig.now_ns(), broken)
 
 
 def _left(rig: RunningRig, bus: ZenohBus, begin_ns: int) -> Made:
@@ -105,7 +112,13 @@ FAULTS = (
     Fault(
         f"a subscriber of everything is stopped for {STOP_S:g} s",
         "nobody waits for it",
-        stopped_subscriber,
+        partial(stopped_subscribers, number=1, stop_s=STOP_S),
+        noticed_s=math.inf,
+    ),
+    Fault(
+        f"six subscribers of everything are stopped for {LONG_STOP_S:g} s",
+        "nobody waits for them; others can connect",
+        partial(stopped_subscribers, number=6, stop_s=LONG_STOP_S),
         noticed_s=math.inf,
     ),
 )
