@@ -15,7 +15,7 @@ Points = NDArray[np.float64]
 Dictionary = Literal[
     "4x4_50", "4x4_100", "4x4_250", "4x4_1000", "5x5_50", "5x5_100", "5x5_250", "5x5_1000", "6x6_50", "6x6_100",
     "6x6_250", "6x6_1000", "7x7_50", "7x7_100", "7x7_250", "7x7_1000", "original",
-    "apriltag_16h5", "apriltag_25h9", "apriltag_36h10", "apriltag_36h11",
+    "apriltag_16h5", "apriltag_25h9", "apriltag_36h10", "apriltag_36h11", "mip_36h12",
 ]  # fmt: skip
 
 #: OpenCV's marker dictionaries, in the order of its enumeration.

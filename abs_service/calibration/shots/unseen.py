@@ -1,14 +1,14 @@
 """Clauses on images that do not show the board: their number, and the reasons by frequency."""
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
-from dataclasses import replace
+from collections.abc import Collection, Iterable, Sequence
 
 from abs_service.calibration.shots.corner_extraction import BoardObservations
 from abs_service.calibration.shots.shots import Shot
 from calib.board.april_grid import AprilGrid
 from calib.board.corners import description, errors
-from calib.board.corners.search import chessboard_size, find
+from calib.board.corners.other_discs import other_discs
+from calib.board.corners.search import chessboard_size
 from calib.board.corners.to_8bit import Grey, grey
 from calib.board.target import AsymmetricCircles, Charuco, Chessboard, Circles, Target
 
@@ -38,8 +38,17 @@ def reason(target: Target, seen: BoardObservations, shown: Sequence[Shot]) -> st
     count = len(seen.rejected)
     parts = reasons(seen.rejected.values())
     advice = f". {STILLS}" if mostly_moved(seen) else ""
-    other = f". {said}" if (said := instead(target, shown)) else ""
+    other = f". {said}" if (said := instead(target, shown) or _advice(seen.rejected.values())) else ""
     return f"no {_name(target)} in any of {count} images: {parts}{other}{advice}"
+
+
+def _advice(errors_: Collection[Exception]) -> str:
+    """Sentence of the first error of the most frequent kind, if its kind alone does not say what to do; else ""."""
+    (kind, _), *_ = Counter(map(type, errors_)).most_common(1)
+    if kind not in (errors.OtherBoardError, errors.MirroredBoardError):
+        return ""
+    said = str(next(error for error in errors_ if type(error) is kind))
+    return said[0].upper() + said[1:]
 
 
 def instead(target: Target, shown: Sequence[Shot]) -> str:
@@ -117,11 +126,9 @@ def _instead(target: Target, shown: Sequence[Shot]) -> str:
     for image, levels in images:
         if said := description.mismatch(target, levels):
             return f"{image} {said}"
-    for image, levels in images[-1:] if isinstance(target, Circles) else ():
-        if len(find(replace(target, columns=target.rows, rows=target.columns), levels)[0]):
-            return f"{image} shows a grid of {target.rows} × {target.columns} discs"
     if isinstance(target, Circles | AsymmetricCircles):
-        return ""
+        clauses = ((image, other_discs(target, levels)) for image, levels in images)
+        return next((f"{image} {said}" for image, said in clauses if said), "")
     # Of some images only a part of the board is found, so that two have to agree.
     sizes = Counter(chessboard_size(levels) for _, levels in images)
     ((columns, rows), count), *_ = sizes.most_common(1) or [((0, 0), 0)]

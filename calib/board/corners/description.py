@@ -36,7 +36,7 @@ _MISREAD = 0.05
 #: Kalibr's tags have a wider frame than markers.
 _APRIL_GRID = "apriltag_36h11"
 
-#: Dictionaries with so many markers that a search for others than the described one leaves them out.
+#: Dictionaries with so many markers that a search leaves them out, unless the description is of their kind.
 _SLOW = re.compile("_1000|36h10")
 
 #: Said of a board whose upper left square is of the other colour, by whether that is black.
@@ -76,20 +76,29 @@ class _Markers:
 def mismatch(target: Target, levels: Grey) -> str:
     """Clause on what markers in an image say against the description of a board; "" if they say nothing."""
     image = _smaller(levels)
-    own = (_family(target.dictionary), 1) if isinstance(target, Charuco) else (_APRIL_GRID, BORDER)
-    every = [(name, 1) for name in dict.fromkeys(map(_family, DICTIONARIES)) if not _SLOW.search(name)]
-    seen = _markers(image, *own)
+    family, border = (_family(target.dictionary), 1) if isinstance(target, Charuco) else (_APRIL_GRID, BORDER)
+    # Some of the markers with a wider frame look like others with a narrow one, and the other way round.
+    seen = max((_markers(image, family, each) for each in (border, 3 - border)), key=lambda each: len(each.ids))
     if len(seen.ids) < MIN_MARKERS:
-        if len(_markers(255 - image, *own).ids) >= MIN_MARKERS:
+        if len(_markers(255 - image, family, border).ids) >= MIN_MARKERS:
             return "shows markers in white on black instead of black on white"
-        seen = max((_markers(image, *each) for each in (*every, (_APRIL_GRID, BORDER))), key=lambda each: len(each.ids))
+        seen = max((_markers(image, *each) for each in _others(target)), key=lambda each: len(each.ids))
     if len(seen.ids) < MIN_MARKERS:
         return ""
-    if isinstance(target, AprilGrid) != (seen.border == BORDER) or not isinstance(target, Charuco | AprilGrid):
-        kind = "an AprilGrid" if seen.border == BORDER else f"a ChArUco with markers of the dictionary {seen.name}"
-        return f"shows {kind}"
-    if isinstance(target, Charuco) and _family(target.dictionary) != seen.family:
+    return _against(target, seen)
+
+
+def _against(target: Target, seen: _Markers) -> str:
+    if (seen.family, seen.border) == (_APRIL_GRID, BORDER):
+        return _misplaced(target, seen) if isinstance(target, AprilGrid) else "shows an AprilGrid"
+    if _is_lattice(seen):
+        return f"shows single markers of the dictionary {seen.name} without a chessboard, which are not supported"
+    if not isinstance(target, Charuco):
+        return f"shows a ChArUco with markers of the dictionary {seen.name}"
+    if _family(target.dictionary) != seen.family:
         return f"shows markers of the dictionary {seen.name}, the description says {target.dictionary}"
+    if seen.border > 1:
+        return f"shows markers with a black frame of {seen.border} cells; a ChArUco has 1 here"
     return _misplaced(target, seen)
 
 
@@ -132,6 +141,25 @@ def _family(dictionary: str) -> str:
     return re.sub(r"^(\dx\d)_(50|100|250)$", r"\1_250", dictionary)
 
 
+def _others(target: Target) -> list[tuple[str, int]]:
+    """Dictionaries and widths of frames [cells] to search for markers that are not as described."""
+    every = [name for name in dict.fromkeys(map(_family, DICTIONARIES)) if not _SLOW.search(name)]
+    others = [*((name, 1) for name in every), (_APRIL_GRID, BORDER)]
+    if isinstance(target, Charuco):
+        others += [(f"{bits[0]}_1000", 1) for bits in re.finditer(r"^\dx\d", target.dictionary)]
+    return others
+
+
+def _is_lattice(seen: _Markers) -> bool:
+    """True if markers stand in rows and columns without the squares between them that a ChArUco has."""
+    columns = range(2, _MAX_COLUMNS + 1)
+    boards = (_places(seen.ids, each, black) for each in columns for black in (True, False))
+    if len(seen.ids) < MIN_PLACED or min(_off(each, seen.centers) for each in boards) < _OFF:
+        return False
+    lattices = (_lattice(seen.ids, each) * (1, up) for each in columns for up in (1, -1))
+    return min(_off(each, seen.centers) for each in lattices) < _OFF
+
+
 def _markers(levels: Grey, family: str, border: int) -> _Markers:
     parameters = cv2.aruco.DetectorParameters()
     parameters.markerBorderBits = border
@@ -145,7 +173,8 @@ def _misplaced(target: Charuco | AprilGrid, seen: _Markers) -> str:
     """Other numbers of columns and rows, or squares of the other colour, by where markers stand."""
     count = target.columns * target.rows // (2 if isinstance(target, Charuco) else 1)
     size, largest = f"{target.columns} × {target.rows}", int(seen.ids.max())
-    ids = f"shows markers with ids up to {largest}, a board of {size} has 0 to {count - 1}"
+    numbers = f"from {seen.ids.min()} to {largest}" if seen.ids.min() else f"up to {largest}"
+    ids = f"shows markers with ids {numbers}, a board of {size} has 0 to {count - 1}"
     columns, is_first_black = _layout(target, seen)
     if not columns:
         return ids if largest >= count else ""
@@ -153,7 +182,8 @@ def _misplaced(target: Charuco | AprilGrid, seen: _Markers) -> str:
         return _OTHER_PATTERN[is_first_black]
     if columns == target.columns:
         return ids if largest >= count else ""
-    if columns == target.rows and largest < count:
+    is_last_row_seen = largest >= count * (1 - 1 / target.columns)
+    if columns == target.rows and is_last_row_seen and largest < count:
         return f"fits with columns and rows exchanged, {columns} × {target.columns} instead of {size}"
     return f"shows markers with ids up to {largest} that stand as on a board of {columns} columns, not of {size}"
 
@@ -165,7 +195,10 @@ def _layout(target: Charuco | AprilGrid, seen: _Markers) -> tuple[int, bool]:
         return 0, True
     colors = (True, False) if isinstance(target, Charuco) else (True,)
     tried = {
-        (columns, black): _off(_places(target, seen.ids, columns, black), seen.centers)
+        (columns, black): _off(
+            _lattice(seen.ids, columns) if isinstance(target, AprilGrid) else _places(seen.ids, columns, black),
+            seen.centers,
+        )
         for columns in range(2, _MAX_COLUMNS + 1)
         for black in colors
     }
@@ -180,10 +213,13 @@ def _is_first_black(target: Charuco | AprilGrid) -> bool:
     return target.is_first_black if isinstance(target, Charuco) else True
 
 
-def _places(target: Charuco | AprilGrid, ids: NDArray[np.intp], columns: int, black: bool) -> NDArray[np.float64]:
-    """Places of markers on a board of a number of columns (n, 2) [squares]."""
-    if isinstance(target, AprilGrid):
-        return np.stack([ids % columns, -(ids // columns)], axis=1).astype(np.float64)
+def _lattice(ids: NDArray[np.intp], columns: int) -> NDArray[np.float64]:
+    """Places of tags on an AprilGrid of a number of columns (n, 2) [tags]."""
+    return np.stack([ids % columns, -(ids // columns)], axis=1).astype(np.float64)
+
+
+def _places(ids: NDArray[np.intp], columns: int, black: bool) -> NDArray[np.float64]:
+    """Places of markers on a ChArUco of a number of columns (n, 2) [squares]."""
     row, column = np.divmod(np.arange(2 * (int(ids.max()) + columns + 1)), columns)
     white = (row + column) % 2 == int(black)
     return np.stack([column[white][ids], row[white][ids]], axis=1).astype(np.float64)

@@ -196,6 +196,12 @@ def is_cut_off(target: Target, levels: Grey) -> bool:
     return bool(regular and (to_end < _CUT * closest).any())
 
 
+def count_of_discs(target: Circles | AsymmetricCircles, levels: Grey) -> int:
+    """Number of blobs in an image that may be discs of a board."""
+    levels = _scaled(levels, next(_scales(target, levels)))
+    return len(_disc_detector(target, levels).detect(levels))
+
+
 def _find_circles(target: Circles | AsymmetricCircles, levels: Grey, kind: int) -> tuple[bool, NDArray[np.floating]]:
     nothing = False, np.zeros((0, 2))
     discs = target.columns * target.rows

@@ -9,8 +9,9 @@ import pytest
 from calib.board.corners.description import mismatch
 from calib.board.corners.detection import detect
 from calib.board.corners.errors import NothingFoundError, OtherBoardError
+from calib.board.corners.other_discs import other_discs
 from calib.board.corners.to_8bit import grey
-from calib.board.target import AprilGrid, Charuco, Chessboard
+from calib.board.target import AprilGrid, AsymmetricCircles, Charuco, Chessboard, Circles, Dictionary
 from tests.calib.board.boards import VGA, as_bytes, centered, photograph
 
 GRID = AprilGrid(6, 5, 0.03, 0.009)
@@ -91,3 +92,57 @@ def test_a_grid_that_begins_with_another_number_is_refused(monkeypatch: pytest.M
     image = as_bytes(photograph(GRID, VGA, centered(GRID, (0.2, 0.1, 0.3), 0.42)))
     with pytest.raises(OtherBoardError, match="with number 0 in the lower left corner"):
         detect(GRID, image)
+
+
+@pytest.mark.parametrize(("name", "tags"), [("DICT_6X6_250", "6x6_50"), ("DICT_APRILTAG_36h11", "apriltag_36h11")])
+def test_single_markers_are_not_taken_for_a_charuco(name: str, tags: str) -> None:
+    dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name))
+    image = grey(cv2.aruco.GridBoard((7, 5), 0.03, 0.006, dictionary).generateImage((1024, 736), marginSize=20))
+    for board in (AprilGrid(7, 5, 0.03, 0.006), Chessboard(7, 5, 0.03), Charuco(7, 5, 0.03, 0.022, "4x4_50")):
+        told = f"shows single markers of the dictionary {tags} without a chessboard, which are not supported"
+        assert mismatch(board, image) == told
+
+
+@pytest.mark.parametrize(
+    ("name", "first", "border", "described", "told"),
+    [
+        ("DICT_5X5_100", 0, 2, "5x5_100", "shows markers with a black frame of 2 cells; a ChArUco has 1 here"),
+        ("DICT_4X4_1000", 500, 1, "4x4_50", "markers of the dictionary 4x4_1000, the description says 4x4_50"),
+        ("DICT_5X5_100", 30, 1, "5x5_50", "markers with ids from 30 to 46, a board of 7 × 5 has 0 to 16"),
+        ("DICT_ARUCO_MIP_36h12", 0, 1, "5x5_50", "the dictionary mip_36h12, the description says 5x5_50"),
+        ("DICT_ARUCO_MIP_36h12", 0, 1, "mip_36h12", ""),
+    ],
+)
+def test_markers_of_an_unusual_print_are_named(
+    name: str, first: int, border: int, described: Dictionary, told: str
+) -> None:
+    dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name))
+    printed = cv2.aruco.CharucoBoard((7, 5), 0.03, 0.022, dictionary, np.arange(first, first + 17))
+    image = grey(printed.generateImage((900, 640), marginSize=20, borderBits=border))
+    assert mismatch(Charuco(7, 5, 0.03, 0.022, described), image).endswith(told)
+
+
+def test_columns_and_rows_are_exchanged_only_if_the_last_row_is_there() -> None:
+    square = AprilGrid(6, 6, 0.03, 0.009)
+    image = as_bytes(photograph(square, VGA, centered(square, (0.2, 0.1, 0.3), 0.45)))
+    told = "shows markers with ids up to 35 that stand as on a board of 6 columns, not of 7 × 6"
+    assert mismatch(AprilGrid(7, 6, 0.03, 0.009), image) == told
+
+
+@pytest.mark.parametrize(
+    ("described", "told"),
+    [
+        (Circles(8, 5, 0.02, 0.012), "shows a grid of 7 × 5 discs"),
+        (AsymmetricCircles(7, 5, 0.02, 0.012), "shows a grid of 7 × 5 discs"),
+    ],
+)
+def test_the_grid_of_discs_that_is_there_is_named(described: Circles | AsymmetricCircles, told: str) -> None:
+    board = Circles(7, 5, 0.02, 0.012)
+    assert other_discs(described, as_bytes(photograph(board, VGA, centered(board, (0.2, 0.1, 0.1), 0.25)))) == told
+
+
+def test_discs_in_shifted_rows_are_no_regular_grid() -> None:
+    board = AsymmetricCircles(4, 11, 0.015, 0.012)
+    image = as_bytes(photograph(board, VGA, centered(board, (0.2, 0.1, 1.5), 0.25)))
+    assert other_discs(Circles(4, 11, 0.015, 0.012), image) == "shows an asymmetric grid of 4 × 11 discs"
+    assert other_discs(board, 255 - image) == "shows white discs on black instead of black ones on white"

@@ -12,7 +12,7 @@ from abs_service import cli
 from abs_service.calibration.files import target_file
 from abs_service.calibration.shots import unseen
 from abs_service.calibration.shots.shots import SensorShot, Shot
-from calib.board.target import Charuco, Chessboard, Target
+from calib.board.target import AprilGrid, Charuco, Chessboard, Target
 from tests.abs_service.calibration.simulated import scene
 from tests.calib.board.boards import VGA, as_bytes, centered, photograph
 
@@ -36,7 +36,7 @@ def test_a_board_that_is_in_no_image_is_said_with_what_is_there(said, data_set: 
     images = f"left={data_set('calib_opencv_stereo')}/left0[1-4].jpg"
     error = said(Chessboard(10, 7, 0.025), "--images", images)
     assert "no board of 10 × 7 inner corners in any of 4 images: nothing found in 3" in error
-    assert "2 images show a board of 9 × 6 inner corners: correct the description" in error
+    assert "3 images show a board of 9 × 6 inner corners: correct the description" in error
 
 
 @pytest.mark.parametrize(("hidden", "told"), [(1, False), (0, True)])
@@ -150,3 +150,25 @@ def test_a_board_of_which_too_few_images_show_a_part_is_named(said, tmp_path: Pa
     error = said(Chessboard(9, 5, 0.025), "--images", f"color={tmp_path}/c_*.png")
     assert "Not used: " in error
     assert "2 images show a board of 9 × 6 inner corners: correct the description" in error
+
+
+def test_what_is_wrong_with_a_grid_and_what_to_do_about_a_mirror_is_said(said, tmp_path: Path) -> None:
+    board = AprilGrid(4, 3, 0.03, 0.009)
+    image = as_bytes(photograph(board, VGA, centered(board, (0.2, 0.1, 0.1), 0.3)))
+    cv2.imwrite(str(tmp_path / "c_0.png"), image)
+    cv2.imwrite(str(tmp_path / "m_0.png"), image[:, ::-1])
+    error = said(AprilGrid(4, 3, 0.03, 0.02), "--images", f"color={tmp_path}/c_*.png")
+    assert "not as described in 1. The gaps between the tags are 0.30 of a tag wide, but 0.67 as described" in error
+    error = said(board, "--images", f"color={tmp_path}/m_*.png")
+    assert "mirrored in 1. The board is seen as in a mirror: switch off the mirroring" in error
+
+
+def test_one_image_of_three_that_shows_only_a_part_hides_no_other_board(said, tmp_path: Path) -> None:
+    board = Chessboard(9, 6, 0.025)
+    for number in range(4):
+        shown = Chessboard(7, 5, 0.025) if number == 3 else board
+        image = as_bytes(photograph(shown, VGA, centered(board, (0.2, 0.1, 0.3 * number), 0.4)))
+        cv2.imwrite(str(tmp_path / f"c_{number}.png"), image)
+    assert "2 images show a board of 9 × 6 inner corners" in said(
+        Chessboard(10, 7, 0.025), "--images", f"color={tmp_path}/c_*.png"
+    )
