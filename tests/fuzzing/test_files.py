@@ -47,7 +47,7 @@ PARTS = (
 SUFFIXES = (".png", ".jpg", ".tiff", ".pgm", ".bmp", ".webp")
 CAMERA = Camera(640, 480, 500.0, 501.0, 319.5, 239.5)
 INTRINSICS = b'{"width": 4, "height": 3, "intrinsic_matrix": [4, 0, 0, 0, 4, 0, 1.5, 1, 1], "depth_scale": 1000}'
-FORMATS = ("kalibr", "ros", "opencv", "depthai", "mrcal")
+FORMATS = ("kalibr", "ros", "opencv", "depthai", "mrcal", "colmap")
 
 
 @dataclass(frozen=True)

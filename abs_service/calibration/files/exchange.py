@@ -7,7 +7,7 @@ import cv2
 
 from abs_service.config.problems import allowed_instead
 from calib.camera import Camera
-from calib.formats import depthai, kalibr, mrcal, opencv, ros, tf, urdf
+from calib.formats import colmap, depthai, kalibr, mrcal, opencv, ros, tf, urdf
 from calib.formats.content import Content, FormatError, Hints, Written
 
 READERS = {
@@ -16,6 +16,7 @@ READERS = {
     "opencv": opencv.read,
     "depthai": depthai.read,
     "mrcal": mrcal.read,
+    "colmap": colmap.read,
 }
 WRITERS = {
     "kalibr": kalibr.write,
@@ -23,6 +24,7 @@ WRITERS = {
     "opencv": opencv.write,
     "depthai": depthai.write,
     "mrcal": mrcal.write,
+    "colmap": colmap.write,
     "urdf": urdf.write,
     "tf": tf.write,
 }
@@ -41,6 +43,7 @@ _TELLING = (
     ("opencv-matrix", "opencv"),
     ("cam0:", "kalibr"),
     ("camera_matrix:", "ros"),
+    ("CAMERA_ID, MODEL, WIDTH, HEIGHT", "colmap"),
 )
 
 

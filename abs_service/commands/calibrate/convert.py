@@ -8,10 +8,10 @@
   abs-service calibrate convert rig.toml rig.urdf                         the frames, for robots
 
 Formats: toml (our calibration and rig files), kalibr (camchain), ros (CameraInfo), opencv (FileStorage as YAML, XML or
-JSON), depthai (JSON), mrcal (.cameramodel), and to write only urdf and tf. What a format has no place for is said on
-standard error and, with --json, under "lost". What would be wrong is refused, and nothing written (exit code 2): a lens
-that a format cannot express, a skew, four coefficients of OpenCV that may be those of two lenses (--lens), cameras more
-than 5 m apart (--unit), and fields of view and principal points that no camera has.
+JSON), depthai (JSON), mrcal (.cameramodel), colmap (cameras.txt), and to write only urdf and tf. What a format has no
+place for is said on standard error and, with --json, under "lost". What would be wrong is refused, and nothing written
+(exit code 2): a lens that a format cannot express, a skew, four coefficients of OpenCV that may be those of two lenses
+(--lens), cameras more than 5 m apart (--unit), and fields of view and principal points that no camera has.
 """
 
 import argparse

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from calib import pose
 from calib.camera import Camera
-from calib.formats import depthai, kalibr, mrcal, opencv, ros, tf, urdf
+from calib.formats import colmap, depthai, kalibr, mrcal, opencv, ros, tf, urdf
 from calib.formats.content import Hints
 from calib.lenses.fisheye import KannalaBrandt
 from calib.lenses.lens import Lens
@@ -89,6 +89,15 @@ def test_depthai_keeps_all_but_names_and_where_the_first_camera_is(first: Camera
     written = depthai.write({"tof": first, "left": second})
     assert_same(depthai.read(written.text, HINTS).cameras, {"cam_a": first, "cam_b": second}, "relative")
     assert "tof is cam_a, left is cam_b" in written.lost[-1]
+
+
+@settings(max_examples=40)
+@given(cameras(8), cameras(4))
+def test_colmap_keeps_all_but_names_and_poses(first: Camera, second: Camera) -> None:
+    written = colmap.write({"tof": first, "left": second})
+    assert_same(colmap.read(written.text, HINTS).cameras, {"camera1": first, "camera2": second}, "none")
+    assert written.lost[0] == "names: tof is 1, left is 2"
+    assert list(colmap.read(colmap.write({"left": first}).text, HINTS).cameras) == ["tof"]
 
 
 @settings(max_examples=40)
