@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from abs_service.pairing.observation import Observation
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import Synthesizer
-from abs_service.tracker.terms.base import Term
+from abs_service.tracker.terms.base import ObservedTerm, Term
 from abs_service.tracker.terms.linearization import Part, PointLinearization
 from abs_service.tracker.terms.patches import Patches
 from abs_service.tracker.terms.sensor_fit import SensorFit
@@ -38,7 +38,7 @@ class ObservedObjective(Protocol):
         ...
 
     def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> list[Part]:
-        """Normalised residuals of a population of one, and their derivatives, see `Term.linearize`."""
+        """Normalised residuals of a population of one, and their derivatives, see `ObservedTerm.linearize`."""
         ...
 
     def fits(self, surface: Surface) -> list[SensorFit]:
@@ -46,7 +46,7 @@ class ObservedObjective(Protocol):
         ...
 
     def match(self, surface: Surface, sparse_jacobian: SparseJacobian, patches: Patches) -> list[PointLinearization]:
-        """Residuals of the places in the images where the appearance of a population of one is, see `Term.match`."""
+        """Residuals of the places in the images where the appearance of a population of one is (`ObservedTerm`)."""
         ...
 
     def misfit(self, surface: Surface) -> NDArray[np.float64]:
@@ -70,24 +70,23 @@ class TermSum:
         """Passes every sensor's image to its term, and all occluders to every term."""
         self._synthesizer.observe(observation)
         terms = [term for term in self._terms if term.sensor in observation.images]
-        for term in terms:
-            term.observe(observation.images[term.sensor], predicted, reach_m)
-        occluders = np.concatenate([np.zeros((0, 3)), *(term.foreground() for term in terms)])
-        for term in terms:
+        observed = [term.observe(observation.images[term.sensor], predicted, reach_m) for term in terms]
+        occluders = np.concatenate([np.zeros((0, 3)), *(term.occluders for term in observed)])
+        for term in observed:
             term.hide(occluders)
         self._frames = frame = self._frames + 1
-        return ObservedTerms(terms, lambda: self._frames == frame)
+        return ObservedTerms(observed, lambda: self._frames == frame)
 
 
 class ObservedTerms:
     """The sum of the terms of the sensors that contribute to one frame.
 
     Args:
-        terms: terms that have observed their sensor's image.
-        is_newest: False once they have observed another one, for which they use the same memory.
+        terms: one of every sensor.
+        is_newest: False once a sensor's next image was observed, which uses the same memory.
     """
 
-    def __init__(self, terms: Sequence[Term], is_newest: Callable[[], bool]):
+    def __init__(self, terms: Sequence[ObservedTerm], is_newest: Callable[[], bool]):
         self._observed = terms
         self._is_newest = is_newest
 
@@ -120,7 +119,7 @@ class ObservedTerms:
             term.learn(surface)
 
     @property
-    def _terms(self) -> Sequence[Term]:
+    def _terms(self) -> Sequence[ObservedTerm]:
         if not self._is_newest():
             raise RuntimeError("the cost of a frame is asked after the next frame was observed")
         return self._observed

@@ -1,5 +1,7 @@
 """Term of a light barrier: its reading compared with the crossing of mesh and beam."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,7 +17,7 @@ from calib.noise.images.binary import LightBarrier
 
 
 class BarrierTerm:
-    """−log of the probability of the reading, given whether the mesh crosses the beam."""
+    """−log of the probability of the reading, given whether the mesh crosses the beam, in one frame after the other."""
 
     def __init__(self, sensor: str, camera: Camera, faces: NDArray[np.int32], noise: LightBarrier, bounds: Bounds):
         self.sensor = sensor
@@ -24,17 +26,35 @@ class BarrierTerm:
         self._beam = np.ascontiguousarray(beam, np.float32)
         self._noise = noise
         self._bounds = bounds
-        self._costs = np.zeros(2)  # for a mesh that leaves the beam free, and one that crosses it
-        self._interrupted = False
 
-    def observe(self, image: Image, predicted: Surface, reach_m: float = np.inf) -> None:
+    def observe(self, image: Image, predicted: Surface, reach_m: float = np.inf) -> "ObservedBarrier":
         """Takes a reading."""
         if not isinstance(image, BeamReading):
             raise TypeError(f"sensor {self.sensor} has noise of a light barrier but delivered {type(image).__name__}")
-        self._interrupted = image.interrupted
-        self._costs = np.minimum(np.add(self._noise.cost(image.interrupted), self._bounds.inlier), self._bounds.outlier)
+        costs = np.minimum(np.add(self._noise.cost(image.interrupted), self._bounds.inlier), self._bounds.outlier)
+        return ObservedBarrier(self.sensor, self._faces, self._beam, costs, image.interrupted)
 
-    def foreground(self) -> NDArray[np.float64]:
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ObservedBarrier:
+    """−log of the probability of one reading, see `ObservedTerm`.
+
+    Attributes:
+        sensor: name of the sensor.
+        faces: vertex indices (m, 3) of the mesh.
+        beam: its ends (2, 3) [m].
+        costs: of a mesh that leaves the beam free, and of one that crosses it (2,).
+        interrupted: the reading.
+    """
+
+    sensor: str
+    faces: NDArray[np.int32]
+    beam: NDArray[np.float32]
+    costs: NDArray[np.float64]
+    interrupted: bool
+
+    @property
+    def occluders(self) -> NDArray[np.float64]:
         """No points: the position along the beam is unknown."""
         return np.zeros((0, 3))
 
@@ -43,7 +63,7 @@ class BarrierTerm:
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
         """−log P(reading | mesh crosses the beam or not), (population,)."""
-        return self._costs[self._crossing(surface).astype(int)]
+        return self.costs[self._crossing(surface).astype(int)]
 
     def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> list[Part]:
         """No residuals: the cost is piecewise constant, its derivative zero."""
@@ -51,7 +71,7 @@ class BarrierTerm:
 
     def fit(self, surface: Surface) -> SensorFit:
         """Agreement of the single sample with a population of one."""
-        agrees = int(self._crossing(surface)[0] == self._interrupted)
+        agrees = int(self._crossing(surface)[0] == self.interrupted)
         return SensorFit(self.sensor, 1, 0, 1, agrees, -float(self.cost(surface)[0]), float("nan"))
 
     def match(self, surface: Surface, sparse_jacobian: SparseJacobian, patches: Patches) -> PointLinearization:
@@ -67,7 +87,7 @@ class BarrierTerm:
 
     def _crossing(self, surface: Surface) -> NDArray[np.bool_]:
         crossing = np.zeros(len(surface.vertices), np.bool_)
-        _crossing(surface.vertices, self._faces, self._beam[0], self._beam[1], crossing)
+        _crossing(surface.vertices, self.faces, self.beam[0], self.beam[1], crossing)
         return crossing
 
 

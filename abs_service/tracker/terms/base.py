@@ -1,4 +1,4 @@
-"""Interface of a term, and the bounds of its costs."""
+"""Interface of a term over time and in one frame, and the bounds of its costs."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -45,31 +45,19 @@ def facing(view: View, surface: Surface) -> NDArray[np.bool_]:
     return np.asarray(np.einsum("ni,ni->n", normals, vertices - view.camera.center) < 0)
 
 
-class Term(Protocol):
-    """Negative log-likelihood of one sensor's image given a surface.
+class ObservedTerm(Protocol):
+    """Negative log-likelihood of one sensor's image given a surface; asked until the sensor's next image is observed.
 
-    Attributes:
-        sensor: name of the sensor.
+    The answers do not depend on the order of the calls.
     """
 
-    sensor: str
-
-    def observe(self, image: Image, predicted: Surface, reach_m: float = np.inf) -> None:
-        """Sets the image that the following costs refer to.
-
-        Args:
-            image: measurement of the sensor.
-            predicted: predicted mesh, a population of one.
-            reach_m: radius around the prediction outside which costs need not be exact, only high [m].
-        """
-        ...
-
-    def foreground(self) -> NDArray[np.float64]:
-        """Measured points (k, 3) [m] of occluders between the sensor and the predicted mesh."""
+    @property
+    def occluders(self) -> NDArray[np.float64]:
+        """Measured points (k, 3) [m] between the sensor and the predicted mesh."""
         ...
 
     def hide(self, points: NDArray[np.float64]) -> None:
-        """Masks, for this frame, pixels occluded by points (k, 3) [m] that other sensors measured."""
+        """Masks pixels occluded by points (k, 3) [m] that other sensors measured, before anything else is asked."""
         ...
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
@@ -100,4 +88,24 @@ class Term(Protocol):
 
     def learn(self, surface: Surface) -> None:
         """Takes the estimate of the frame in, a population of one: later frames may be compared otherwise."""
+        ...
+
+
+class Term(Protocol):
+    """The images of one sensor, one after the other.
+
+    Attributes:
+        sensor: name of the sensor.
+    """
+
+    sensor: str
+
+    def observe(self, image: Image, predicted: Surface, reach_m: float = np.inf) -> ObservedTerm:
+        """The cost of deformed meshes given an image; it uses the memory of the image before.
+
+        Args:
+            image: measurement of the sensor.
+            predicted: predicted mesh, a population of one.
+            reach_m: radius around the prediction outside which costs need not be exact, only high [m].
+        """
         ...

@@ -1,12 +1,14 @@
 """Term of a colour sensor: measured colours compared with those of the vertices."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.pairing.images import ColorImage, Image, Window
 from abs_service.tracker.models.base import SparseJacobian, Surface
-from abs_service.tracker.synthesis.base import Synthesis, Synthesizer
-from abs_service.tracker.synthesis.window import NOTHING_HAS, Bordered
+from abs_service.tracker.synthesis.base import Synthesis, Synthesizer, View
+from abs_service.tracker.synthesis.window import NOTHING_HAS, Bordered, within
 from abs_service.tracker.terms.base import Bounds, facing
 from abs_service.tracker.terms.gradients import noiseless_color_rows
 from abs_service.tracker.terms.linearization import Part, PointLinearization
@@ -27,7 +29,7 @@ from calib.noise.images.color import GaussianColor
 
 
 class ColorTerm:
-    """−log of the density of the measured colour given the vertex's own, summed over the samples."""
+    """−log of the density of the measured colour given the vertex's own, in one frame after the other."""
 
     def __init__(
         self,
@@ -47,32 +49,35 @@ class ColorTerm:
         self._sigma = np.array([[noise.sigma]], np.float32)
         self._constant = bounds.inlier + 3 * (np.log(noise.sigma) + LOG_SQRT_2PI)
         self._registration_noise = registration_noise
-        self._inverse = np.zeros((0, 3), np.float32)
-        self._normalizer = np.zeros(0, np.float32)
-        self._illumination = Exposed()
-        self._texture = np.zeros((0, 3), np.float32)
-        self._image: NDArray[np.float32] | NDArray[np.uint8] = np.zeros((1, 1, 3), np.float32)
         self._levels = np.zeros((0, 0, 3), np.uint8)
         self._bordered = Bordered(np.full(3, np.nan, np.float32), np.full(3, NOTHING_HAS, np.float32))
 
-    def observe(self, image: Image, predicted: Surface, reach_m: float = np.inf) -> None:
+    def observe(self, image: Image, predicted: Surface, reach_m: float = np.inf) -> "ObservedColor":
         """Sets the colour image; NaN, as in the border, means no measurement."""
         if not isinstance(image, ColorImage):
             raise TypeError(f"sensor {self.sensor} has a colour noise model but delivered {type(image).__name__}")
         window = self._synthesizer.window(self.sensor, predicted, reach_m)
-        self._image = self._resampled(image.rgb) if self._synthesizer.resamples else self._ordered(image.rgb, window)
-        texture = self._bordered.move(self._image.shape[:2], window)
-        self._bordered.inside[:] = self._image[window]
-        self._texture = texture.reshape(-1, 3)
+        picture = self._resampled(image.rgb) if self._synthesizer.resamples else self._ordered(image.rgb, window)
+        texture = self._bordered.move(picture.shape[:2], window).reshape(-1, 3)
+        self._bordered.inside[:] = picture[window]
         self._view.look(predicted)
-        self._bias.observe(self._image, predicted)
+        self._bias.observe(picture, predicted)
         seen = self._view.synthesize(predicted)
-        self._illumination.adapt(self._texture[seen.pixel[0]], seen.attributes[0].T)
         widening = self._registration_noise.widening(self._view, predicted, self._sigma)
-        self._inverse = np.repeat(
-            np.float32(1) / (self._sigma * widening.factor), 3 // widening.factor.shape[1], axis=1
+        inverse = np.float32(1) / (self._sigma * widening.factor)
+        return ObservedColor(
+            sensor=self.sensor,
+            view=self._view,
+            bounds=self._bounds,
+            illumination=Exposed().adapt(texture[seen.pixel[0]], seen.attributes[0].T),
+            bias=self._bias,
+            shadow=self._shadow,
+            image=picture,
+            texture=texture,
+            window=window,
+            inverse=np.repeat(inverse, 3 // widening.factor.shape[1], axis=1),
+            normalizer=(self._constant + 3 * widening.log.mean(axis=1)).astype(np.float32),
         )
-        self._normalizer = (self._constant + 3 * widening.log.mean(axis=1)).astype(np.float32)
 
     def _resampled(self, rgb: NDArray[np.uint8]) -> NDArray[np.float32]:
         """The image in the view's camera, NaN where unknown."""
@@ -89,14 +94,47 @@ class ColorTerm:
         levels.setflags(write=False)  # as frames are
         return levels
 
-    def foreground(self) -> NDArray[np.float64]:
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ObservedColor:
+    """−log of the density of the colours of one image, see `ObservedTerm`.
+
+    Attributes:
+        sensor: name of the sensor.
+        view: of the mesh in its camera.
+        bounds: costs of the outlier model.
+        illumination: exposure of the image.
+        bias: of the registration of edges.
+        shadow: of occluders.
+        image: colours (height, width, 3) in the view's camera.
+        texture: the same with a border of one pixel, flattened (pixels, 3).
+        window: of the image that is compared.
+        inverse: inverse deviations (n or 1, 3) of the samples' colours.
+        normalizer: cost (n or 1,) of a colour that agrees exactly.
+    """
+
+    sensor: str
+    view: View
+    bounds: Bounds
+    illumination: Exposed
+    bias: RegistrationBias
+    shadow: Shadow
+    image: NDArray[np.float32] | NDArray[np.uint8]
+    texture: NDArray[np.float32]
+    window: Window
+    inverse: NDArray[np.float32]
+    normalizer: NDArray[np.float32]
+
+    @property
+    def occluders(self) -> NDArray[np.float64]:
         """No points: colours carry no distance."""
         return np.zeros((0, 3))
 
     def hide(self, points: NDArray[np.float64]) -> None:
         """Masks the pixels occluded by points (k, 3) [m]."""
         if len(points):
-            self._bordered.inside[self._shadow.mask(points)[self._bordered.window]] = np.inf
+            bordered = self.texture.reshape(self.image.shape[0] + 2, -1, 3)
+            within(bordered, self.window)[self.shadow.mask(points)[self.window]] = np.inf
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
         """−Σ_v log of the density of the measured colours (population,)."""
@@ -104,28 +142,28 @@ class ColorTerm:
 
     def _synthesize(self, surface: Surface) -> Synthesis:
         """The colours of a population as this frame's exposure shows them."""
-        return self._illumination.shine(self._view.synthesize(surface), surface, self._view)
+        return self.illumination.shine(self.view.synthesize(surface), surface, self.view)
 
     def _cost_of(self, seen: Synthesis, surface: Surface) -> NDArray[np.float64]:
         """Cost (population,) of what is synthesised."""
         out = np.empty(len(seen.pixel))
         _color_cost(seen.pixel, seen.attributes, *self._measured, out)
-        return self._view.balance(out, surface, self._bounds.unseen)
+        return self.view.balance(out, surface, self.bounds.unseen)
 
     @property
     def _measured(self) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], float, float]:
-        return self._texture, self._inverse, self._normalizer, self._bounds.outlier, self._bounds.unseen
+        return self.texture, self.inverse, self.normalizer, self.bounds.outlier, self.bounds.unseen
 
     def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> list[Part]:
         """Normalised residuals of the inliers, three channels each, and their derivatives with respect to theta."""
         residual, measured = self._residuals(self._synthesize(surface))
-        use = measured & (self._normalizer + 0.5 * np.sum(residual**2, axis=1) < self._bounds.outlier)
-        vertices = self._view.spread(surface, surface.vertices[0].T)
-        inverse = np.broadcast_to(self._inverse, residual.shape)[use]
-        rows = noiseless_color_rows(self._image, self._view.camera, vertices[use], inverse).reshape(-1, 3)
+        use = measured & (self.normalizer + 0.5 * np.sum(residual**2, axis=1) < self.bounds.outlier)
+        vertices = self.view.spread(surface, surface.vertices[0].T)
+        inverse = np.broadcast_to(self.inverse, residual.shape)[use]
+        rows = noiseless_color_rows(self.image, self.view.camera, vertices[use], inverse).reshape(-1, 3)
         points = np.repeat(np.flatnonzero(use), residual.shape[1])
-        samples = self._view.follow(surface, sparse_jacobian)
-        bias = self._bias.derivatives(vertices, rows, points)
+        samples = self.view.follow(surface, sparse_jacobian)
+        bias = self.bias.derivatives(vertices, rows, points)
         return [PointLinearization(residual[use].ravel(), rows, points, samples, vertices, bias)]
 
     def fit(self, surface: Surface) -> SensorFit:
@@ -133,14 +171,14 @@ class ColorTerm:
         seen = self._synthesize(surface)
         residual, measured = self._residuals(seen)
         pixel, known = seen.pixel[0], np.isfinite(seen.attributes[0]).all(axis=0)
-        hidden = np.isinf(self._texture[pixel, 0])
-        masks = VertexMasks.of(pixel, facing(self._view, surface), np.zeros_like(hidden), hidden, ~known)
+        hidden = np.isinf(self.texture[pixel, 0])
+        masks = VertexMasks.of(pixel, facing(self.view, surface), np.zeros_like(hidden), hidden, ~known)
         mean = -float(self._cost_of(seen, surface)[0]) / len(residual)
         size = np.sqrt(np.mean(residual**2, axis=1))
         return summarize(self.sensor, masks, measured, size, mean, channels=3)
 
     def match(self, surface: Surface, sparse_jacobian: SparseJacobian, patches: Patches) -> PointLinearization:
-        """See `Term`."""
+        """See `ObservedTerm`."""
         seen = self._synthesize(surface)
 
         def costs(
@@ -151,7 +189,7 @@ class ColorTerm:
             _color_cost(pixel, attributes, texture, inverse[own], normalizer[own], outlier, uniform, out)
             return out
 
-        return matched(self._view, surface, sparse_jacobian, seen, patches, self._image.shape, costs)
+        return matched(self.view, surface, sparse_jacobian, seen, patches, self.image.shape, costs)
 
     def misfit(self, surface: Surface) -> NDArray[np.float64]:
         """Zero: colours carry no distance."""
@@ -163,7 +201,7 @@ class ColorTerm:
     def _residuals(self, seen: Synthesis) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
         """Normalised residuals (n, 3) and mask of the measured samples (n,)."""
         colors = seen.attributes[0].T.astype(np.float64)
-        residual = (self._texture[seen.pixel[0]] - colors) * self._inverse
+        residual = (self.texture[seen.pixel[0]] - colors) * self.inverse
         measured = (seen.pixel[0] > 0) & np.all(np.isfinite(residual), axis=1)
         return np.where(np.reshape(measured, (-1, 1)), residual, np.inf), np.asarray(measured)
 

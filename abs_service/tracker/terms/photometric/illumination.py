@@ -11,12 +11,15 @@ from abs_service.tracker.synthesis.base import Synthesis, View
 from abs_service.tracker.terms.photometric.exposure import gains
 from calib.jit import kernel
 
+#: Gain of an image that is exposed as the first one.
+_NEUTRAL = np.ones(1, np.float32)
+
 
 class Illumination(Protocol):
     """Converts reflectivities into image values."""
 
-    def adapt(self, measured: NDArray[np.floating], expected: NDArray[np.floating]) -> None:
-        """Follows the exposure of an image; see `gains` for what is measured and expected."""
+    def adapt(self, measured: NDArray[np.floating], expected: NDArray[np.floating]) -> "Illumination":
+        """The illumination with the exposure of an image; see `gains` for what is measured and expected."""
         ...
 
     def shine(self, seen: Synthesis, surface: Surface, view: View) -> Synthesis:
@@ -27,8 +30,9 @@ class Illumination(Protocol):
 class Passive:
     """The light of the room: a vertex looks the same wherever it is."""
 
-    def adapt(self, measured: NDArray[np.floating], expected: NDArray[np.floating]) -> None:
-        """Does nothing."""
+    def adapt(self, measured: NDArray[np.floating], expected: NDArray[np.floating]) -> "Passive":
+        """Itself."""
+        return self
 
     def shine(self, seen: Synthesis, surface: Surface, view: View) -> Synthesis:
         """The synthesis itself."""
@@ -36,14 +40,18 @@ class Passive:
 
 
 class Exposed:
-    """The light of the room, seen by a camera that adapts exposure and white balance: one gain per channel."""
+    """The light of the room, seen by a camera that adapts exposure and white balance.
 
-    def __init__(self) -> None:
-        self._gains = np.ones(1, np.float32)
+    Args:
+        exposure: gain of every channel, or of all (channels or 1,).
+    """
 
-    def adapt(self, measured: NDArray[np.floating], expected: NDArray[np.floating]) -> None:
-        """Takes the gains of an image."""
-        self._gains = gains(measured, expected)
+    def __init__(self, exposure: NDArray[np.float32] = _NEUTRAL):
+        self._gains = exposure
+
+    def adapt(self, measured: NDArray[np.floating], expected: NDArray[np.floating]) -> "Exposed":
+        """The light with the gains of an image."""
+        return Exposed(gains(measured, expected))
 
     def shine(self, seen: Synthesis, surface: Surface, view: View) -> Synthesis:
         """The synthesis with its attributes as the image is exposed."""
@@ -60,8 +68,9 @@ class Active:
     def __init__(self, center: NDArray[np.float64]):
         self._center = center.astype(np.float32)
 
-    def adapt(self, measured: NDArray[np.floating], expected: NDArray[np.floating]) -> None:
-        """Does nothing: the lamp and the sensor's exposure are one, and known."""
+    def adapt(self, measured: NDArray[np.floating], expected: NDArray[np.floating]) -> "Active":
+        """Itself: the lamp and the sensor's exposure are one, and known."""
+        return self
 
     def shine(self, seen: Synthesis, surface: Surface, view: View) -> Synthesis:
         """The synthesis with reflectivities as bright as they look on each member of the population."""

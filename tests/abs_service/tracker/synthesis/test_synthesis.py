@@ -65,7 +65,7 @@ def slope(term, model: Rigid, theta: np.ndarray, parameter: int, step: float) ->
 def test_the_depth_gradient_is_that_of_the_cost(kind):
     mesh = sheet(21, 31, flat, size=(0.2, 0.14))
     term = DepthTerm("tof", built(kind, mesh), len(mesh.vertices), GaussianPolynomial(((SIGMA,),)), BOUNDS)
-    term.observe(depth_image(plane_distance(TOF, WALL, 1.0)), as_surface((mesh.vertices, mesh.normals)))
+    term = term.observe(depth_image(plane_distance(TOF, WALL, 1.0)), as_surface((mesh.vertices, mesh.normals)))
     for theta in ([0, 0, 0, 0, 0, 0.006], [0.02, -0.02, 0, 0, 0, -0.004]):
         numerical, linear = slope(term, Rigid(mesh), np.array(theta), 5, 5e-4)
         assert linear == pytest.approx(numerical, rel=0.1)
@@ -84,7 +84,7 @@ def test_the_colour_gradient_is_that_of_the_cost(kind):
     synthesizer = built(kind, mesh)
     term = ColorTerm("color", synthesizer, gradient_colors(synthesizer.canvas.vertices), GaussianColor(LEVELS), BOUNDS)
     wall = gradient_colors(COLOR.unproject(plane_distance(COLOR, WALL, 1.0)))
-    term.observe(ColorImage(np.rint(wall).astype(np.uint8)), as_surface((mesh.vertices, mesh.normals)))
+    term = term.observe(ColorImage(np.rint(wall).astype(np.uint8)), as_surface((mesh.vertices, mesh.normals)))
     for parameter in (3, 4):
         theta = 0.01 * np.eye(6)[parameter]
         numerical, linear = slope(term, Rigid(mesh), theta, parameter, 0.01)
@@ -107,14 +107,11 @@ def test_a_mosaic_is_compared_channel_by_channel(kind, order):
     values = np.take_along_axis(wall, channel[..., None].astype(int), axis=2)[..., 0].astype(np.float32)
     surface = as_surface((mesh.vertices, mesh.normals))
     term = ChannelTerm("color", synthesizer, looks, GaussianBayer(LEVELS), Passive(), BOUNDS)
-    term.observe(ChannelImage(values, channel), surface)
-    fit = term.fit(surface)
+    fit = term.observe(ChannelImage(values, channel), surface).fit(surface)
     assert fit.inliers == fit.samples > 0.8 * fit.visible
     assert fit.normalized_residual < 0.3
-    term.observe(
-        ChannelImage(values, BAYER_ORDERS["gbrg" if order == "rggb" else "rggb"][rows % 2, columns % 2]), surface
-    )
-    assert term.fit(surface).inliers < 0.8 * fit.inliers
+    wrong = ChannelImage(values, BAYER_ORDERS["gbrg" if order == "rggb" else "rggb"][rows % 2, columns % 2])
+    assert term.observe(wrong, surface).fit(surface).inliers < 0.8 * fit.inliers
 
 
 @ALL
@@ -127,7 +124,7 @@ def test_a_lamp_of_its_own_lights_the_samples(kind):
     law = reflectivity * (1.0 / wall) / wall**2  # the cosine of incidence on a wall at 1 m is 1 over the distance
     term = ChannelTerm("tof", synthesizer, looks, GaussianIntensity("amplitude", 50.0), Active(TOF.center), BOUNDS)
     surface = as_surface((MESH.vertices, MESH.normals))
-    term.observe(ChannelImage(law.astype(np.float32), np.zeros(law.shape, np.uint8)), surface)
+    term = term.observe(ChannelImage(law.astype(np.float32), np.zeros(law.shape, np.uint8)), surface)
     fit = term.fit(surface)
     assert fit.inliers == fit.samples > 0.9 * len(MESH.vertices)
     assert fit.normalized_residual < 0.5
@@ -138,7 +135,7 @@ def test_what_leaves_the_image_neither_gains_nor_gets_lost(kind):
     """Outside, it has the cost of a mesh without any measurement."""
     term = DepthTerm("tof", built(kind), len(MESH.vertices), GaussianPolynomial(((SIGMA,),)), BOUNDS)
     surface = as_surface((MESH.vertices, MESH.normals))
-    term.observe(depth_image(plane_distance(TOF, WALL, 1.0)), surface)
+    term = term.observe(depth_image(plane_distance(TOF, WALL, 1.0)), surface)
     there, away, behind = term.cost(
         Rigid(MESH).deform(np.array([np.zeros(6), [0, 0, 0, 2, 0, 0], [0, 0, 0, 0, 0, -3]]))
     )

@@ -8,12 +8,13 @@ from hypothesis import strategies as st
 from abs_service.pairing.images import BAYER_ORDERS, ONE_CHANNEL, ChannelImage, ColorImage
 from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.synthesis import dense, sparse, undistorted, warped
-from abs_service.tracker.terms.base import Bounds, Term
+from abs_service.tracker.terms.base import Bounds, ObservedTerm
 from abs_service.tracker.terms.depth.depth import DepthTerm
 from abs_service.tracker.terms.linearization import stack
 from abs_service.tracker.terms.photometric.channel import ChannelTerm
 from abs_service.tracker.terms.photometric.color import ColorTerm
 from abs_service.tracker.terms.photometric.illumination import Passive
+from abs_service.tracker.terms.photometric.observed_channel import ObservedChannel
 from calib import pose
 from calib.camera import Camera
 from calib.lenses.lens import Lens
@@ -72,14 +73,13 @@ class Scene:
     def looks(self) -> np.ndarray:
         return tints(self.synthesizer.canvas.vertices)
 
-    def channel(self, noise: GaussianGrey | GaussianBayer, pattern: np.ndarray) -> ChannelTerm:
+    def channel(self, noise: GaussianGrey | GaussianBayer, pattern: np.ndarray) -> ObservedChannel:
         looks = self.looks()[:, : int(pattern.max()) + 1]
         term = ChannelTerm("color", self.synthesizer, looks, noise, Passive(), BOUNDS)
-        term.observe(self.mosaic(pattern), self.surface)
-        return term
+        return term.observe(self.mosaic(pattern), self.surface)
 
 
-def residuals(term: Term, scene: Scene) -> np.ndarray:
+def residuals(term: ObservedTerm, scene: Scene) -> np.ndarray:
     """Normalised residuals of all measured samples, none of which is an outlier."""
     found = stack(term.linearize(scene.surface, Rigid(MESH).sparse_jacobian(np.zeros(6))), 6).residual
     assert len(found) % term.fit(scene.surface).samples == 0  # a colour has three
@@ -98,13 +98,13 @@ def test_a_plane_is_found_where_it_is(kind, turn, shift):
     """
     scene = Scene(kind, np.array(turn + shift))
     depth = DepthTerm("tof", scene.synthesizer, len(MESH.vertices), DEPTH, BOUNDS)
-    depth.observe(scene.depth, scene.surface)
+    depth = depth.observe(scene.depth, scene.surface)
     residual, fit = residuals(depth, scene), depth.fit(scene.surface)
     assert len(residual) > 0.9 * fit.visible > 100
     steepest = 1.7e-3 * np.sqrt(2) * np.tan(0.25 * np.sqrt(3) + 0.27)  # half a pixel diagonal on an inclined plane
     assert np.abs(residual).max() * DEPTH.sigma < 1.5 * steepest + 1e-5
     color = ColorTerm("color", scene.synthesizer, scene.looks(), GaussianColor(LEVELS), BOUNDS)
-    color.observe(ColorImage(np.rint(scene.colors).astype(np.uint8)), scene.surface)
+    color = color.observe(ColorImage(np.rint(scene.colors).astype(np.uint8)), scene.surface)
     assert color.fit(scene.surface).samples > 100
     bayer = scene.channel(GaussianBayer(LEVELS), BAYER_ORDERS["gbrg"])
     for term in (color, bayer):

@@ -76,8 +76,7 @@ def test_a_surface_beside_the_image_has_a_window_and_a_cost(down):
     assert scene()[window].size > 0
     term = depth_term(outline=True)
     term.observe(depth_image(scene()), moved(0, 0, 0), REACH_M)
-    term.observe(depth_image(scene()), away, 0.0)
-    assert np.isfinite(term.cost(away)).all()
+    assert np.isfinite(term.observe(depth_image(scene()), away, 0.0).cost(away)).all()
 
 
 @settings(max_examples=60, deadline=None)
@@ -101,16 +100,16 @@ def test_without_bounds_or_partly_out_of_sight_the_window_is_the_whole_image():
 
 @pytest.mark.parametrize("outline", [False, True])
 def test_within_reach_depth_costs_the_same_as_in_the_whole_image(outline):
-    whole, window = depth_term(outline), depth_term(outline)
+    terms = depth_term(outline), depth_term(outline)
     for x in (0.0, 0.02, -0.03):  # memory reused between frames must have no effect
         predicted = moved(x + 0.004, 0.002, 0)
-        whole.observe(depth_image(scene(x)), predicted)
-        window.observe(depth_image(scene(x)), predicted, REACH_M)
+        image = depth_image(scene(x))
+        whole, window = (term.observe(image, predicted, by) for term, by in zip(terms, (np.inf, REACH_M)))
         for step in np.random.default_rng(1).uniform(-0.02, 0.02, (20, 3)):
             surface = moved(x + step[0], step[1], 0.3 * step[2])
             np.testing.assert_array_equal(window.cost(surface), whole.cost(surface))
             np.testing.assert_equal(asdict(window.fit(surface)), asdict(whole.fit(surface)))  # NaN is NaN
-        np.testing.assert_array_equal(window.foreground(), whole.foreground())
+        np.testing.assert_array_equal(window.occluders, whole.occluders)
 
 
 def test_within_reach_colours_cost_the_same_as_in_the_whole_image():
@@ -118,26 +117,25 @@ def test_within_reach_colours_cost_the_same_as_in_the_whole_image():
     occluder = np.array([[0.0, 0.0, 0.9], [1.0, 0.0, 0.9]])  # one on the sheet, one outside the window
     for seed, x in enumerate((0.0, 0.03)):
         picture = ColorImage(np.random.default_rng(seed).integers(0, 255, (120, 200, 3)).astype(np.uint8))
-        for term, reach in zip(terms, (np.inf, REACH_M)):
-            term.observe(picture, moved(x, 0, 0), reach)
+        seen = [term.observe(picture, moved(x, 0, 0), reach) for term, reach in zip(terms, (np.inf, REACH_M))]
         for hide in (np.zeros((0, 3)), occluder):
-            for term in terms:
+            for term in seen:
                 term.hide(hide)
             for step in np.random.default_rng(1).uniform(-0.02, 0.02, (20, 3)):
                 surface = moved(x + step[0], step[1], 0.3 * step[2])
-                np.testing.assert_array_equal(terms[1].cost(surface), terms[0].cost(surface))
+                np.testing.assert_array_equal(seen[1].cost(surface), seen[0].cost(surface))
 
 
 @pytest.mark.parametrize("order", ["rggb", "gbrg"])
 def test_within_reach_a_mosaic_costs_the_same_as_in_the_whole_image(order):
     """The window may start at any pixel of the Bayer pattern."""
     noise, pattern = GaussianBayer(60.0), BAYER_ORDERS[order]
-    whole, window = (ChannelTerm("color", sparse(WIDE, MESH), MESH.colors, noise, Passive(), BOUNDS) for _ in range(2))
+    terms = [ChannelTerm("color", sparse(WIDE, MESH), MESH.colors, noise, Passive(), BOUNDS) for _ in range(2)]
     occluder = np.array([[0.0, 0.0, 0.9], [1.0, 0.0, 0.9]])
     for seed, x in enumerate((0.0, 0.03, 0.0341)):
         values = np.random.default_rng(seed).uniform(0, 255, (120, 200)).astype(np.float32)
-        whole.observe(ChannelImage(values, pattern), moved(x, 0, 0))
-        window.observe(ChannelImage(values, pattern), moved(x, 0, 0), REACH_M)
+        image, predicted = ChannelImage(values, pattern), moved(x, 0, 0)
+        whole, window = (term.observe(image, predicted, by) for term, by in zip(terms, (np.inf, REACH_M)))
         for hide in (np.zeros((0, 3)), occluder):
             whole.hide(hide)
             window.hide(hide)
@@ -156,13 +154,15 @@ def test_beyond_the_window_nothing_is_explained():
     """Otherwise a search could escape from a bad fit into unprepared pixels."""
     depth = depth_term()
     depth.observe(depth_image(scene()), moved(0, 0, 0))  # the first image is seen as a whole
-    depth.observe(depth_image(scene(0.2)), moved(-0.15, 0, 0), 0.01)
-    assert depth.cost(moved(0.25, 0, 0))[0] == pytest.approx(len(MESH.vertices) * BOUNDS.outlier, rel=1e-5)
+    seen = depth.observe(depth_image(scene(0.2)), moved(-0.15, 0, 0), 0.01)
+    assert seen.cost(moved(0.25, 0, 0))[0] == pytest.approx(len(MESH.vertices) * BOUNDS.outlier, rel=1e-5)
     color = ColorTerm("color", sparse(WIDE, MESH), MESH.colors, GaussianColor(), BOUNDS)
-    color.observe(ColorImage(np.full((120, 200, 3), 90, np.uint8)), moved(-0.15, 0, 0), 0.01)
+    color = color.observe(ColorImage(np.full((120, 200, 3), 90, np.uint8)), moved(-0.15, 0, 0), 0.01)
     assert color.cost(moved(0.25, 0, 0))[0] == pytest.approx(len(MESH.vertices) * BOUNDS.outlier, rel=1e-5)
     bayer = ChannelTerm("color", sparse(WIDE, MESH), MESH.colors, GaussianBayer(), Passive(), BOUNDS)
-    bayer.observe(ChannelImage(np.full((120, 200), 90, np.float32), BAYER_ORDERS["rggb"]), moved(-0.15, 0, 0), 0.01)
+    bayer = bayer.observe(
+        ChannelImage(np.full((120, 200), 90, np.float32), BAYER_ORDERS["rggb"]), moved(-0.15, 0, 0), 0.01
+    )
     assert bayer.cost(moved(0.25, 0, 0))[0] == pytest.approx(len(MESH.vertices) * BOUNDS.outlier, rel=1e-5)
 
 

@@ -38,8 +38,7 @@ def term(camera: Camera, faces: np.ndarray, noise: LightBarrier = NOISE, bounds:
 
 def crossing(barrier: BarrierTerm, surface: Surface) -> list[bool]:
     """True for each mesh that crosses the beam, from the cost of an interruption: 0.02 for a miss, 0.1 for an alarm."""
-    barrier.observe(BeamReading(True), surface)
-    return (barrier.cost(surface) < 1).tolist()
+    return (barrier.observe(BeamReading(True), surface).cost(surface) < 1).tolist()
 
 
 @given(seeds)
@@ -115,14 +114,14 @@ def test_it_is_one_sample_that_agrees_or_not_and_has_no_slope():
     barrier = term(head(np.zeros(3), np.array([0.0, 0.0, 1.0])), MESH.faces)
     surface = Rigid(MESH).deform(np.array([[0, 0, 0, 0, 0, -0.5]]))
     for interrupted in (True, False):
-        barrier.observe(BeamReading(interrupted), surface)
-        fit = barrier.fit(surface)
+        seen = barrier.observe(BeamReading(interrupted), surface)
+        fit = seen.fit(surface)
         assert (fit.visible, fit.occluded, fit.samples, fit.inliers) == (1, 0, 1, int(interrupted))
         assert fit.mean_log_likelihood == pytest.approx(-NOISE.cost(interrupted)[1])
         assert np.isnan(fit.normalized_residual)
-    (linear,) = barrier.linearize(surface, SparseJacobian.from_dense(np.zeros((30, 3, 6))))
-    assert linear.jacobian.shape == (0, 6)
-    assert barrier.foreground().shape == (0, 3)
+        (linear,) = seen.linearize(surface, SparseJacobian.from_dense(np.zeros((30, 3, 6))))
+        assert linear.jacobian.shape == (0, 6)
+        assert seen.occluders.shape == (0, 3)
 
 
 def test_an_image_is_no_reading():

@@ -3,7 +3,12 @@
 import numpy as np
 import pytest
 
+from abs_service.tracker.terms.base import Bounds
+from abs_service.tracker.terms.depth.depth import DepthTerm
 from abs_service.tracker.terms.depth.fluctuation import FEWEST, MIN_VERTICES, Fluctuation
+from calib.camera import Camera
+from calib.noise.constant import Constant
+from tests.abs_service.tracker.scenes import as_surface, depth_image, sparse
 
 DEVIATION = 1e-3
 
@@ -52,3 +57,20 @@ def test_a_vertex_counts_only_where_both_frames_measure_it():
         deviation[hidden] = distance[hidden] = 0.0  # so no vertex is ever measured in two frames
         fluctuation.update(distance, deviation)
     assert fluctuation.scale == 1
+
+
+def test_what_is_learnt_of_a_frame_counts_from_the_next_one_on():
+    """Asked again after its estimate was taken in, a frame answers the same."""
+    camera, generator = Camera(160, 120, 150.0, 150.0, 79.5, 59.5), np.random.default_rng(4)
+    columns, rows = np.meshgrid(np.arange(30.0, 130.0, 8), np.arange(20.0, 100.0, 8))
+    vertices = camera.unproject(np.ones((120, 160)))[rows.astype(int), columns.astype(int)].reshape(-1, 3)
+    surface = as_surface((vertices, np.tile([0.0, 0.0, -1.0], (len(vertices), 1))))
+    term, scales = DepthTerm("tof", sparse(camera), len(vertices), Constant(DEVIATION), Bounds(0.05, 1.6, 4.6)), []
+    for _ in range(FEWEST + 2):
+        frame = term.observe(depth_image(1 + generator.normal(0, 4 * DEVIATION, (120, 160))), surface)
+        before = frame.fit(surface).normalized_residual
+        frame.learn(surface)
+        assert frame.fit(surface).normalized_residual == before
+        scales.append(frame.scale)
+    assert scales[0] == 1
+    assert scales[-1] == pytest.approx(4, rel=0.2)

@@ -67,7 +67,7 @@ def test_the_cost_is_the_likelihood(name, seed):
     hands = CAMERA.center + 0.5 * (vertices[vertices[:, 2] > 0][:3] - CAMERA.center)
     covered = Shadow(CAMERA).mask(hands)
     image.values[~covered & (generator.random(SHAPE) < 0.1)] = np.nan
-    made.observe(image, in_sight(CAMERA, len(vertices)))
+    made = made.observe(image, in_sight(CAMERA, len(vertices)))
     made.hide(hands)
     expected = reference.channel_cost(
         *(CAMERA, noise, image.values, image.channel, covered),
@@ -118,7 +118,7 @@ def test_costs_do_not_depend_on_the_rest_of_the_population(name):
     looks = generator.uniform(20, 235, (len(mesh.vertices), int(pattern.max()) + 1)).astype(np.float32)
     made = term(noise, looks)
     image = ChannelImage(generator.uniform(0, 255, SHAPE).astype(np.float32), pattern)
-    made.observe(image, as_surface((mesh.vertices, mesh.normals)))
+    made = made.observe(image, as_surface((mesh.vertices, mesh.normals)))
     surface = Rigid(mesh).deform(generator.normal(0, 0.02, (4, 6)))
     alone = [made.cost(as_surface((v.T, n.T)))[0] for v, n in zip(surface.vertices, surface.normals)]
     np.testing.assert_array_equal(made.cost(surface), alone)

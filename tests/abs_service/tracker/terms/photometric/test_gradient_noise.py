@@ -102,7 +102,7 @@ def held(print_levels: float, noise: float) -> float:
     looks = at_vertices(first, CAMERA, synthesizer.canvas).astype(np.float32)
     bounds = likelihood.Settings().bounds(rig.sensors[name])
     term, surface = ChannelTerm(name, synthesizer, looks, sensor, Passive(), bounds), model.deform(model.rest[None])
-    term.observe(now, surface)
+    term = term.observe(now, surface)
     (linear,) = term.linearize(surface, model.sparse_jacobian(model.rest))
     assert isinstance(linear, PointLinearization)
     assert len(linear.residual) > 0.9 * len(model.mesh.vertices)

@@ -52,8 +52,8 @@ def grey(picture: Print, mesh: Mesh) -> tuple[Term, Image]:
 
 def matched(term: Term, image: Image, mesh: Mesh = MESH) -> PointLinearization:
     model = Rigid(mesh)
-    term.observe(image, as_surface((mesh.vertices, mesh.normals)))
-    return term.match(model.deform(model.rest[None]), model.sparse_jacobian(model.rest), patches_of(mesh))
+    seen = term.observe(image, as_surface((mesh.vertices, mesh.normals)))
+    return seen.match(model.deform(model.rest[None]), model.sparse_jacobian(model.rest), patches_of(mesh))
 
 
 def moved(image: Image, right: int, down: int) -> Image:
@@ -101,7 +101,7 @@ def test_a_print_that_is_gone_or_outside_the_image_is_found_nowhere():
     beside.vertices[:, 0] += 0.3
     term, image = color(random_print(), MESH)
     model = Rigid(beside)
-    term.observe(image, as_surface((beside.vertices, beside.normals)))
+    term = term.observe(image, as_surface((beside.vertices, beside.normals)))
     places = term.match(model.deform(model.rest[None]), model.sparse_jacobian(model.rest), patches_of(beside))
     assert not is_beside([places])
 

@@ -14,7 +14,9 @@ from abs_service.tracker.synthesis.window import WHOLE
 from abs_service.tracker.terms.base import Bounds
 from abs_service.tracker.terms.depth.classification.background import MIN_PIXELS, Background
 from abs_service.tracker.terms.depth.classification.visibility import classify, surfaces_of, where
-from abs_service.tracker.terms.depth.depth import FREE_SCALE_M, DepthTerm
+from abs_service.tracker.terms.depth.depth import DepthTerm
+from abs_service.tracker.terms.depth.depth_cost import FREE_SCALE_M
+from abs_service.tracker.terms.depth.observed_depth import ObservedDepth
 from abs_service.tracker.terms.linearization import stack
 from abs_service.tracker.terms.photometric.color import ColorTerm
 from abs_service.tracker.terms.photometric.shadow import Shadow
@@ -123,11 +125,10 @@ def test_a_surface_that_moved_as_a_whole_is_still_the_object():
     assert not seen.foreground.any()
 
 
-def term_before(distance: np.ndarray) -> DepthTerm:
+def term_before(distance: np.ndarray) -> ObservedDepth:
     noise = GaussianPolynomial(((3e-3,),))
     term = DepthTerm("tof", sparse(STRAIGHT, MESH), len(MESH.vertices), noise, Bounds(0.05, 1.6, 4.6))
-    term.observe(depth_image(distance), as_surface((MESH.vertices, MESH.normals)))
-    return term
+    return term.observe(depth_image(distance), as_surface((MESH.vertices, MESH.normals)))
 
 
 def moved(x: float) -> Surface:
@@ -182,11 +183,11 @@ def test_an_occluder_that_a_depth_sensor_sees_hides_colours_from_another_camera(
     camera = Camera(160, 120, 300.0, 300.0, 79.5, 59.5, T_rs=pose.from_rotation_vector([0, 0, 0], [0.05, 0, 0]))
     distance = board(STRAIGHT)
     distance[20:45, 52:77] = 0.85
-    points = term_before(distance).foreground()
+    points = term_before(distance).occluders
     term = ColorTerm("color", sparse(camera, MESH), MESH.colors, GaussianColor(), Bounds(0.05, 16, 19))
     black = ColorImage(np.zeros((120, 160, 3), np.uint8))
     surface = as_surface((MESH.vertices, MESH.normals))
-    term.observe(black, surface)
+    term = term.observe(black, surface)
     before, cost = term.fit(surface), term.cost(surface)[0]
     term.hide(points)
     after = term.fit(surface)

@@ -190,7 +190,7 @@ def test_free_space_right_beside_the_outline_is_held_against_no_vertex(outline_p
     sensor = Sensor("tof", CAMERA, Constant(5e-3))
     comparison = Comparison(Bounds(0.05, 1.6, 4.6), outline_px=outline_px)
     term = measurement(sensor.noise).term(sensor, MESH, sparse(CAMERA, MESH), comparison)
-    term.observe(depth_image(picture(by=-2e-3)), moved(MESH, 0.0))
+    term = term.observe(depth_image(picture(by=-2e-3)), moved(MESH, 0.0))
     fit = term.fit(moved(MESH, 0.0))
     assert (fit.inliers == fit.visible) == (outline_px > 0)
     assert fit.occluded == 0

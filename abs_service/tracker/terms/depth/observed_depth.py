@@ -1,0 +1,157 @@
+"""One frame of a depth sensor: cost, residuals and agreement of deformed meshes."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.tracker.models.base import SparseJacobian, Surface
+from abs_service.tracker.synthesis.base import Synthesis, View
+from abs_service.tracker.terms.base import Bounds, facing
+from abs_service.tracker.terms.depth.depth_cost import FREE_SCALE_M, depth_cost, normalize
+from abs_service.tracker.terms.depth.fluctuation import Fluctuation
+from abs_service.tracker.terms.depth.outline.base import Outline
+from abs_service.tracker.terms.depth.outline.continuation import Continuation
+from abs_service.tracker.terms.depth.pixel_classes import PixelClasses
+from abs_service.tracker.terms.depth.texels import Texels
+from abs_service.tracker.terms.gradients import color_rows, depth_rows
+from abs_service.tracker.terms.linearization import Part, PointLinearization
+from abs_service.tracker.terms.patches import Patches
+from abs_service.tracker.terms.sensor_fit import SensorFit, summarize
+from abs_service.tracker.terms.vertex_counts import VertexMasks
+
+#: Nearer to the object than this, a sample in free space is pulled back no more stiffly [m].
+MIN_FREE_M = 0.005
+
+#: A measurement that is farther from its vertex is no measurement of the object [m].
+LARGEST_MISFIT_M = 0.05
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ObservedDepth:
+    """−log φ of eqs. 18 and 19 in one frame, see `ObservedTerm`.
+
+    Attributes:
+        sensor: name of the sensor.
+        view: of the mesh in its camera.
+        bounds: costs of the outlier model.
+        texels: the noise model, rendered over the image.
+        missing: cost (1, n) of a missing return at each vertex beyond that of an inlier.
+        classes: of the pixels.
+        occluders: points (k, 3) [m] before the predicted mesh.
+        outline: of the object.
+        continuation: measured surface beside the mesh.
+        fluctuation: of the sensor's distances, for later frames.
+        scale: of the noise model's deviations in this frame, from the fluctuation in earlier ones.
+        is_surprised: nothing in the image agrees with the prediction.
+    """
+
+    sensor: str
+    view: View
+    bounds: Bounds
+    texels: Texels
+    missing: NDArray[np.float32]
+    classes: PixelClasses
+    occluders: NDArray[np.float64]
+    outline: Outline
+    continuation: Continuation
+    fluctuation: Fluctuation
+    scale: float
+    is_surprised: bool
+
+    def hide(self, points: NDArray[np.float64]) -> None:
+        """Does nothing: a depth sensor detects occluders in its own image."""
+
+    def cost(self, surface: Surface) -> NDArray[np.float64]:
+        """−Σ_v log φ (population,) plus the cost of the outline."""
+        return self._measured_cost(surface, self.view.synthesize(surface)) + self.outline.cost(surface)
+
+    def _measured_cost(self, surface: Surface, seen: Synthesis) -> NDArray[np.float64]:
+        """Cost (population,) of the distances; the density is the larger of inlier and outlier density."""
+        out = np.empty(len(seen.pixel))
+        missing = self.view.carry(surface, self.missing)
+        texture = self.texels.at(seen.pixel)
+        depth_cost(seen.pixel, seen.distance, missing, texture, self.bounds.inlier, self.bounds.outlier, out)
+        return self.view.balance(out, surface, self.bounds.unseen)
+
+    def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> list[Part]:
+        """Normalised residuals of inliers and of samples in free space, and their derivatives with respect to Θ."""
+        samples, seen = self.view.follow(surface, sparse_jacobian), self.view.synthesize(surface)
+        measured, free = (each(surface, samples, seen) for each in (self._linearize_measured, self._linearize_free))
+        return [measured, free, self.outline.linearize(surface, sparse_jacobian)]
+
+    def _linearize_measured(self, surface: Surface, samples: SparseJacobian, seen: Synthesis) -> PointLinearization:
+        residual, inverse_deviation, cost = self._residuals(seen)
+        use = np.flatnonzero(cost < self.bounds.outlier - self.bounds.inlier)
+        vertices, normals = (
+            self.view.spread(surface, values) for values in (surface.vertices[0].T, surface.normals[0].T)
+        )
+        rows = depth_rows(vertices, normals, self.view.camera.center, use, inverse_deviation)
+        return PointLinearization(residual[use], rows, use, samples, vertices)
+
+    def _linearize_free(self, surface: Surface, samples: SparseJacobian, seen: Synthesis) -> PointLinearization:
+        """Residuals of samples in free space, which stop a thin sheet from sliding along itself.
+
+        The cost d / s of a sample that is d from the object is replaced by a square of the same slope, ½ d² / (s d₀).
+        """
+        pixel, free_m = seen.pixel[0], self.classes.free_m
+        away = free_m.ravel()[pixel].astype(np.float64)
+        out = (pixel > 0) & (away > 0)
+        if not out.any():
+            return PointLinearization.empty(samples)
+        vertices = self.view.spread(surface, surface.vertices[0].T)
+        distances = np.ascontiguousarray(free_m[1:-1, 1:-1, None])
+        weight = 1 / np.sqrt(FREE_SCALE_M * np.maximum(away[out], MIN_FREE_M))
+        rows = color_rows(distances, self.view.camera, vertices[out])[:, 0] * weight[:, None]
+        return PointLinearization(away[out] * weight, rows, np.flatnonzero(out), samples, vertices)
+
+    def fit(self, surface: Surface) -> SensorFit:
+        """Agreement of the sensor with a population of one."""
+        seen = self.view.synthesize(surface)
+        residual, _, cost = self._residuals(seen)
+        measured, pixel = cost < np.inf, np.where(self.classes.beyond.ravel()[seen.pixel[0]], 0, seen.pixel[0])
+        classes = self.classes.at(pixel)
+        free = (classes.free_m > 0) & (pixel > 0)
+        masks = VertexMasks.of(pixel, facing(self.view, surface), classes.lost, classes.covered, classes.doubtful)
+        mean = -float(self._measured_cost(surface, seen)[0]) / residual.size
+        size = np.where(free, np.inf, np.abs(residual))
+        found = summarize(self.sensor, masks, measured | free, size, mean)
+        return replace(
+            found,
+            normalized_residual=found.normalized_residual * self.scale,  # by the model as it is stated
+            rim=self.outline.fit(surface),
+            remainder=self.continuation.remainder(surface),
+            is_surprised=self.is_surprised,
+        )
+
+    def match(self, surface: Surface, sparse_jacobian: SparseJacobian, patches: Patches) -> PointLinearization:
+        """No residuals: there is no appearance."""
+        return PointLinearization.empty(sparse_jacobian)
+
+    def misfit(self, surface: Surface) -> NDArray[np.float64]:
+        """Signed distance of each vertex from its measurement, and the deviation of that by noise (2, n) [m].
+
+        In free space it is that from the object, without noise. Zero where nothing is measured, and everywhere if the
+        samples of the synthesis are not the vertices.
+        """
+        seen = self.view.synthesize(surface)
+        if seen.pixel.shape[1] != surface.vertices.shape[2]:
+            return np.zeros((2, 1))
+        residual, inverse, cost = self._residuals(seen)
+        classes = self.classes.at(np.maximum(seen.pixel[0], 0))
+        deviation = 1 / np.maximum(inverse, 1e-9)
+        signed = np.clip(residual * deviation, -LARGEST_MISFIT_M, LARGEST_MISFIT_M)
+        usable, measured = (seen.pixel[0] > 0) & ~classes.unknown, cost < np.inf
+        distance = np.where(measured, signed, classes.free_m.astype(np.float64))
+        return np.stack([distance, np.where(measured, deviation, 0.0)]) * usable
+
+    def learn(self, surface: Surface) -> None:
+        """Learns how much the distances fluctuate."""
+        distance, deviation = self.misfit(surface)
+        self.fluctuation.update(distance, deviation / self.scale)
+
+    def _residuals(self, seen: Synthesis) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Normalised residual, inverse deviation, and unbounded cost, infinite without a measurement, each (n,)."""
+        residual, inverse, cost = np.empty((3, seen.pixel.shape[1]))
+        normalize(seen.pixel[0], seen.distance[0], self.texels.at(seen.pixel), residual, inverse, cost)
+        return residual, inverse, cost

@@ -1,0 +1,197 @@
+"""One frame of a sensor with one value per pixel: cost, residuals and agreement of deformed meshes."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.pairing.images import Window
+from abs_service.tracker.models.base import SparseJacobian, Surface
+from abs_service.tracker.synthesis.base import Synthesis, View
+from abs_service.tracker.synthesis.perspective import project_with_jacobian
+from abs_service.tracker.synthesis.window import within
+from abs_service.tracker.terms.base import Bounds, facing
+from abs_service.tracker.terms.gradients import channel_gradients, shortened
+from abs_service.tracker.terms.image_noise import NORMAL_MEDIAN, noise_deviation
+from abs_service.tracker.terms.linearization import Part, PointLinearization
+from abs_service.tracker.terms.patches import Patches
+from abs_service.tracker.terms.photometric.channel_cost import CHANNEL, INVERSE, NORMALIZER, VALUE, channel_cost
+from abs_service.tracker.terms.photometric.illumination import Illumination
+from abs_service.tracker.terms.photometric.matching import matched
+from abs_service.tracker.terms.photometric.registration_bias import RegistrationBias
+from abs_service.tracker.terms.photometric.shadow import Shadow
+from abs_service.tracker.terms.photometric.texture_registration_noise import Widening
+from abs_service.tracker.terms.sensor_fit import SensorFit, summarize
+from abs_service.tracker.terms.vertex_counts import VertexMasks
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ObservedChannel:
+    """−log of the density of the numbers of one image, see `ObservedTerm`.
+
+    Attributes:
+        sensor: name of the sensor.
+        view: of the mesh in its camera.
+        bounds: costs of the outlier model.
+        illumination: light of the frame.
+        widening: of the noise, by that of the texture's registration.
+        bias: of the registration of edges.
+        shadow: of occluders.
+        image: texels (height, width, 4) in the view's camera, see `channel_cost`.
+        texture: the same with a border of one pixel, flattened (pixels, 4).
+        window: of the image that is compared.
+        is_mosaic: each pixel shows one of several channels.
+    """
+
+    sensor: str
+    view: View
+    bounds: Bounds
+    illumination: Illumination
+    widening: Widening
+    bias: RegistrationBias
+    shadow: Shadow
+    image: NDArray[np.float32]
+    texture: NDArray[np.float32]
+    window: Window
+    is_mosaic: bool
+
+    @property
+    def occluders(self) -> NDArray[np.float64]:
+        """No points: brightness carries no distance."""
+        return np.zeros((0, 3))
+
+    def hide(self, points: NDArray[np.float64]) -> None:
+        """Masks the pixels occluded by points (k, 3) [m]."""
+        if len(points):
+            bordered = self.texture.reshape(self.image.shape[0] + 2, -1, 4)
+            within(bordered, self.window)[self.shadow.mask(points)[self.window], VALUE] = np.inf
+
+    def exposed(self, predicted: Surface) -> "ObservedChannel":
+        """The frame in the light that it shows on the predicted mesh, a population of one."""
+        seen = self.view.synthesize(predicted)
+        return replace(self, illumination=self.illumination.adapt(self._by_channel(seen), seen.attributes[0].T))
+
+    def deviation(self, surface: Surface) -> NDArray[np.float64]:
+        """Deviation (m, 1) of the value at each sample of a population of one; infinite without a measurement."""
+        inverse = self._residuals(self.view.synthesize(surface), surface)[1]
+        with np.errstate(divide="ignore"):
+            return (1 / inverse)[:, None]
+
+    def cost(self, surface: Surface) -> NDArray[np.float64]:
+        """−Σ_v log of the density of the measured values (population,)."""
+        seen = self._synthesize(surface)
+        out = np.empty(len(seen.pixel))
+        channel_cost(seen.pixel, seen.attributes, *self._measured, out)
+        return self.view.balance(out, surface, self.bounds.unseen)
+
+    def _synthesize(self, surface: Surface) -> Synthesis:
+        """The values of a population as they look in this light."""
+        return self.illumination.shine(self.view.synthesize(surface), surface, self.view)
+
+    @property
+    def _measured(self) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], float, float]:
+        widening, bounds = self.widening, self.bounds
+        return self.texture, widening.factor, widening.log, bounds.outlier, bounds.unseen
+
+    def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> list[Part]:
+        """Normalised residuals of the inliers and their derivatives with respect to theta.
+
+        The derivative of the shading is neglected: it is small compared with that of the texture.
+        """
+        seen = self.view.synthesize(surface)
+        residual, inverse, normalizer = self._residuals(seen, surface)
+        use = 0.5 * residual**2 + normalizer < self.bounds.outlier
+        vertices = self.view.spread(surface, surface.vertices[0].T)
+        gradients, gains = self._gradients(seen, surface)
+        places, projection = project_with_jacobian(self.view.camera, vertices)
+        rows = np.einsum("mi,mij->mj", gradients[use] * inverse[use, None], projection[use])
+        # Noise has gradients as a print has, and the more of it there is, the better it would seem to hold a surface.
+        # Its deviation is that at all samples: where the value agrees, there is less of it by chance. A fine print
+        # looks like noise, but it is no residual where it agrees.
+        deviation = self._noise_deviation(places) * inverse[use]
+        deviation = np.minimum(deviation, np.median(np.abs(residual)) / NORMAL_MEDIAN)
+        noise = deviation**2 @ np.einsum("mi,mij->m", gains[use], projection[use] ** 2)
+        rows = shortened(rows, float(noise))
+        samples, points = self.view.follow(surface, sparse_jacobian), np.flatnonzero(use)
+        bias = self.bias.derivatives(vertices, rows, points)
+        return [PointLinearization(residual[use], rows, points, samples, vertices, bias)]
+
+    def fit(self, surface: Surface) -> SensorFit:
+        """Agreement of the sensor with a population of one."""
+        seen = self.view.synthesize(surface)
+        residual = self._residuals(seen, surface)[0]
+        pixel, known = seen.pixel[0], np.isfinite(seen.attributes[0]).all(axis=0)
+        hidden = np.isinf(self.texture[pixel, VALUE])
+        masks = VertexMasks.of(pixel, facing(self.view, surface), np.zeros_like(hidden), hidden, ~known)
+        mean = -float(self.cost(surface)[0]) / len(residual)
+        return summarize(self.sensor, masks, np.isfinite(residual), np.abs(residual), mean)
+
+    def match(self, surface: Surface, sparse_jacobian: SparseJacobian, patches: Patches) -> PointLinearization:
+        """See `ObservedTerm`."""
+        seen = self._synthesize(surface)
+
+        def costs(
+            pixel: NDArray[np.int32], attributes: NDArray[np.float32], samples: NDArray[np.intp]
+        ) -> NDArray[np.float64]:
+            texture, factor, log_factor, outlier, uniform = self._measured
+            out, own = np.empty(len(pixel)), samples % len(factor)  # one may stand for all
+            channel_cost(pixel, attributes, texture, factor[own], log_factor[own], outlier, uniform, out)
+            return out
+
+        return matched(self.view, surface, sparse_jacobian, seen, patches, self.image.shape, costs)
+
+    def misfit(self, surface: Surface) -> NDArray[np.float64]:
+        """Zero: brightness carries no distance."""
+        return np.zeros((2, 1))
+
+    def learn(self, surface: Surface) -> None:
+        """Learns nothing."""
+
+    def _by_channel(self, seen: Synthesis) -> NDArray[np.float64]:
+        """Measured values at each sample (m, channels), NaN in the channels that its pixel does not show."""
+        texels = self.texture[seen.pixel[0]]
+        values = np.full(seen.attributes[0].T.shape, np.nan)
+        values[np.arange(len(texels)), texels[:, CHANNEL].astype(int)] = texels[:, VALUE]
+        return values
+
+    def _noise_deviation(self, places: NDArray[np.float64]) -> float:
+        """Standard deviation of the image's noise around places (n, 2).
+
+        Taken for zero in a mosaic: pixels of a channel are too far apart to tell a fine print from noise.
+        """
+        return 0.0 if self.is_mosaic else float(noise_deviation(self.image[..., VALUE, None], places)[0])
+
+    def _gradients(self, seen: Synthesis, surface: Surface) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Image gradient of each sample in its pixel's channel, to the right and down (m, 2) [1/px].
+
+        And its variance by independent noise of the pixels of variance 1 (m, 2) [1/px²].
+
+        A mosaic shows each channel in every other pixel, too far apart to measure the slope of a fine texture. So it is
+        the surface's own where that is known, which is also exactly how a residual changes within a pixel.
+        """
+        channel = self.texture[seen.pixel[0], CHANNEL].astype(int)
+        own = replace(seen, attributes=self.view.attribute_gradients(surface).T)  # along both axes, as two members
+        shining = self.illumination.shine(own, surface, self.view).attributes
+        gradients = shining[:, channel, np.arange(len(channel))].T.astype(np.float64)
+        unknown = np.isnan(gradients).any(axis=1)
+        samples = self.view.spread(surface, surface.vertices[0].T.astype(np.float64))[unknown]
+        gains = self.view.gradient_noise_gains(surface)
+        gradients[unknown], gains[unknown] = channel_gradients(
+            self.image[..., VALUE], self.image[..., CHANNEL], self.view.camera, samples
+        )
+        return gradients, gains
+
+    def _residuals(
+        self, seen: Synthesis, surface: Surface
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Normalised residual, infinite without a measurement, inverse deviation, log of the normaliser, each (n,)."""
+        shining = self.illumination.shine(seen, surface, self.view)
+        texels = self.texture[seen.pixel[0]].astype(np.float64)
+        each, channel = np.arange(len(texels)), texels[:, CHANNEL].astype(int)
+        widening = self.widening
+        # One widening may stand for all samples, or for all channels.
+        of = each % len(widening.factor), channel % widening.factor.shape[1]
+        inverse = texels[:, INVERSE] / widening.factor[of]
+        residual = (texels[:, VALUE] - shining.attributes[0][channel, each]) * inverse
+        measured = (seen.pixel[0] > 0) & np.isfinite(residual)
+        return np.where(measured, residual, np.inf), inverse, texels[:, NORMALIZER] + widening.log[of]
