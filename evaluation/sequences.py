@@ -143,7 +143,7 @@ class TrackedSequence:
     @property
     def evaluations(self) -> float:
         """Mean number of candidates per exposure, without the first."""
-        return float(np.mean([estimate.evaluations for estimate in self.estimates[1:]]))
+        return float(np.mean([estimate.search.evaluations for estimate in self.estimates[1:]]))
 
     @property
     def thetas(self) -> NDArray[np.float64]:

@@ -68,7 +68,7 @@ def with_mesh(found: tracker_estimate.Estimate, mesh: Mesh | None, version: int)
         mesh_version=version,
         inlier_share=found.inlier_share,
         residuals={fit.sensor: fit.normalized_residual for fit in found.fits},
-        evaluations=found.evaluations,
+        evaluations=found.search.evaluations,
         missing=found.missing,
         warnings=found.warnings,
     )

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from abs_service.pairing.observation import Observation
 from abs_service.tracker import status
-from abs_service.tracker.estimate import Estimate, Status
+from abs_service.tracker.estimate import Estimate, SearchReport, Status
 from abs_service.tracker.optimizers.base import Budget, Optimizer, Outcome, Search
 from abs_service.tracker.posterior.covariance.observability import single_frame_deviation
 from abs_service.tracker.posterior.covariance.theta_covariance import ThetaCovariance
@@ -24,7 +24,6 @@ from abs_service.tracker.posterior.posterior import Posterior
 from abs_service.tracker.posterior.relocation import fit_to_points
 from abs_service.tracker.posterior.search_start import search_start
 from abs_service.tracker.shape_quality import ShapeComparison
-from abs_service.tracker.terms.agreement import inlier_share
 from abs_service.tracker.terms.patches import patches_of
 
 #: Frames after a start that are searched from scratch: in the first, nothing is known, and in the second, not how fast
@@ -104,7 +103,7 @@ class Tracker:
             except StopIteration as ended:
                 return ended.value
 
-    def _estimate(self, observation: Observation, frame: FramePosterior, outcome: Outcome, budget: Budget) -> Estimate:
+    def _estimate(self, observation: Observation, frame: FramePosterior, outcome: Outcome, spent: Budget) -> Estimate:
         """Covariances, agreement of the sensors and status at the optimum."""
         optimum = frame.optimum(outcome.theta, outcome.linearized)
         motion = self._posterior.motion.update(frame.motion, optimum.theta, optimum.inverse_curvature)
@@ -121,24 +120,17 @@ class Tracker:
         return Estimate(
             seq=observation.seq,
             t_host_ns=observation.t_host_ns,
+            sources=observation.sources,
+            missing=observation.missing,
             status=verdict,
             reasons=reasons,
             theta=optimum.theta,
             covariance=covariance,
             vertices=optimum.vertices,
             vertex_covariance=vertex_covariance,
-            cost=outcome.cost,
-            deviation=outcome.deviation,
-            searcher=outcome.searcher,
-            stop=outcome.stop,
-            generations=budget.generations,
-            evaluations=budget.evaluations,
-            budget=self._evaluations,
-            inlier_share=inlier_share(fits),
             fits=fits,
             shape=shape,
-            sources=observation.sources,
-            missing=observation.missing,
+            search=SearchReport.of(outcome, spent),
         )
 
 

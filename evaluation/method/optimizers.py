@@ -132,14 +132,14 @@ def _figures(runs: Sequence[Run]) -> dict[str, float]:
         "worst_mm": max(one.vertex_mm for one in errors),
         "median_ms": float(np.median(times)),
         "p95_ms": float(np.quantile(times, 0.95)),
-        "generations": float(np.mean([estimate.generations for estimate in estimates])),
-        "evaluations": float(np.mean([estimate.evaluations for estimate in estimates])),
+        "generations": float(np.mean([estimate.search.generations for estimate in estimates])),
+        "evaluations": float(np.mean([estimate.search.evaluations for estimate in estimates])),
     }
 
 
 def _stops(estimates: Sequence[Estimate]) -> str:
     """Search and stop criterion of the estimates, the most frequent first."""
-    found = Counter(f"{estimate.searcher} {estimate.stop}" for estimate in estimates)
+    found = Counter(f"{estimate.search.searcher} {estimate.search.stop}" for estimate in estimates)
     return ", ".join(f"{what} {count / len(estimates):.0%}" for what, count in found.most_common())
 
 

@@ -55,23 +55,24 @@ class Budget:
     """Budget of evaluations and time of one frame, and its consumption.
 
     Args:
-        limit: maximum number of cost evaluations; a generation that has begun is completed.
+        limit: see below.
         in_time: False when the time is up.
 
     Attributes:
+        limit: maximum number of cost evaluations; a generation that has begun is completed.
         generations: of populations, and accepted steps of descents.
         evaluations: number of cost evaluations.
     """
 
     def __init__(self, limit: int, in_time: Callable[[], bool]):
+        self.limit = limit
         self.generations = 0
         self.evaluations = 0
-        self._limit = limit
         self._in_time = in_time
 
     def exhausted(self) -> Stop | None:
         """Reason to stop; None while there is budget."""
-        if self.evaluations >= self._limit:
+        if self.evaluations >= self.limit:
             return Stop.EVALUATIONS
         return None if self._in_time() else Stop.TIME
 

@@ -7,7 +7,7 @@ import pytest
 from absmsg.v1.common_pb2 import Header
 
 from abs_service.pairing.observation import Source
-from abs_service.tracker.estimate import Estimate, Status
+from abs_service.tracker.estimate import Estimate, SearchReport, Status
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.optimizers.base import Stop
 from abs_service.tracker.shape_quality import ShapeQuality
@@ -25,21 +25,16 @@ ESTIMATE = Estimate(
     covariance=np.array([[1.0, 0.1, 0.2], [0.1, 2.0, 0.3], [0.2, 0.3, 3.0]]),
     vertices=np.arange(6, dtype=np.float32).reshape(2, 3),
     vertex_covariance=np.array([[[1.0, 2, 3], [2, 4, 5], [3, 5, 6]], [[7.0, 0, 0], [0, 8, 0], [0, 0, 9]]]),
-    cost=12.5,
-    deviation=0.5,
-    searcher="cma_es",
-    stop=Stop.TIME,
-    generations=3,
-    evaluations=45,
-    budget=1000,
-    inlier_share=0.9,
+    search=SearchReport(
+        cost=12.5, deviation=0.5, searcher="cma_es", stop=Stop.TIME, generations=3, evaluations=45, limit=1000
+    ),
     fits=(
         SensorFit(
             "tof",
             280,
             10,
             270,
-            260,
+            252,
             1.5,
             1.1,
             RimFit(visible=60, outside=5, inside=3, occluded=2),
@@ -108,7 +103,7 @@ def test_effort_and_budget_of_the_search_are_published():
 @pytest.mark.parametrize("stop", Stop)
 def test_every_reason_to_stop_has_its_word(stop):
     state = estimate_messages.state(
-        Header(), replace(ESTIMATE, stop=stop), IDENTITY, Effort(1.0, 24.0, 2.0, 0.5, 0, {})
+        Header(), replace(ESTIMATE, search=SearchReport(stop=stop)), IDENTITY, Effort(1.0, 24.0, 2.0, 0.5, 0, {})
     )
     word = estimate_messages.State.Stop.Name(state.stop).removeprefix("STOP_").lower()
     assert word == ("unspecified" if stop == Stop.NOTHING else stop.value)

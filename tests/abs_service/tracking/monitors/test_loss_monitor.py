@@ -8,7 +8,6 @@ import pytest
 from abs_service.tracker.detection.initial_detection import DetectionError
 from abs_service.tracker.estimate import Estimate, Status
 from abs_service.tracker.mesh import Mesh
-from abs_service.tracker.shape_quality import ShapeQuality
 from abs_service.tracker.status import Settings as Limits
 from abs_service.tracker.terms.sensor_fit import RimFit, SensorFit
 from abs_service.tracking.monitors.loss_monitor import LossMonitor, Settings
@@ -24,9 +23,7 @@ LOST = sheet(size=(0.3, 0.2))
 
 
 def estimate(k: int, status: Status, reasons: tuple[str, ...] = ()) -> Estimate:
-    nothing = np.zeros(0)
-    made = Estimate(**dict.fromkeys((field.name for field in dataclasses.fields(Estimate)), nothing))  # pyright: ignore
-    return dataclasses.replace(made, t_host_ns=k * FRAME_NS, status=status, reasons=reasons, shape=ShapeQuality())
+    return Estimate(k, k * FRAME_NS, {}, (), status, reasons)
 
 
 def test_a_tracked_object_needs_no_attempt():
