@@ -158,7 +158,9 @@ class Kernel:
         values = sorted((name, repr(value)) for name, value in used if not (callable(value) or ismodule(value)))
         built = _FASTMATH, _OPTIONS, _CALLED
         # The module, because cached code imports its modules by name.
-        made_of = self.function.__module__, _readable(self.function), values, built
+        # Fields of tuples are found by their place.
+        fields = [named._fields for named in self.function.__annotations__.values() if hasattr(named, "_fields")]
+        made_of = self.function.__module__, _readable(self.function), values, built, *fields
         return hashlib.sha256(repr(made_of).encode()).hexdigest()[:12]
 
     @functools.cached_property

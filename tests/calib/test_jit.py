@@ -6,7 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 from types import FunctionType
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 import pytest
@@ -70,6 +70,17 @@ def test_code_that_has_moved_to_another_module_is_compiled_anew() -> None:
     moved = FunctionType(getattr(doubled, "function").__code__, globals(), "doubled")  # noqa: B009
     moved.__module__ = "calib.elsewhere"
     assert digest(kernel(moved)) != digest(doubled)
+
+
+def test_a_tuple_with_its_fields_in_another_order_makes_another_kernel() -> None:
+    def reading(pair: type) -> Any:
+        def first(values: pair) -> float:  # pyright: ignore[reportInvalidTypeForm]
+            return values.a
+
+        return kernel(first)
+
+    one, other = (reading(NamedTuple("Pair", [(name, float) for name in names])) for names in ("ab", "ba"))
+    assert digest(one) != digest(other)
 
 
 PARTS = """

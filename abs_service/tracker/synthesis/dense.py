@@ -110,7 +110,7 @@ class DenseView:
     def look(self, predicted: Surface) -> None:
         """Counts the pixels of the predicted mesh; the z-buffer resolves self-occlusion per candidate."""
         samples, share = self._render(predicted)
-        self._expected = float(samples.count[0]) / max(float(share[0]), MIN_SHARE)
+        self._expected = float(samples.covered[0]) / max(float(share[0]), MIN_SHARE)
 
     def synthesize(self, surface: Surface) -> Synthesis:
         """Synthesises a population; samples beyond a candidate's number of covered pixels have pixel −1."""
@@ -147,7 +147,7 @@ class DenseView:
         it.
         """
         samples, share = self._render(surface)
-        mean = np.where(samples.count > 0, costs / np.maximum(samples.count, 1), unseen)
+        mean = np.where(samples.covered > 0, costs / np.maximum(samples.covered, 1), unseen)
         return self._expected * (share * mean + (1 - share) * unseen)
 
     def render(self, surface: Surface) -> NDArray[np.float32]:
@@ -161,8 +161,8 @@ class DenseView:
         """
         last, samples, share = self._last
         if last is not surface:
-            place, inverse_z = self._projection.project(surface.vertices)
-            share = in_sight(place, inverse_z, self._ray_length.shape)
-            samples = render(place, inverse_z, self._faces, self._ray_length, self._step)
+            projected = self._projection.project(surface.vertices)
+            share = in_sight(projected, self._ray_length.shape)
+            samples = render(projected, self._faces, self._ray_length, self._step)
             self._last = (surface, samples, share)
         return samples, share

@@ -1,5 +1,7 @@
 """Projection of the vertices of a population into one camera's image, in single precision."""
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,6 +18,18 @@ def optics(camera: Camera) -> tuple[NDArray[np.float32], NDArray[np.float32], ND
     return pose, matrix, camera.lens.coefficients.astype(np.float32)
 
 
+class Projected(NamedTuple):
+    """Vertices of a population in one camera's image.
+
+    Attributes:
+        place: pixel coordinates (population, n, 2); 0 for a vertex that the camera cannot see.
+        inverse_z: 1/z (population, n) [1/m]; NaN for a vertex outside the field of view or behind the camera.
+    """
+
+    place: NDArray[np.float32]
+    inverse_z: NDArray[np.float32]
+
+
 class Projection:
     """Eq. 10 for populations, in single precision.
 
@@ -27,36 +41,49 @@ class Projection:
         self.arguments = *optics(camera), camera.field_radius**2
         self._project = composed(_project, **lens_parts(camera.lens))
 
-    def project(self, vertices: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Pixel coordinates (population, n, 2) and 1/z (population, n) of vertices (population, 3, n) [m].
-
-        Vertices outside the field of view or behind the camera have coordinates 0 and 1/z NaN.
-        """
+    def project(self, vertices: NDArray[np.float32]) -> Projected:
+        """The vertices (population, 3, n) [m] in the image."""
         population, _, n = vertices.shape
-        place, inverse_z = np.empty((population, n, 2), np.float32), np.empty((population, n), np.float32)
-        self._project(vertices, *self.arguments, place, inverse_z)
-        return place, inverse_z
+        found = Projected(np.empty((population, n, 2), np.float32), np.empty((population, n), np.float32))
+        self._project(vertices, *self.arguments, *found)
+        return found
 
 
-def in_sight(place: NDArray[np.float32], inverse_z: NDArray[np.float32], shape: tuple[int, ...]) -> NDArray[np.float64]:
+def in_sight(seen: Projected, shape: tuple[int, ...]) -> NDArray[np.float64]:
     """Share (population,) of projected vertices inside an image of a shape (height, width)."""
-    count = np.zeros(len(place), np.int64)
-    _count_inside(place, inverse_z, shape[0], shape[1], count)
-    return count / place.shape[1]
+    count = np.zeros(len(seen.place), np.int64)
+    _count_inside(seen, shape[0], shape[1], count)
+    return count / seen.place.shape[1]
+
+
+def extent(seen: Projected) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Minimum and maximum (row, column) of all vertices that the camera can see; ∞ and −∞ without any."""
+    low, high = np.full(2, np.inf), np.full(2, -np.inf)
+    _extent(seen, low, high)
+    return low, high
 
 
 @kernel
-def _count_inside(
-    place: NDArray[np.float32], inverse_z: NDArray[np.float32], height: int, width: int, count: NDArray[np.int64]
-) -> None:
+def _extent(seen: Projected, low: NDArray[np.float64], high: NDArray[np.float64]) -> None:
+    """Lowers `low` and raises `high` (2,) to the results of `extent`."""
+    for k in range(seen.place.shape[0]):
+        for v in range(seen.place.shape[1]):
+            if not np.isnan(seen.inverse_z[k, v]):
+                for axis in range(2):
+                    low[1 - axis] = min(low[1 - axis], seen.place[k, v, axis])
+                    high[1 - axis] = max(high[1 - axis], seen.place[k, v, axis])
+
+
+@kernel
+def _count_inside(seen: Projected, height: int, width: int, count: NDArray[np.int64]) -> None:
     """Number of vertices of every candidate that the camera can see and that lie inside its image."""
     half = np.float32(0.5)
     right, bottom = np.float32(width) - half, np.float32(height) - half
-    for k in range(place.shape[0]):
-        for v in range(place.shape[1]):
-            x, y = place[k, v, 0], place[k, v, 1]
+    for k in range(seen.place.shape[0]):
+        for v in range(seen.place.shape[1]):
+            x, y = seen.place[k, v, 0], seen.place[k, v, 1]
             inside = x >= -half and x < right and y >= -half and y < bottom
-            count[k] += 1 if inside and not np.isnan(inverse_z[k, v]) else 0
+            count[k] += 1 if inside and not np.isnan(seen.inverse_z[k, v]) else 0
 
 
 @kernel

@@ -7,8 +7,7 @@ from numpy.typing import NDArray
 
 from abs_service.pairing.images import Limits, Window, limits
 from abs_service.tracker.models.base import Surface
-from abs_service.tracker.synthesis.projection import Projection
-from abs_service.tracker.synthesis.rasterization.zbuffer import extent
+from abs_service.tracker.synthesis.projection import Projection, extent
 from calib.camera import Camera
 from calib.jit import kernel
 
@@ -31,13 +30,12 @@ def around(camera: Camera, projection: Projection, predicted: Surface, reach_m: 
         predicted: predicted surface, a population of one.
         reach_m: largest distance of the surface from the prediction [m]; infinite: the whole image.
     """
-    place, inverse_z = projection.project(predicted.vertices)
-    nearest = inverse_z.max(initial=0.0)
+    seen = projection.project(predicted.vertices)
+    nearest = seen.inverse_z.max(initial=0.0)
     if not np.isfinite(reach_m * nearest):
         return WHOLE
     margin = reach_m * max(camera.fx, camera.fy) * nearest + 2
-    low, high = np.full(2, np.inf), np.full(2, -np.inf)
-    extent(place, inverse_z, low, high)
+    low, high = extent(seen)
     size = np.array([camera.height, camera.width])
     first = np.clip(np.floor(low - margin), 0, size - 1).astype(int) // 2 * 2
     last = np.clip(np.ceil(high + margin) + 1, first + 1, size).astype(int).tolist()

@@ -1,6 +1,7 @@
 """Heights of measured points above a mesh: residual of a depth image at every vertex, along the normal."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +34,43 @@ class Heights:
     precision: NDArray[np.float64]
 
 
+class Cutout(NamedTuple):
+    """Measured distances (rows, columns) [m] of an image, with the row and the column of the first one."""
+
+    distance: NDArray[np.float32]
+    top: int
+    left: int
+
+
+class VertexPixels(NamedTuple):
+    """The pixels of every vertex.
+
+    Attributes:
+        rows, columns: of its own pixel (n,).
+        steps: rows and columns (k, 2) from there to each of its pixels.
+    """
+
+    rows: NDArray[np.int64]
+    columns: NDArray[np.int64]
+    steps: NDArray[np.int64]
+
+
+class Planes(NamedTuple):
+    """The tangential plane of every vertex, and what measurements of it are expected to be.
+
+    Attributes:
+        sight: vertices relative to the camera (n, 3) [m].
+        normals: their unit normals (n, 3).
+        mean: mean offset of their measurements (n,) [m]; NaN where nothing is to be measured.
+        limit: largest height of an inlier (n,) [m].
+    """
+
+    sight: NDArray[np.float64]
+    normals: NDArray[np.float64]
+    mean: NDArray[np.float64]
+    limit: NDArray[np.float64]
+
+
 class HeightSensor:
     """A depth sensor that measures heights, of every vertex by the pixels that are nearer to it than to others."""
 
@@ -44,7 +82,7 @@ class HeightSensor:
         self._reach = int(radius)
         rows, columns = np.mgrid[-self._reach : self._reach + 1, -self._reach : self._reach + 1].reshape(2, -1)
         self._steps = np.stack([rows, columns], axis=1)[np.hypot(rows, columns) <= radius]
-        self._rays = camera.lookup.rays.reshape(-1, 3) @ camera.T_rs[:3, :3].T
+        self._rays = (camera.lookup.rays.reshape(-1, 3) @ camera.T_rs[:3, :3].T).reshape(camera.lookup.rays.shape)
 
     def measure(
         self,
@@ -72,9 +110,10 @@ class HeightSensor:
         sigma = deviation * cosine
         limit = INLIER_DEVIATIONS * np.sqrt(sigma**2 + variance)
         height, pixels = np.empty_like(sigma), np.empty_like(sigma)
-        places = row, column, self._steps, self._camera.width, top, left
-        measured = np.ascontiguousarray(measured)  # one memory layout, for which the kernel is compiled
-        _mean_heights(measured, self._rays, *places, sight, normals, mean, limit, height, pixels)
+        # One memory layout, for which the kernel is compiled.
+        cutout = Cutout(np.ascontiguousarray(measured), top, left)
+        planes = Planes(sight, normals, mean, limit)
+        _mean_heights(cutout, self._rays, VertexPixels(row, column, self._steps), planes, height, pixels)
         return Heights(height, pixels / np.where(pixels, sigma, 1) ** 2)
 
     def _pixel(self, vertices: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
@@ -106,42 +145,29 @@ class HeightSensor:
 
 @kernel
 def _mean_heights(
-    distance: NDArray[np.float32],
+    cutout: Cutout,
     rays: NDArray[np.float64],
-    rows: NDArray[np.int64],
-    columns: NDArray[np.int64],
-    steps: NDArray[np.int64],
-    width: int,
-    top: int,
-    left: int,
-    sight: NDArray[np.float64],
-    normals: NDArray[np.float64],
-    mean: NDArray[np.float64],
-    limit: NDArray[np.float64],
+    places: VertexPixels,
+    planes: Planes,
     height: NDArray[np.float64],
     pixels: NDArray[np.float64],
 ) -> None:
     """Mean height of the inliers among every vertex's pixels, if they are more than half; else it is not measured.
 
     Args:
-        distance: measured distances in a window of the image [m].
-        rays: unit directions of all pixels in the rig frame (height · width, 3).
-        rows, columns: of every vertex's own pixel (n,).
-        steps: rows and columns (k, 2) from a vertex's own pixel to each of its pixels.
-        width: of the image.
-        top, left: the window's first row and column.
-        sight: vertices relative to the camera (n, 3) [m].
-        normals: their unit normals (n, 3).
-        mean: mean offset of their measurements (n,) [m]; NaN where nothing is to be measured.
-        limit: largest height of an inlier (n,) [m].
+        cutout: of the image, with all pixels of all vertices.
+        rays: unit directions of all pixels in the rig frame (height, width, 3).
+        places: the pixels of every vertex.
+        planes: the planes above which heights are measured.
         height, pixels: results (n,) [m], and the number of inliers (n,); both 0 without enough of them.
     """
+    (distance, top, left), (rows, columns, steps), (sight, normals, mean, limit) = cutout, places, planes
     for v in range(rows.size):
         x, y, z = normals[v, 0], normals[v, 1], normals[v, 2]
         vertex, total, count = sight[v, 0] * x + sight[v, 1] * y + sight[v, 2] * z, 0.0, 0
         for k in range(steps.shape[0]):
             row, column = rows[v] + steps[k, 0], columns[v] + steps[k, 1]
-            ray = rays[row * width + column]
+            ray = rays[row, column]
             away = (distance[row - top, column - left] - mean[v]) * (ray[0] * x + ray[1] * y + ray[2] * z) - vertex
             if abs(away) < limit[v]:  # False for NaN
                 total += away

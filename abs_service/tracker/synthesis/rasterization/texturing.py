@@ -34,7 +34,7 @@ def paint(values: NDArray[np.float32], detail: int, samples: Samples) -> NDArray
     """Attributes (population, channels, m) of samples, from those at lattice points (k, channels), linear between."""
     population, m = samples.pixel.shape
     result = np.empty((population, values.shape[1], m), np.float32)
-    _paint(values, detail, samples.face, samples.weights, result)
+    _paint(values, detail, samples, result)
     return result
 
 
@@ -54,14 +54,9 @@ def _small_faces(detail: int) -> NDArray[np.int64]:
 
 
 @kernel
-def _paint(
-    values: NDArray[np.float32],
-    detail: int,
-    face: NDArray[np.int32],
-    weights: NDArray[np.float32],
-    result: NDArray[np.float32],
-) -> None:
+def _paint(values: NDArray[np.float32], detail: int, samples: Samples, result: NDArray[np.float32]) -> None:
     """Linear interpolation within the sub-triangle that contains each sample."""
+    face, weights = samples.face, samples.weights
     one = np.float32(1)
     points = (detail + 1) * (detail + 2) // 2
     for k in range(face.shape[0]):

@@ -1,15 +1,15 @@
 """A z-buffer for a population of meshes: visible face, distance and barycentric coordinates of every pixel."""
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from abs_service.tracker.synthesis.projection import Projected, extent
 from calib.jit import kernel
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Samples:
+class Samples(NamedTuple):
     """Pixels that every candidate of a population covers, padded with −1 to a common number m.
 
     Attributes:
@@ -18,38 +18,50 @@ class Samples:
         distance: radial distance (population, m) [m].
         face: index (population, m) of the face.
         weights: perspective-correct barycentric weights of the face's corners (population, m, 3).
-        count: number of samples (population,).
+        covered: number of samples (population,).
     """
 
     pixel: NDArray[np.int32]
     distance: NDArray[np.float32]
     face: NDArray[np.int32]
     weights: NDArray[np.float32]
-    count: NDArray[np.int64]
+    covered: NDArray[np.int64]
 
 
-def render(
-    place: NDArray[np.float32],
-    inverse_z: NDArray[np.float32],
-    faces: NDArray[np.int32],
-    ray_length: NDArray[np.float32],
-    step: int,
-) -> Samples:
+class Grid(NamedTuple):
+    """Every `step`-th row and column of an image, from (top, left) · step."""
+
+    step: int
+    top: int
+    left: int
+
+
+class Nearest(NamedTuple):
+    """The nearest faces of a population in a grid of pixels (rows, columns).
+
+    Attributes:
+        inverse_z: 1/z (population, rows, columns) [1/m]; 0 without a face.
+        face: its index (population, rows, columns); −1 without.
+    """
+
+    inverse_z: NDArray[np.float32]
+    face: NDArray[np.int32]
+
+
+def render(seen: Projected, faces: NDArray[np.int32], ray_length: NDArray[np.float32], step: int) -> Samples:
     """Renders a population.
 
     Args:
-        place: pixel coordinates (population, n, 2) of the vertices.
-        inverse_z: their 1/z (population, n), NaN where the camera cannot see them.
+        seen: the projected vertices.
         faces: vertex indices (m, 3), anticlockwise around the normal.
         ray_length: radial distance per z of every pixel (height, width).
         step: spacing of the sampled rows and columns [px].
     """
-    population = len(place)
-    top, left, rows, columns = _box(place, inverse_z, ray_length.shape, step)
-    nearness = np.empty((population, rows, columns), np.float32)
-    face = np.empty((population, rows, columns), np.int32)
+    population = len(seen.place)
+    grid, size = _box(seen, ray_length.shape, step)
+    nearest = Nearest(np.empty((population, *size), np.float32), np.empty((population, *size), np.int32))
     count = np.zeros(population, np.int64)
-    _rasterize(place, inverse_z, faces, step, top, left, nearness, face, count)
+    _rasterize(seen, faces, grid, nearest, count)
     most = int(count.max(initial=0))
     samples = Samples(
         np.full((population, most), -1, np.int32),
@@ -58,71 +70,34 @@ def render(
         np.zeros((population, most, 3), np.float32),
         count,
     )
-    _collect(
-        nearness,
-        face,
-        place,
-        inverse_z,
-        faces,
-        ray_length,
-        step,
-        top,
-        left,
-        samples.pixel,
-        samples.distance,
-        samples.face,
-        samples.weights,
-    )
+    _collect(seen, faces, grid, nearest, ray_length, samples)
     return samples
 
 
 def interpolate(values: NDArray[np.float32], faces: NDArray[np.int32], samples: Samples) -> NDArray[np.float32]:
     """Interpolates values (population or 1, n, channels) of the vertices at the samples (population, m, channels)."""
     result = np.empty((*samples.pixel.shape, values.shape[2]), np.float32)
-    _interpolate(values, faces, samples.face, samples.weights, result)
+    _interpolate(values, faces, samples, result)
     return result
 
 
-def _box(
-    place: NDArray[np.float32], inverse_z: NDArray[np.float32], shape: tuple[int, ...], step: int
-) -> tuple[int, int, int, int]:
-    """Bounding box of a population in an image: first row and column, and number of both, in steps."""
-    low, high = np.full(2, np.inf), np.full(2, -np.inf)
-    extent(place, inverse_z, low, high)
+def _box(seen: Projected, shape: tuple[int, ...], step: int) -> tuple[Grid, tuple[int, int]]:
+    """Grid over the bounding box of a population in an image, and its numbers of rows and columns."""
+    low, high = extent(seen)
     if high[0] < low[0]:
-        return 0, 0, 0, 0
+        return Grid(step, 0, 0), (0, 0)
     most = -(-np.array(shape) // step) - 1
-    first = np.clip(np.ceil(low / step), 0, most).astype(int)
-    last = np.clip(np.floor(high / step), -1, most).astype(int)
-    return (*first.tolist(), *np.maximum(last + 1 - first, 0).tolist())
-
-
-@kernel
-def extent(
-    place: NDArray[np.float32], inverse_z: NDArray[np.float32], low: NDArray[np.float64], high: NDArray[np.float64]
-) -> None:
-    """Minimum and maximum (row, column) of all vertices that the camera can see."""
-    for k in range(place.shape[0]):
-        for v in range(place.shape[1]):
-            if not np.isnan(inverse_z[k, v]):
-                for axis in range(2):
-                    low[1 - axis] = min(low[1 - axis], place[k, v, axis])
-                    high[1 - axis] = max(high[1 - axis], place[k, v, axis])
+    top, left = np.clip(np.ceil(low / step), 0, most).astype(int).tolist()
+    bottom, right = np.clip(np.floor(high / step), -1, most).astype(int).tolist()
+    return Grid(step, top, left), (max(bottom + 1 - top, 0), max(right + 1 - left, 0))
 
 
 @kernel
 def _rasterize(
-    place: NDArray[np.float32],
-    inverse_z: NDArray[np.float32],
-    faces: NDArray[np.int32],
-    step: int,
-    top: int,
-    left: int,
-    nearness: NDArray[np.float32],
-    face: NDArray[np.int32],
-    count: NDArray[np.int64],
+    seen: Projected, faces: NDArray[np.int32], grid: Grid, nearest: Nearest, count: NDArray[np.int64]
 ) -> None:
-    """Nearest face (−1 if none) and its 1/z at every `step`-th pixel from (top, left) · step; counts the samples."""
+    """Fills in the nearest faces, and counts the samples (population,), zeros at the start."""
+    (step, top, left), (place, inverse_z), (nearness, face) = grid, seen, nearest
     height, width = nearness.shape[1:]
     one = np.float32(1)
     for k in range(nearness.shape[0]):
@@ -156,21 +131,15 @@ def _rasterize(
 
 @kernel
 def _collect(
-    nearness: NDArray[np.float32],
-    face: NDArray[np.int32],
-    place: NDArray[np.float32],
-    inverse_z: NDArray[np.float32],
+    seen: Projected,
     faces: NDArray[np.int32],
+    grid: Grid,
+    nearest: Nearest,
     ray_length: NDArray[np.float32],
-    step: int,
-    top: int,
-    left: int,
-    pixel: NDArray[np.int32],
-    distance: NDArray[np.float32],
-    index: NDArray[np.int32],
-    weights: NDArray[np.float32],
+    samples: Samples,
 ) -> None:
-    """Gathers the covered pixels (population, height, width), row by row, into the arrays of `Samples`."""
+    """Gathers the covered pixels, row by row, into the samples."""
+    (step, top, left), (place, inverse_z), (nearness, face) = grid, seen, nearest
     population, height, width = face.shape
     stride = ray_length.shape[1] + 2
     for k in range(population):
@@ -190,24 +159,21 @@ def _collect(
                 at_b, at_c = (right * cy - down * cx) / area, (bx * down - by * right) / area
                 z = 1 / nearness[k, row, column]
                 # The image's y axis points down: faces that are clockwise in it are front faces.
-                pixel[k, i] = (y + 1) * stride + x + 1 if area < 0 else 0
-                distance[k, i] = ray_length[y, x] * z
-                index[k, i] = f
-                weights[k, i, 0] = (1 - at_b - at_c) * inverse_z[k, a] * z
-                weights[k, i, 1] = at_b * inverse_z[k, b] * z
-                weights[k, i, 2] = at_c * inverse_z[k, c] * z
+                samples.pixel[k, i] = (y + 1) * stride + x + 1 if area < 0 else 0
+                samples.distance[k, i] = ray_length[y, x] * z
+                samples.face[k, i] = f
+                samples.weights[k, i, 0] = (1 - at_b - at_c) * inverse_z[k, a] * z
+                samples.weights[k, i, 1] = at_b * inverse_z[k, b] * z
+                samples.weights[k, i, 2] = at_c * inverse_z[k, c] * z
                 i += 1
 
 
 @kernel
 def _interpolate(
-    values: NDArray[np.float32],
-    faces: NDArray[np.int32],
-    index: NDArray[np.int32],
-    weights: NDArray[np.float32],
-    result: NDArray[np.float32],
+    values: NDArray[np.float32], faces: NDArray[np.int32], samples: Samples, result: NDArray[np.float32]
 ) -> None:
     """Weighted sums (population, m, channels) of the corners' values (population or 1, n, channels)."""
+    index, weights = samples.face, samples.weights
     for k in range(index.shape[0]):
         own = k % values.shape[0]
         for i in range(index.shape[1]):

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.synthesis.dense import DenseView
-from abs_service.tracker.synthesis.projection import Projection, in_sight
+from abs_service.tracker.synthesis.projection import Projected, Projection, in_sight
 from abs_service.tracker.synthesis.rasterization.texturing import lattice, paint
 from abs_service.tracker.synthesis.rasterization.zbuffer import Samples, interpolate, render
 from abs_service.tracker.synthesis.sparse import SparseView
@@ -52,9 +52,9 @@ def test_the_z_buffer_is_what_its_definition_says(seed, step):
     inverse_z[generator.integers(12)] = np.nan
     faces = np.array([facing(generator.choice(12, 3, replace=False), place) for _ in range(7)], np.int32)
     ray_length = generator.uniform(1, 1.3, (12, 16)).astype(np.float32)
-    samples = render(place[None], inverse_z[None], faces, ray_length, step)
+    samples = render(Projected(place[None], inverse_z[None]), faces, ray_length, step)
     assert np.all(np.diff(samples.pixel[0]) > 0)
-    assert samples.count.tolist() == [len(samples.pixel[0])]
+    assert samples.covered.tolist() == [len(samples.pixel[0])]
     found = {divmod(int(pixel), 18): i for i, pixel in enumerate(samples.pixel[0])}
     for y in range(0, 12, step):
         for x in range(0, 16, step):
@@ -85,7 +85,7 @@ def test_the_projection_is_eq_10(seed):
     assert not place[0, ~seen].any()
     low, high = -0.5, np.array([CAMERA.width, CAMERA.height]) - 0.5
     inside = seen & np.all((place[0] >= low) & (place[0] < high), axis=1)
-    assert in_sight(place, inverse_z, (CAMERA.height, CAMERA.width))[0] == pytest.approx(np.mean(inside))
+    assert in_sight(Projected(place, inverse_z), (CAMERA.height, CAMERA.width))[0] == pytest.approx(np.mean(inside))
 
 
 def reference_inside(vertices: np.ndarray) -> np.ndarray:
