@@ -38,8 +38,8 @@ THREADS = "NUMBA_NUM_THREADS"
 def kernel(function: Function) -> Function:
     """Compiles `function` at its first call; caches the machine code on disk; releases the interpreter lock.
 
-    Kernels take contiguous arrays and scalars; divisions follow IEEE rules and do not raise. Numba is imported at the
-    first call, because the import takes a second.
+    Kernels take contiguous arrays, scalars and named tuples of them; divisions follow IEEE rules and do not raise.
+    Numba is imported at the first call, because the import takes a second.
     """
     return cast(Function, Kernel(function, {}))
 
@@ -157,9 +157,9 @@ class Kernel:
         used = ((name, value.digest if isinstance(value, Kernel) else value) for name, value in self._globals.items())
         values = sorted((name, repr(value)) for name, value in used if not (callable(value) or ismodule(value)))
         built = _FASTMATH, _OPTIONS, _CALLED
-        # The module, because cached code imports its modules by name.
-        # Fields of tuples are found by their place.
+        # Machine code finds the fields of tuples by their place.
         fields = [named._fields for named in self.function.__annotations__.values() if hasattr(named, "_fields")]
+        # The module, because cached code imports its modules by name.
         made_of = self.function.__module__, _readable(self.function), values, built, *fields
         return hashlib.sha256(repr(made_of).encode()).hexdigest()[:12]
 

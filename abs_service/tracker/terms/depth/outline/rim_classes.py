@@ -73,28 +73,27 @@ def classify_rim(
         distance: measured radial distances (height, width) [m], NaN without return.
     """
     outer, inner = (surface.vertices[0].T[which].astype(np.float64) for which in (rim.outer, rim.inner))
-    # Extrapolated to the end of the surface, which lies about as far outside the outer vertex as the inner one inside.
-    end_cosine = 2 * _cosine(camera, surface, rim.outer) - _cosine(camera, surface, rim.inner)
-    place = camera.project(outer)
-    per_step = -np.einsum("ki,ki->k", gradients, place - camera.project(inner))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        beyond = np.where(per_step > 0, inside / per_step, np.inf)
-    classes = np.full(len(beyond), RimClass.FREE, np.uint8)
-    gap = np.where(beyond <= LARGEST_GAP_STEPS, np.maximum(beyond, 0.0), 0.0)
-    step = outer - inner
-    hidden, unseen = _unseen(camera, [outer + by * step for by in _HIDING_STEPS], inside_at)
+    place, step = camera.project(outer), outer - inner
+    beyond = _steps_to_outline(inside, gradients, place - camera.project(inner))
+    ends_near = beyond <= LARGEST_GAP_STEPS
+    gap = np.where(ends_near, np.maximum(beyond, 0.0), 0.0)
     ends = outer + gap[:, None] * step
     # If the mesh ends far inside the object, or the outline bends, it is nearest elsewhere than where the edge points.
-    missed = np.abs(inside_at(ends)) > LARGEST_MISS_PX
-    goes_on = ~(beyond <= LARGEST_GAP_STEPS) | (missed & (gap > 0))
+    ends_elsewhere = (np.abs(inside_at(ends)) > LARGEST_MISS_PX) & (gap > 0)
+    goes_on = ~ends_near | ends_elsewhere
     far = ~goes_on & (inside > LARGEST_MISS_PX) & (not rim.is_end)
     goes_on[far] = _leaves(camera, (outer + _ALMOST * gap[:, None] * step)[far], distance)
-    classes[goes_on] = np.where(hidden, unseen, RimClass.CONTACT)[goes_on]
-    classes[end_cosine < MIN_COSINE] = RimClass.SILHOUETTE
-    classes = np.where(inside > camera.width + camera.height, unseen, classes).astype(np.uint8)
-    classes[~_is_within(camera, place, BORDER_PX)] = RimClass.BORDER
-    if not rim.is_end:
-        classes[(classes == RimClass.FREE) & _ends_at_border(camera.project(ends), distance)] = RimClass.BORDER
+    hidden, unseen = _unseen(camera, [outer + by * step for by in _HIDING_STEPS], inside_at)
+    # Extrapolated to the end of the surface, which lies about as far outside the outer vertex as the inner one inside.
+    turns_away = 2 * _cosine(camera, surface, rim.outer) - _cosine(camera, surface, rim.inner) < MIN_COSINE
+    unknown = inside > camera.width + camera.height
+    at_border = ~_is_within(camera, place, BORDER_PX)
+    cut = _ends_at_border(camera.project(ends), distance) & (not rim.is_end)
+    classes = np.select(  # the first that holds
+        [at_border, unknown, turns_away, goes_on & hidden, goes_on, cut],
+        [RimClass.BORDER, unseen, RimClass.SILHOUETTE, unseen, RimClass.CONTACT, RimClass.BORDER],
+        RimClass.FREE,
+    ).astype(np.uint8)
     free = classes == RimClass.FREE
     if _bulges(camera, surface, rim.outer[free], -gradients[free]):
         classes[free] = RimClass.SILHOUETTE
@@ -103,6 +102,15 @@ def classify_rim(
         classes[free] = RimClass.CONTACT
     gap[(classes != RimClass.FREE) | rim.is_end] = 0.0
     return classes, gap.astype(np.float32)
+
+
+def _steps_to_outline(
+    inside: NDArray[np.float64], gradients: NDArray[np.float64], step_px: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Number of steps (k, 2) [px] outwards that lead to the outline (k,), see `classify_rim`; ∞ for one inwards."""
+    per_step = -np.einsum("ki,ki->k", gradients, step_px)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(per_step > 0, inside / per_step, np.inf)
 
 
 def _unseen(
