@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from abs_service import config, wiring
 from abs_service.pairing.images import DepthImage
-from abs_service.tracker.estimate import Estimate, Status
+from abs_service.tracker.estimates.estimate import Estimate, Status
 from abs_service.tracker.models import nurbs
 from abs_service.tracker.models.base import DeformationModel
 from abs_service.tracker.objectives import euclidean, likelihood

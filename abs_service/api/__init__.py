@@ -8,7 +8,7 @@ from abs_service.api.recording import Image, Recording, open_recording
 from abs_service.api.rig import Rig, load_rig
 from abs_service.api.tracker import Tracker
 from abs_service.config import ConfigError
-from abs_service.tracker.estimate import Status
+from abs_service.tracker.estimates.estimate import Status
 from calib.camera import Camera, CameraError
 from calib.lenses.fisheye import KannalaBrandt as Fisheye
 from calib.lenses.lens import Lens, LensError

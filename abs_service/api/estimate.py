@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker import estimate as tracker_estimate
-from abs_service.tracker.estimate import Status
+from abs_service.tracker.estimates import estimate as tracker_estimate
+from abs_service.tracker.estimates.estimate import Status
 from abs_service.tracker.mesh import Mesh
 
 

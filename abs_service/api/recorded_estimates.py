@@ -11,7 +11,7 @@ from google.protobuf.message import DecodeError
 from numpy.typing import NDArray
 
 from abs_service.api.estimate import Estimate
-from abs_service.tracker.estimate import Status
+from abs_service.tracker.estimates.estimate import Status
 from drivers.replay.contents import Contents, RecordingError
 from drivers.replay.messages import messages
 

@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.pairing.observation import Observation
-from abs_service.tracker import status
-from abs_service.tracker.estimate import Estimate, SearchReport, Status
+from abs_service.tracker.estimates import status
+from abs_service.tracker.estimates.estimate import Estimate, SearchReport, Status
+from abs_service.tracker.estimates.shape_quality import ShapeComparison
 from abs_service.tracker.optimizers.base import Budget, Optimizer, Outcome, Search
 from abs_service.tracker.posterior.covariance.observability import single_frame_deviation
 from abs_service.tracker.posterior.covariance.theta_covariance import ThetaCovariance
@@ -23,7 +24,6 @@ from abs_service.tracker.posterior.frame_posterior import FramePosterior
 from abs_service.tracker.posterior.posterior import Posterior
 from abs_service.tracker.posterior.relocation import fit_to_points
 from abs_service.tracker.posterior.search_start import search_start
-from abs_service.tracker.shape_quality import ShapeComparison
 from abs_service.tracker.terms.patches import patches_of
 
 #: Frames after a start that are searched from scratch: in the first, nothing is known, and in the second, not how fast

@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from abs_service.pairing.observation import Observation
-from abs_service.tracker import resolution, status
+from abs_service.tracker import resolution
 from abs_service.tracker.appearance import with_appearance
 from abs_service.tracker.detection.initial_detection import InitialDetection
 from abs_service.tracker.detection.plausibility import ExtentError, warnings
@@ -15,6 +15,7 @@ from abs_service.tracker.detection.regions.base import Region
 from abs_service.tracker.detection.templates import base as templates
 from abs_service.tracker.detection.templates import first_image
 from abs_service.tracker.detection.templates.base import ALL_SEEN, Sight, Template
+from abs_service.tracker.estimates import status
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import DeformationModel, HasDerived, ModelError
 from abs_service.tracker.objectives.base import Objective

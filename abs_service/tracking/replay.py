@@ -8,7 +8,7 @@ from typing import Any
 from abs_service.bus import keys
 from abs_service.bus.stamps import HeaderFactory
 from abs_service.pairing.synchroniser import Synchroniser
-from abs_service.tracker.estimate import Estimate
+from abs_service.tracker.estimates.estimate import Estimate
 from abs_service.tracking.log.tracker_log import EstimateReport, TrackerLog
 from abs_service.tracking.session import TrackingSession
 from abs_service.tracking.tracked_sets import track_sets

@@ -16,7 +16,7 @@ from abs_service.tracker.detection.initial_detection import DetectionError, Init
 from abs_service.tracker.detection.plausibility import ExtentError, doubts
 from abs_service.tracker.detection.regions.base import Region
 from abs_service.tracker.detection.segmentation import detect_object
-from abs_service.tracker.estimate import Estimate, Status, initializing
+from abs_service.tracker.estimates.estimate import Estimate, Status, initializing
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import DeformationModel, ModelError
 from abs_service.tracker.tracker import Tracker

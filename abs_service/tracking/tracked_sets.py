@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from typing import NamedTuple
 
-from abs_service.tracker.estimate import Estimate
+from abs_service.tracker.estimates.estimate import Estimate
 from abs_service.tracking.session import TrackingSession
 from drivers.contract.frame import FrameSet
 

@@ -11,7 +11,7 @@ from absmsg.v1.sensor_model_pb2 import NumberList
 from numpy.typing import NDArray
 
 from abs_service.pairing.observation import Source
-from abs_service.tracker.estimate import Estimate, Status
+from abs_service.tracker.estimates.estimate import Estimate, Status
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import DeformationModel, HasVertexBasis
 from abs_service.tracker.optimizers.base import Stop

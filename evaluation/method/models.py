@@ -25,7 +25,7 @@ from abs_service.tracker.optimizers import cma, hybrid
 from abs_service.tracking.plan import ModelSettings, ObjectiveSettings, OptimizerSettings
 from evaluation.experiment import Context, Findings, Goal, at_least, at_most
 from evaluation.sequences import SMALL, demo_plan, demo_rig, expose, simulate, track
-from evaluation.statistics.paired import upper_end
+from evaluation.statistics import upper_end
 
 TITLE = "Deformation models on the demo's sheet, strip and board"
 

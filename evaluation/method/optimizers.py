@@ -18,7 +18,7 @@ from functools import partial
 import numpy as np
 
 from abs_service.report.content import Cell, Column, Section, Table
-from abs_service.tracker.estimate import Estimate
+from abs_service.tracker.estimates.estimate import Estimate
 from abs_service.tracker.optimizers import cma, cma_es, hybrid
 from abs_service.tracking.log.truth import Errors
 from abs_service.tracking.plan import OptimizerSettings

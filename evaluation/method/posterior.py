@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 
 from abs_service.report.content import Column, Section, Table
-from abs_service.tracker.estimate import Estimate
+from abs_service.tracker.estimates.estimate import Estimate
 from abs_service.tracker.models.base import DeformationModel, SparseJacobian
 from abs_service.tracker.posterior.covariance.vertex_covariance import propagated
 from abs_service.tracker.posterior.priors.change_metric import ChangeMetric
@@ -29,7 +29,7 @@ from abs_service.tracker.terms.linearization import stack
 from calib.noise.images.color import GaussianColor
 from evaluation.experiment import Context, Findings, at_least, at_most
 from evaluation.sequences import demo_plan, demo_rig, expose, simulate, track, with_noise
-from evaluation.statistics.coverage import inside_region
+from evaluation.statistics import inside_region
 
 #: Standard deviation of a colour in the default rig [levels of 256].
 DEMO_SIGMA = 4.0

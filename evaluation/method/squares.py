@@ -38,7 +38,7 @@ from evaluation.sequences import (
     track,
     with_noise,
 )
-from evaluation.statistics.paired import upper_end
+from evaluation.statistics import upper_end
 
 TITLE = "Likelihood against squares with default weights on the demo's sheet, and what explains the difference"
 

@@ -47,7 +47,7 @@ from evaluation.scenes.bent_sheet import CAMERA, SheetFrame, render_frames
 from evaluation.scenes.rubber import SIGMA as RUBBER_SIGMA
 from evaluation.scenes.rubber import STRAINS, printed_frames
 from evaluation.sequences import TrackedSequence, demo_plan, demo_rig, expose, simulate, track
-from evaluation.statistics.coverage import inside_region
+from evaluation.statistics import inside_region
 
 TITLE = "Trust: sheets that slide along themselves, and coverage over time"
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from abs_service import config, wiring
 from abs_service.pairing.synchroniser import Synchroniser
-from abs_service.tracker.estimate import Estimate
+from abs_service.tracker.estimates.estimate import Estimate
 from abs_service.tracking.log.truth import closest_points
 from abs_service.tracking.observer import streams
 from abs_service.tracking.session import TrackingSession

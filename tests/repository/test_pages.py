@@ -7,8 +7,8 @@ from pathlib import Path
 
 import yaml
 
-from abs_service.tracker import status
-from abs_service.tracker.shape_quality import ShapeQuality
+from abs_service.tracker.estimates import status
+from abs_service.tracker.estimates.shape_quality import ShapeQuality
 from abs_service.tracker.terms.sensor_fit import Remainder, RimFit, SensorFit
 from abs_service.tracker.terms.vertex_counts import VertexCounts
 

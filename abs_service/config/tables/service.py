@@ -125,7 +125,7 @@ class TrackerTable(Table):
     objective: Annotated[Any, Plugin("abs_service.tracker.objectives")] = Field(default={"type": "likelihood"})
     priors: Annotated[Any, SettingsOf("abs_service.tracker.posterior.priors.settings")] = Field(default={})
     vertex_offsets: Annotated[Any, SettingsOf("abs_service.tracking.offsets.vertex_offsets")] = Field(default={})
-    status: Annotated[Any, SettingsOf("abs_service.tracker.status")] = Field(default={})
+    status: Annotated[Any, SettingsOf("abs_service.tracker.estimates.status")] = Field(default={})
     reinitialization: Annotated[Any, SettingsOf("abs_service.tracking.monitors.loss_monitor")] = Field(default={})
     optimizer: Annotated[Any, Plugin("abs_service.tracker.optimizers")] = Field(default={"type": "hybrid"})
     budget_ms: Milliseconds = 24.0

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from abs_service.pairing.synchroniser import Synchroniser
 from abs_service.tracker.detection.segmentation import detect_object
 from abs_service.tracker.detection.strip.elastica import heavy_elastica
-from abs_service.tracker.estimate import Estimate, Status
+from abs_service.tracker.estimates.estimate import Estimate, Status
 from abs_service.tracker.models.gravity import Gravity
 from abs_service.tracking.bending_stiffness.stiffness import (
     InclinationProfile,

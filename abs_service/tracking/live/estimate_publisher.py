@@ -11,7 +11,7 @@ from abs_service.bus import keys
 from abs_service.bus.clock_offsets import Offset
 from abs_service.bus.contract import IMAGES, MESH, STATE, Bus
 from abs_service.bus.stamps import HeaderFactory
-from abs_service.tracker.estimate import Estimate
+from abs_service.tracker.estimates.estimate import Estimate
 from abs_service.tracker.models.base import DeformationModel, HasVertexBasis
 from abs_service.tracking.session import TrackingSession
 from abs_service.wire import estimate_messages

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from abs_service.bus.clock_offsets import Offset
 from abs_service.bus.health import Health, Level
 from abs_service.pairing.frame_set_queue import FrameSetQueue
-from abs_service.tracker.estimate import Estimate, Status
+from abs_service.tracker.estimates.estimate import Estimate, Status
 from abs_service.tracking.monitors.noise_monitor import NoiseMonitor
 from abs_service.tracking.monitors.silence_monitor import SilenceMonitor
 

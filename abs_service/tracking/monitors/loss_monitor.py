@@ -7,9 +7,9 @@ import numpy as np
 from annotated_types import Ge, Gt
 from numpy.typing import NDArray
 
-from abs_service.tracker import status
 from abs_service.tracker.detection.initial_detection import DetectionError
-from abs_service.tracker.estimate import Estimate, Status
+from abs_service.tracker.estimates import status
+from abs_service.tracker.estimates.estimate import Estimate, Status
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracking.monitors.common_colors import common_share
 

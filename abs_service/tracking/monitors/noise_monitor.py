@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from abs_service.bus.health import Health, Level
-from abs_service.tracker.estimate import Estimate
+from abs_service.tracker.estimates.estimate import Estimate
 
 #: Time over which residuals are averaged [ns]; at 30 Hz and 300 vertices, their variance is then known to 2 %.
 WINDOW_NS = 1_000_000_000

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 import abs_service as a
 from evaluation.inputs.recordings import features
 from evaluation.inputs.recordings.binding import Binding, Points, bind
-from evaluation.statistics.coverage import inside_region
+from evaluation.statistics import inside_region
 
 FOLDER = "sl_kinect_paper"
 

@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 
 from abs_service.pairing.images import DepthImage
 from abs_service.pairing.observation import Observation, Source
-from abs_service.tracker import status
 from abs_service.tracker.detection.grid_mesh import triangles
 from abs_service.tracker.detection.initial_detection import InitialDetection
 from abs_service.tracker.detection.regions import nearest
 from abs_service.tracker.detection.shapes.sheet_mesh import Sheet
-from abs_service.tracker.estimate import Estimate
+from abs_service.tracker.estimates import status
+from abs_service.tracker.estimates.estimate import Estimate
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models import flexpad, nurbs
 from abs_service.tracker.models.base import DeformationModel

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker import status
 from abs_service.tracker.detection.regions import nearest
-from abs_service.tracker.estimate import Status
+from abs_service.tracker.estimates import status
+from abs_service.tracker.estimates.estimate import Status
 from abs_service.tracker.objectives import euclidean
 from abs_service.tracker.optimizers import cma_es, hybrid
 from abs_service.tracker.posterior.priors import settings as priors

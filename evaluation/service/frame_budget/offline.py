@@ -15,7 +15,7 @@ from abs_service.bus import keys
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.commands.parts import recorded_rig
 from abs_service.commands.recordings import replay
-from abs_service.tracker.estimate import Estimate, Status
+from abs_service.tracker.estimates.estimate import Estimate, Status
 from abs_service.tracking.session import TrackingSession
 from abs_service.wire import estimate_messages
 from abs_service.wire.estimate_messages import Effort, Identity

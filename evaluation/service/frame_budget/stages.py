@@ -1,13 +1,13 @@
 """Stages of a frame, and the functions at which they begin."""
 
 from abs_service.pairing.synchroniser import Synchroniser
-from abs_service.tracker import status
+from abs_service.tracker.estimates import status
+from abs_service.tracker.estimates.shape_quality import ShapeComparison
 from abs_service.tracker.objectives.base import TermSum
 from abs_service.tracker.posterior.covariance.theta_covariance import ThetaCovariance
 from abs_service.tracker.posterior.covariance.vertex_covariance import VertexCovariance
 from abs_service.tracker.posterior.frame_posterior import FramePosterior
 from abs_service.tracker.posterior.posterior import Posterior
-from abs_service.tracker.shape_quality import ShapeComparison
 from abs_service.tracker.synthesis.sparse import Sparse, SparseView
 from abs_service.tracker.terms.depth import texels
 from abs_service.tracker.terms.depth.classification.classifier import Classifier

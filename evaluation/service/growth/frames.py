@@ -10,7 +10,7 @@ from functools import partial
 
 import numpy as np
 
-from abs_service.tracker.estimate import Status
+from abs_service.tracker.estimates.estimate import Status
 from abs_service.tracker.models import nurbs
 from abs_service.tracker.optimizers import cma_es
 from abs_service.tracking.plan import Plan

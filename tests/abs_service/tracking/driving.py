@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from abs_service import config, wiring
-from abs_service.tracker.estimate import Estimate, Status
+from abs_service.tracker.estimates.estimate import Estimate, Status
 from abs_service.tracker.models.base import DeformationModel
 from abs_service.tracker.optimizers import cma_es
 from abs_service.tracker.posterior.posterior import Posterior

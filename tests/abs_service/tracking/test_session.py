@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from abs_service.tracker.estimate import Status
+from abs_service.tracker.estimates.estimate import Status
 from abs_service.tracker.models import rigid
 from abs_service.tracker.objectives import euclidean
 from abs_service.tracker.optimizers import cma, cma_es, hybrid

@@ -7,10 +7,10 @@ import pytest
 from absmsg.v1.common_pb2 import Header
 
 from abs_service.pairing.observation import Source
-from abs_service.tracker.estimate import Estimate, SearchReport, Status
+from abs_service.tracker.estimates.estimate import Estimate, SearchReport, Status
+from abs_service.tracker.estimates.shape_quality import ShapeQuality
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.optimizers.base import Stop
-from abs_service.tracker.shape_quality import ShapeQuality
 from abs_service.tracker.terms.sensor_fit import Remainder, RimFit, SensorFit
 from abs_service.tracker.terms.vertex_counts import VertexCounts
 from abs_service.wire import estimate_messages

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from evaluation.statistics.paired import upper_end
+from evaluation.statistics import upper_end
 
 
 def test_the_upper_end_is_above_the_mean_by_the_half_width_of_student():

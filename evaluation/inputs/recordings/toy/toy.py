@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service import config, wiring
-from abs_service.tracker.estimate import Estimate, Status
+from abs_service.tracker.estimates.estimate import Estimate, Status
 from abs_service.tracking.session import TrackingSession
 from abs_service.tracking.warmup.board import warm_up
 from calib.camera import Camera

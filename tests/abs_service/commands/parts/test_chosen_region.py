@@ -8,7 +8,7 @@ import pytest
 from abs_service import config
 from abs_service.commands.parts import chosen_region
 from abs_service.tracker.detection.regions import above_plane, box, distance, mask, nearest, seed
-from abs_service.tracker.estimate import Status
+from abs_service.tracker.estimates.estimate import Status
 from abs_service.tracking.session import TrackingSession
 from abs_service.wire.commands import AS_CONFIGURED, Choice, RefusedError
 from abs_service.wire.commands import box as corners_of

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from abs_service.tracker.estimate import Status
+from abs_service.tracker.estimates.estimate import Status
 from abs_service.tracker.models.flexpad import FlexPad, Settings
 from abs_service.tracker.objectives import euclidean
 from abs_service.tracking.observer import Observer

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection
 from abs_service.tracker.detection.segmentation import detect_object
 from abs_service.tracker.detection.strip.strip_detection import Strip, find_strip
-from abs_service.tracker.estimate import Status
+from abs_service.tracker.estimates.estimate import Status
 from abs_service.tracker.models import gravity, posed
 from abs_service.tracker.models.gravity import Gravity
 from abs_service.tracking.observer import Observer

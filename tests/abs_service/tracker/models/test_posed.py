@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from abs_service import config, wiring
 from abs_service.tracker.detection.shapes.sheet_mesh import Sheet
-from abs_service.tracker.estimate import Status
+from abs_service.tracker.estimates.estimate import Status
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models import nurbs, posed
 from abs_service.tracker.models.base import SparseJacobian, Surface

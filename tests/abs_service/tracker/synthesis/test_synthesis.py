@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from abs_service.pairing.images import BAYER_ORDERS, ChannelImage, ColorImage
-from abs_service.tracker.estimate import Status
+from abs_service.tracker.estimates.estimate import Status
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.synthesis import dense, sparse, undistorted, warped

@@ -2,7 +2,7 @@
 
 import pytest
 
-from abs_service.tracker.estimate import Status
+from abs_service.tracker.estimates.estimate import Status
 from abs_service.tracker.models import flexpad, nurbs, posed, rigid
 from abs_service.tracking.session import TrackingSession
 from tests.abs_service.tracking.driving import default_plan, drive, mean_errors, rig_of, simulate

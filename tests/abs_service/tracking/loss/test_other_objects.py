@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from abs_service.tracker.detection.regions import nearest, seed
-from abs_service.tracker.estimate import Status
+from abs_service.tracker.estimates.estimate import Status
 from abs_service.tracker.optimizers import cma
 from abs_service.tracking.monitors import loss_monitor
 from abs_service.tracking.session import TrackingSession

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from abs_service.tracker.detection.initial_detection import DetectionError
-from abs_service.tracker.estimate import Estimate, Status
+from abs_service.tracker.estimates.estimate import Estimate, Status
+from abs_service.tracker.estimates.status import Settings as Limits
 from abs_service.tracker.mesh import Mesh
-from abs_service.tracker.status import Settings as Limits
 from abs_service.tracker.terms.sensor_fit import RimFit, SensorFit
 from abs_service.tracking.monitors.loss_monitor import LossMonitor, Settings
 from abs_service.tracking.session import TrackingSession

@@ -6,7 +6,7 @@ import numpy as np
 
 from abs_service.tracker.detection.initial_detection import DetectionError
 from abs_service.tracker.detection.regions import nearest
-from abs_service.tracker.estimate import Status
+from abs_service.tracker.estimates.estimate import Status
 from abs_service.tracker.optimizers import cma
 from abs_service.tracking.session import TrackingSession
 from tests.abs_service.tracking.driving import default_plan, drive, rig_of, simulate

@@ -2,7 +2,7 @@
 
 import dataclasses
 
-from abs_service.tracker.estimate import Status
+from abs_service.tracker.estimates.estimate import Status
 from abs_service.tracking.session import TrackingSession
 from drivers.contract.frame import Frame, Kind
 from tests.abs_service.tracking.driving import default_plan, drive, mean_errors, rig_of, simulate

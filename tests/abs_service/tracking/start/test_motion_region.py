@@ -1,7 +1,7 @@
 """A session with a region that needs several images: it waits for them, also when it is asked to look again."""
 
 from abs_service.tracker.detection.regions import seed
-from abs_service.tracker.estimate import Status
+from abs_service.tracker.estimates.estimate import Status
 from abs_service.tracker.optimizers import cma
 from abs_service.tracking.session import TrackingSession
 from tests.abs_service.tracking.driving import default_plan, drive, rig_of, simulate

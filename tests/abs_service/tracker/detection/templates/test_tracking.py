@@ -7,7 +7,7 @@ from trimesh.visual import ColorVisuals
 
 import abs_service as a
 from calib import pose
-from evaluation.statistics.coverage import inside_region
+from evaluation.statistics import inside_region
 from tests.abs_service.tracker.detection.templates.scenes import CAMERA, NOISE, SIGMA_M, Box, Ellipsoid, Scene, print_of
 
 SEEDS = (1, 2, 3)

@@ -8,7 +8,7 @@ from abs_service.tracker.posterior.covariance.first_frame_slide import FirstFram
 from calib import pose
 from evaluation.method.trust import SCENES
 from evaluation.sequences import demo_plan, demo_rig, expose, simulate, track
-from evaluation.statistics.coverage import inside_region
+from evaluation.statistics import inside_region
 
 #: A fan of triangles that faces the camera.
 POINTS = np.array([[0, 0, 1], [0.1, 0, 1], [0.05, 0.1, 1], [-0.05, 0.1, 1], [-0.1, 0, 1]], np.float64)

@@ -12,7 +12,7 @@ from abs_service.tracker.posterior.covariance.parallax import FittedParallax
 from calib import pose
 from evaluation.method.trust import SCENES
 from evaluation.sequences import demo_plan, demo_rig, expose, simulate, track
-from evaluation.statistics.coverage import inside_region
+from evaluation.statistics import inside_region
 
 #: A square of 0.2 m, 1 m before a camera in the origin.
 GRID = np.stack([*np.meshgrid(np.linspace(-0.1, 0.1, 5), np.linspace(-0.1, 0.1, 5)), np.ones((5, 5))], axis=-1)

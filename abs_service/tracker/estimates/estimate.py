@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.pairing.observation import Observation, Source
+from abs_service.tracker.estimates.shape_quality import ShapeQuality
 from abs_service.tracker.optimizers.base import Budget, Outcome, Stop
-from abs_service.tracker.shape_quality import ShapeQuality
 from abs_service.tracker.terms.agreement import inlier_share
 from abs_service.tracker.terms.sensor_fit import SensorFit
 

@@ -7,8 +7,8 @@ from typing import Annotated
 import numpy as np
 from annotated_types import Gt, Interval
 
-from abs_service.tracker.estimate import Status
-from abs_service.tracker.shape_quality import ShapeQuality
+from abs_service.tracker.estimates.estimate import Status
+from abs_service.tracker.estimates.shape_quality import ShapeQuality
 from abs_service.tracker.terms.agreement import (
     MIN_JUDGED,
     distances_share,

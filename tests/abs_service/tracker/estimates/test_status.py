@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import pytest
 
-from abs_service.tracker.estimate import Status
-from abs_service.tracker.shape_quality import ShapeQuality
-from abs_service.tracker.status import Settings, judge
+from abs_service.tracker.estimates.estimate import Status
+from abs_service.tracker.estimates.shape_quality import ShapeQuality
+from abs_service.tracker.estimates.status import Settings, judge
 from abs_service.tracker.terms.sensor_fit import Remainder, RimFit, SensorFit
 from abs_service.tracker.terms.vertex_counts import VertexCounts
 

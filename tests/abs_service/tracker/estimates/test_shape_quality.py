@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from abs_service.tracker.estimates.shape_quality import FOLDED_COSINE, ShapeComparison, percentile
 from abs_service.tracker.mesh import area_vectors, edge_lengths
-from abs_service.tracker.shape_quality import FOLDED_COSINE, ShapeComparison, percentile
 from tests.abs_service.tracker.scenes import flat, sheet
 
 MESH = sheet(9, 13, flat)

@@ -1,0 +1,1 @@
+"""The estimate of one frame, and what its status is judged by."""
