@@ -2,11 +2,10 @@
 
 from dataclasses import replace
 
-from tests.abs_service.tracker.test_status import SETTINGS, SHAPE, depth, facts, fit
-
 from abs_service.tracker.estimates.estimate import Status
 from abs_service.tracker.estimates.status import judge
 from abs_service.tracker.terms.vertex_counts import VertexCounts
+from tests.abs_service.tracker.estimates.test_status import SETTINGS, SHAPE, depth, facts, fit
 
 
 def test_a_mesh_is_lost_if_no_distance_agrees_where_the_image_shows_the_rest_of_it():

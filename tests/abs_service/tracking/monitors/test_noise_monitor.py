@@ -36,9 +36,10 @@ class MonitorBench:
 
     def see_sensors(self, variances, seconds=2.0, share=0.9, inliers=250):
         """The same for sensors whose names are not Python's."""
-        fits = tuple(SensorFit(name, 300, 0, 300, inliers, 1.0, float(np.sqrt(v))) for name, v in variances.items())
+        visible = round(inliers / share)
+        fits = tuple(SensorFit(name, visible, 0, 300, inliers, 1.0, float(np.sqrt(v))) for name, v in variances.items())
         for _ in range(int(seconds * 1e9 / PERIOD_NS)):
-            self.monitor.add(dataclasses.replace(ESTIMATE, t_host_ns=self.t_ns, inlier_share=share, fits=fits))
+            self.monitor.add(dataclasses.replace(ESTIMATE, t_host_ns=self.t_ns, fits=fits))
             self.t_ns += PERIOD_NS
         return self.said
 
