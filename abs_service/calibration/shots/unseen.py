@@ -51,6 +51,11 @@ def _advice(errors_: Collection[Exception]) -> str:
     return said[0].upper() + said[1:]
 
 
+def looked_at(shown: Sequence[Shot], shot: Shot) -> list[Shot]:
+    """The first and the last two of all shots, from those before and the next one: enough to see another board."""
+    return [*shown[:1], *shown[1:][-1:], shot]
+
+
 def instead(target: Target, shown: Sequence[Shot]) -> str:
     """Clause on what shots show in place of the described board, and what to do; "" if that is not clear."""
     said = _instead(target, shown)

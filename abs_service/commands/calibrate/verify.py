@@ -129,7 +129,7 @@ def _see_all(
     seen, shown, progress = BoardObservations(), list[Shot](), ""
     kept = skipping.kept(shots, arguments.skip, arguments.source)
     for number, shot in enumerate(image_sizes.checked_for(kept, cameras, arguments.calibration), start=1):
-        shown = [*shown[:1], *shown[1:][-1:], shot]
+        shown = unseen.looked_at(shown, shot)
         seen += see(target, _of(cameras, shot), cameras)
         progress = f"{number} shots, {len(seen.corners)} images show the board"
         if sys.stderr.isatty():

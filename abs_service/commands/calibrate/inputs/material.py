@@ -66,7 +66,7 @@ def material(arguments: argparse.Namespace) -> Material:
         is_live = live.is_live(arguments.source)
         seen, shown = BoardObservations(), list[Shot]()
         for shot in image_sizes.checked(skipping.kept(shots, arguments.skip, arguments.source)):
-            shown = [*shown[:1], *shown[1:][-1:], shot]
+            shown = unseen.looked_at(shown, shot)
             new = corner_extraction.see(target, shot, cameras)
             if is_live and not live.adds(new, seen):
                 continue

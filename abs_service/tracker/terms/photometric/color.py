@@ -14,7 +14,7 @@ from abs_service.tracker.terms.gradients import noiseless_color_rows
 from abs_service.tracker.terms.linearization import Part, PointLinearization
 from abs_service.tracker.terms.patches import Patches
 from abs_service.tracker.terms.photometric.illumination import Exposed
-from abs_service.tracker.terms.photometric.matching import matched
+from abs_service.tracker.terms.photometric.matching import Measured, costs_of, matched
 from abs_service.tracker.terms.photometric.registration_bias import RegistrationBias
 from abs_service.tracker.terms.photometric.shadow import Shadow
 from abs_service.tracker.terms.photometric.texture_registration_noise import (
@@ -151,7 +151,7 @@ class ObservedColor:
         return self.view.balance(out, surface, self.bounds.unseen)
 
     @property
-    def _measured(self) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], float, float]:
+    def _measured(self) -> Measured:
         return self.texture, self.inverse, self.normalizer, self.bounds.outlier, self.bounds.unseen
 
     def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> list[Part]:
@@ -179,16 +179,7 @@ class ObservedColor:
 
     def match(self, surface: Surface, sparse_jacobian: SparseJacobian, patches: Patches) -> PointLinearization:
         """See `ObservedTerm`."""
-        seen = self._synthesize(surface)
-
-        def costs(
-            pixel: NDArray[np.int32], attributes: NDArray[np.float32], samples: NDArray[np.intp]
-        ) -> NDArray[np.float64]:
-            texture, inverse, normalizer, outlier, uniform = self._measured
-            out, own = np.empty(len(pixel)), samples % len(inverse)  # one may stand for all
-            _color_cost(pixel, attributes, texture, inverse[own], normalizer[own], outlier, uniform, out)
-            return out
-
+        seen, costs = self._synthesize(surface), costs_of(_color_cost, self._measured)
         return matched(self.view, surface, sparse_jacobian, seen, patches, self.image.shape, costs)
 
     def misfit(self, surface: Surface) -> NDArray[np.float64]:

@@ -33,10 +33,27 @@ SIGMA_PX = 0.5
 #: which samples these are (k,). An infinite attribute costs as much as an inlier on average.
 Costs = Callable[[NDArray[np.int32], NDArray[np.float32], NDArray[np.intp]], NDArray[np.float64]]
 
+#: Texture, two arrays of noise with a row for each sample or one for all, and the costs of outliers and of the unseen.
+Measured = tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], float, float]
+
 _STEPS = np.arange(-REACH_PX, REACH_PX + 1, dtype=np.int32)
 #: All shifts (s, 2), right and down [px], and the index of the one by nothing.
 _SHIFTS = np.stack([part.ravel() for part in np.meshgrid(_STEPS, _STEPS)], axis=1)
 _STILL = len(_SHIFTS) // 2
+
+
+def costs_of(kernel: Callable[..., None], measured: Measured) -> Costs:
+    """Costs by a kernel of (pixel, attributes, *measured, result) that sums over as many samples as it is given."""
+    texture, scale, normalizer, outlier, unseen = measured
+
+    def costs(
+        pixel: NDArray[np.int32], attributes: NDArray[np.float32], samples: NDArray[np.intp]
+    ) -> NDArray[np.float64]:
+        out, own = np.empty(len(pixel)), samples % len(scale)
+        kernel(pixel, attributes, texture, scale[own], normalizer[own], outlier, unseen, out)
+        return out
+
+    return costs
 
 
 def matched(

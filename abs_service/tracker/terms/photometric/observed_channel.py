@@ -17,7 +17,7 @@ from abs_service.tracker.terms.linearization import Part, PointLinearization
 from abs_service.tracker.terms.patches import Patches
 from abs_service.tracker.terms.photometric.channel_cost import CHANNEL, INVERSE, NORMALIZER, VALUE, channel_cost
 from abs_service.tracker.terms.photometric.illumination import Illumination
-from abs_service.tracker.terms.photometric.matching import matched
+from abs_service.tracker.terms.photometric.matching import Measured, costs_of, matched
 from abs_service.tracker.terms.photometric.registration_bias import RegistrationBias
 from abs_service.tracker.terms.photometric.shadow import Shadow
 from abs_service.tracker.terms.photometric.texture_registration_noise import Widening
@@ -89,7 +89,7 @@ class ObservedChannel:
         return self.illumination.shine(self.view.synthesize(surface), surface, self.view)
 
     @property
-    def _measured(self) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], float, float]:
+    def _measured(self) -> Measured:
         widening, bounds = self.widening, self.bounds
         return self.texture, widening.factor, widening.log, bounds.outlier, bounds.unseen
 
@@ -128,16 +128,7 @@ class ObservedChannel:
 
     def match(self, surface: Surface, sparse_jacobian: SparseJacobian, patches: Patches) -> PointLinearization:
         """See `ObservedTerm`."""
-        seen = self._synthesize(surface)
-
-        def costs(
-            pixel: NDArray[np.int32], attributes: NDArray[np.float32], samples: NDArray[np.intp]
-        ) -> NDArray[np.float64]:
-            texture, factor, log_factor, outlier, uniform = self._measured
-            out, own = np.empty(len(pixel)), samples % len(factor)  # one may stand for all
-            channel_cost(pixel, attributes, texture, factor[own], log_factor[own], outlier, uniform, out)
-            return out
-
+        seen, costs = self._synthesize(surface), costs_of(channel_cost, self._measured)
         return matched(self.view, surface, sparse_jacobian, seen, patches, self.image.shape, costs)
 
     def misfit(self, surface: Surface) -> NDArray[np.float64]:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.pairing.images import Window
+from abs_service.tracker.terms.depth.classification.neighbourhood import grown
 from calib.jit import kernel
 
 #: A connected area of missing returns is background if it shares so many pixels with that of the first image.
@@ -42,9 +43,8 @@ class Background:
         """
         if not self._begun:
             self._begun = True
-            near = cv2.dilate(expected.view(np.uint8), np.ones((2 * MARGIN_PX + 1, 2 * MARGIN_PX + 1)))
             self._empty = np.zeros(shape[:2], np.bool_)
-            self._empty[window] = missing & (near == 0)
+            self._empty[window] = missing & ~grown(expected, MARGIN_PX)
         if not missing.any():
             return missing
         empty = self._empty[window]

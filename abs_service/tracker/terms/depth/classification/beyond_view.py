@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.pairing.images import Window
+from abs_service.tracker.terms.depth.classification.neighbourhood import grown, square
 
 #: A field of view fills at least this share of the image: less may be objects before a background without return.
 MIN_AREA = 0.5
@@ -61,16 +62,16 @@ def beyond(missing: NDArray[np.bool_], expected: NDArray[np.bool_]) -> NDArray[n
     if corners is None:
         return blind
     reach = round(BLIND_SHARE * missing.shape[1])
-    others = cv2.dilate(expected.view(np.uint8), _square(reach)) == 0
+    others = ~grown(expected, reach)
     strays = neighbours < MIN_NEIGHBOURS
     for turn in range(4):  # views: every side of the image becomes the left one
         count = _blind_columns(*(np.rot90(mask, turn) for mask in (returns & ~strays, others)))
         np.rot90(blind, turn)[:, :count] = True
     hull = cv2.fillConvexPoly(np.zeros(missing.shape, np.uint8), cv2.convexHull(corners), 1)
     stripe = max(round(EDGE_SHARE * missing.shape[1]), 1)
-    inner = cv2.erode(hull, _square(stripe), borderValue=1) > 0
+    inner = cv2.erode(hull, square(stripe), borderValue=1) > 0
     edge = (hull > 0) & ~inner
-    there, ours = edge & returns, cv2.dilate(expected.view(np.uint8), _square(NEAR_PX)) > 0
+    there, ours = edge & returns, grown(expected, NEAR_PX)
     length, measured, of_others = (np.count_nonzero(mask) for mask in (edge, there, there & ~ours))
     ends = measured >= MIN_RETURNS * length and of_others >= MIN_OTHERS * length
     return ~inner | blind if ends and np.count_nonzero(hull) >= MIN_AREA * hull.size else blind
@@ -90,7 +91,3 @@ def _blind_columns(returns: NDArray[np.bool_], others: NDArray[np.bool_]) -> int
     line = returns[:, first : first + max(round(EDGE_SHARE * returns.shape[1]), 1)]
     of_others = line & others[:, first : first + line.shape[1]]
     return first if np.mean(line) >= MIN_RETURNS and np.mean(of_others) >= MIN_OTHERS else 0
-
-
-def _square(reach: int) -> NDArray[np.uint8]:
-    return np.ones((2 * reach + 1, 2 * reach + 1), np.uint8)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.pairing.images import Window
+from abs_service.tracker.terms.depth.classification.neighbourhood import grown
 from calib.camera import Camera
 
 #: Cameras measure from 0.1 (RealSense D4xx, PMD), 0.4 (Kinect v1), 0.5 (Kinect v2, Azure Kinect) or 0.6 m (Astra) on.
@@ -32,7 +33,7 @@ class NearestRange:
     """
 
     def __init__(self, camera: Camera) -> None:
-        self._z = camera.rays()[..., 2].astype(np.float32)
+        self._camera = camera
         self._nearest: float | None = None
         self._begun = False
 
@@ -50,8 +51,8 @@ class NearestRange:
         begins, self._begun = not self._begun, True
         if not (begins or self._nearest) or not missing.any():
             return np.zeros(missing.shape, np.bool_)
-        depth = distance * self._z[window]
-        edge = ~missing & (_grown(missing, 1))
+        depth = distance * self._camera.rays()[window][..., 2].astype(np.float32)
+        edge = ~missing & grown(missing, 1)
         if begins:
             self._nearest = _nearest(depth, edge, missing, expected)
         elif np.count_nonzero(depth < (1 - NEARER) * (self._nearest or 0.0)) >= MIN_PIXELS:
@@ -71,7 +72,7 @@ def _nearest(
         edge, missing: pixels beside missing returns, and these.
         expected: silhouette of the object.
     """
-    around = _grown(expected, INSIDE_PX)
+    around = grown(expected, INSIDE_PX)
     measured, at_edge = depth[np.isfinite(depth)], depth[edge & around]
     if len(measured) <= MIN_PIXELS:
         return None
@@ -84,13 +85,8 @@ def _nearest(
     if length < MIN_PIXELS or length < MIN_SHARE * nearly:
         return None
     away = cv2.distanceTransform((~missing).view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
-    inside = depth[(away > INSIDE_PX) & (away < INSIDE_PX + 2) & expected & _grown(line, INSIDE_PX + 3)]
+    inside = depth[(away > INSIDE_PX) & (away < INSIDE_PX + 2) & expected & grown(line, INSIDE_PX + 3)]
     return nearest if inside.size and np.median(inside) > (1 + RISE) * nearest else None
-
-
-def _grown(mask: NDArray[np.bool_], reach: int) -> NDArray[np.bool_]:
-    """Pixels (rows, columns) within so many rows and columns of those of a mask."""
-    return cv2.dilate(mask.view(np.uint8), np.ones((2 * reach + 1, 2 * reach + 1), np.uint8)) > 0
 
 
 def _beside(missing: NDArray[np.bool_], line: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.detection.segments.depth_segments import Surfaces, connected_surfaces
 from abs_service.tracker.terms.depth.classification.background import DEEPEST_M
+from abs_service.tracker.terms.depth.classification.neighbourhood import grown
 from calib.jit import kernel
 
 #: Measurements this near to the predicted distance show the object; it may have moved by as much since [m].
@@ -89,7 +90,7 @@ def classify(
     near = _extended(predicted)
     shown, before, solid, behind, missing = (np.empty(distance.shape, np.bool_) for _ in range(5))
     _compare(distance, near, labels, is_object, agreement, shown, before, solid, behind, missing)
-    foreground = before & (cv2.dilate(solid.view(np.uint8), np.ones((3, 3))) > 0) if solid.any() else nothing
+    foreground = before & grown(solid, 1) if solid.any() else nothing
     hole, past, single = nothing, nothing, missing & dropout & ~beyond
     if missing.any():
         hole, past = _holes(missing & ~(single | beyond), np.isfinite(predicted), near / focal, empty)
