@@ -1,13 +1,11 @@
 """Prints every estimate of a running rig: number, status, age when published and on arrival, and the beginning of Θ.
 
-  python examples/subscribe.py [--endpoint tcp/127.0.0.1:7447] [--topic abs/demo/sheet/state] [--count N]
-
-Needs only zenoh (`pip install eclipse-zenoh`) and the messages in proto/absmsg/v1. The age is taken on the monotonic
-clock, so it is right on the host of the cameras; elsewhere compare `header.stamp` with a synchronised wall clock.
+Needs only zenoh (`pip install eclipse-zenoh`) and the messages in proto/absmsg/v1.
 """
 
 import argparse
 import json
+import os
 import time
 from contextlib import suppress
 from itertools import islice
@@ -21,19 +19,22 @@ parser.add_argument("--topic", default="abs/demo/sheet/state", help="abs/RIG/TRA
 parser.add_argument("--count", type=int, help="end after so many estimates (default: with Ctrl-C)")
 arguments = parser.parse_args()
 
-link = {"shared_memory": {"enabled": False}}  # which zenoh has to lock: more than `ulimit -l` may allow
-settings = {"mode": "client", "connect": {"endpoints": [arguments.endpoint]}, "transport": link}
+settings = {"mode": "client", "connect": {"endpoints": [arguments.endpoint]}}
+settings["transport"] = {"shared_memory": {"enabled": False}}  # zenoh would lock more than `ulimit -l` may allow
 try:
     session = zenoh.open(zenoh.Config.from_json5(json.dumps(settings)))
 except zenoh.ZError as error:
     raise SystemExit(f"nothing answers at {arguments.endpoint}: is abs-service running?") from error
 newest = zenoh.handlers.RingChannel(30)  # a reader slower than the tracker loses the oldest, and is never a second late
-with suppress(KeyboardInterrupt, BrokenPipeError), session:
-    states = session.declare_subscriber(arguments.topic, newest)
-    for sample in islice(states, arguments.count):
-        state = DeformationState.FromString(sample.payload.to_bytes())
-        age_ms = (time.monotonic_ns() - state.header.t_host_ns) * 1e-6
-        status = DeformationState.Status.Name(state.status).removeprefix("STATUS_")
-        theta = " ".join(f"{value:+.3f}" for value in state.theta[:6])
-        ages = f"published {state.age_ms:5.1f} ms, here {age_ms:5.1f} ms"
-        print(f"{state.header.seq:6d} {status:12} {ages}  Θ[{len(state.theta)}] = {theta} …", flush=True)
+try:
+    with suppress(KeyboardInterrupt), session:
+        states = session.declare_subscriber(arguments.topic, newest)
+        for sample in islice(states, arguments.count):
+            state = DeformationState.FromString(sample.payload.to_bytes())
+            age_ms = (time.monotonic_ns() - state.header.t_host_ns) * 1e-6  # right on the host of the cameras only
+            status = DeformationState.Status.Name(state.status).removeprefix("STATUS_")
+            theta = f"Θ[{len(state.theta)}] = {' '.join(f'{value:+.3f}' for value in state.theta[:6])} …"
+            ages = f"published {state.age_ms:5.1f} ms, here {age_ms:5.1f} ms"
+            print(f"{state.header.seq:6d} {status:12} {ages}  {theta}", flush=True)
+except BrokenPipeError:  # its reader, as `head`, has seen enough; Python would complain of it at the end
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)

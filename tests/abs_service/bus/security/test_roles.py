@@ -197,8 +197,8 @@ def test_only_operators_set_controls(name, allowed, rig, secured):
 def test_who_connects_is_in_the_log_of_the_router(rig, secured, caplog):
     with caplog.at_level(logging.INFO, "abs_service.bus.security.link_log"):
         secured("operator").close()
-        assert eventually(lambda: "operator disconnected: tls/127.0.0.1:" in caplog.text)
-    assert "operator connected: tls/127.0.0.1:" in caplog.text
+        assert eventually(lambda: "operator disconnected: tls/" in caplog.text)
+    assert "operator connected: tls/" in caplog.text
 
 
 def test_every_topic_of_the_bus_has_a_publisher():
