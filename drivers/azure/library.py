@@ -101,7 +101,7 @@ def load() -> Any:
             getattr(sdk, function).argtypes = arguments
         sdk.k4a_set_debug_message_handler(_listen, None, _ERROR)
         return sdk
-    raise SdkMissingError("pyk4a-bundle", command=_INSTALL)
+    raise SdkMissingError("pyk4a-bundle", command=_INSTALL, newest_python=(3, 12))
 
 
 def forget() -> None:

@@ -1,7 +1,11 @@
 """Device errors, classified by whether a retry can help."""
 
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+
+#: The Python that runs.
+PYTHON = sys.version_info[:2]
 
 
 class DeviceError(Exception):
@@ -23,16 +27,29 @@ class SdkMissingError(FinalError):
         package: the package that cannot be imported.
         extra: the extra of this project that installs it, "" if there is none.
         command: what installs it where no extra can.
+        newest_python: the last version, such as (3, 13), that its wheels are for, if there are later ones.
         error: of its import; a library of the system may be missing that it needs.
     """
 
-    def __init__(self, package: str, extra: str = "", *, command: str = "", error: ImportError | None = None) -> None:
-        if error is None or isinstance(error, ModuleNotFoundError):
-            self.reason = f"{package} is not installed"
-            self.remedy = command or f".venv/bin/pip install -e '.[{extra}]'"
-        else:
+    def __init__(
+        self,
+        package: str,
+        extra: str = "",
+        *,
+        command: str = "",
+        newest_python: tuple[int, int] | None = None,
+        error: ImportError | None = None,
+    ) -> None:
+        if error is not None and not isinstance(error, ModuleNotFoundError):
             self.reason = f"{package} cannot be loaded: {error}"
             self.remedy = "install what it lacks (docs/how-to/install.md)"
+        elif newest_python is not None and newest_python < PYTHON:
+            this, newest = (".".join(map(str, version)) for version in (PYTHON, newest_python))
+            self.reason = f"{package} is not installed, and has no wheel for Python {this}"
+            self.remedy = f"make clean all PYTHON=python{newest}"
+        else:
+            self.reason = f"{package} is not installed"
+            self.remedy = command or f".venv/bin/pip install -e '.[{extra}]'"
         super().__init__(f"{self.reason}:  {self.remedy}")
 
 

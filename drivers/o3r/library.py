@@ -21,7 +21,7 @@ def load() -> Any:
     try:
         import ifm3dpy  # noqa: PLC0415  an extra
     except ImportError as error:
-        raise SdkMissingError("ifm3dpy", "ifm", error=error) from error
+        raise SdkMissingError("ifm3dpy", "ifm", newest_python=(3, 13), error=error) from error
     ifm3dpy.logging.Logger.set_log_level(ifm3dpy.logging.LogLevel.Critical)  # the rest is raised or counted, too
     return ifm3dpy
 

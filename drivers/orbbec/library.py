@@ -26,7 +26,7 @@ def load() -> Any:
         with _silent():
             import pyorbbecsdk  # noqa: PLC0415  no requirement of ours
     except ImportError as error:
-        raise SdkMissingError("pyorbbecsdk2", command=_INSTALL, error=error) from error
+        raise SdkMissingError("pyorbbecsdk2", command=_INSTALL, newest_python=(3, 13), error=error) from error
     return pyorbbecsdk
 
 

@@ -11,6 +11,7 @@ import pytest
 from drivers.azure import check_address, discover, library, open_device, opening
 from drivers.azure.address import parse
 from drivers.azure.attached import attached as found_in
+from drivers.contract import errors
 from drivers.contract.device import AddressError, DeviceError, SdkMissingError
 from drivers.contract.discovery import Availability
 from tests.drivers.azure.attachment import attached, usb_tree
@@ -66,7 +67,8 @@ def test_a_camera_that_a_program_has_opened_is_busy(tmp_path: Path) -> None:
 def test_without_the_sdk_the_driver_says_what_installs_it() -> None:
     library.load.cache_clear()
     try:
-        with patch.object(library, "_names", lambda: iter(["libk4a-that-is-not-there.so"])):
+        nowhere = patch.object(library, "_names", lambda: iter(["libk4a-that-is-not-there.so"]))
+        with nowhere, patch.object(errors, "PYTHON", (3, 11)):
             (found,) = discover(0.1)
             assert (found.availability, found.remedy) == (
                 Availability.SDK_MISSING,

@@ -4,6 +4,7 @@ import sys
 
 import pytest
 
+from drivers.contract import errors
 from drivers.contract.device import AddressError, DeviceError, SdkMissingError
 from drivers.contract.discovery import Availability
 from drivers.o3r import check_address, discover, open_device
@@ -60,6 +61,7 @@ def test_a_port_that_lacks_something_is_named() -> None:
 
 def test_without_the_library_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "ifm3dpy", None)
+    monkeypatch.setattr(errors, "PYTHON", (3, 11))
     with pytest.raises(SdkMissingError, match=r"pip install -e '\.\[ifm\]'"):
         open_device("o3r://", lambda: 0)
     (found,) = discover(0.1)

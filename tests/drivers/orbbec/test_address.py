@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from drivers.contract import errors
 from drivers.contract.device import AddressError, SdkMissingError
 from drivers.contract.discovery import Availability
 from drivers.contract.frame import Kind
@@ -43,6 +44,7 @@ def test_an_address_names_a_serial_number_a_host_or_a_recording() -> None:
 
 def test_without_the_sdk_the_driver_says_what_installs_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pyorbbecsdk", None)
+    monkeypatch.setattr(errors, "PYTHON", (3, 11))
     (found,) = discover(0.1)
     assert (found.availability, found.remedy) == (
         Availability.SDK_MISSING,
