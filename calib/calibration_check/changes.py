@@ -121,14 +121,36 @@ def _consistent(stored: Stored, views: Views, pair: tuple[str, str]) -> tuple[So
 
 
 def _of_the_rest(
-    stored: Stored, views: Views, pair: tuple[str, str], contradicting: list[Contradiction]
+    stored: Stored, views: Views, pair: tuple[str, str], suspected: list[Contradiction]
 ) -> tuple[Solution, list[Contradiction]] | None:
-    """Solution of all but contradicting shots; None if none contradict, or too few are left."""
+    """Solution of the shots that agree with each other, and the others; None without any, or if too few agree.
+
+    What contradicts distorts the solution of all shots, so that others seem to. Each that is suspected is tried with
+    those that are not, the least suspected first.
+    """
     shots = views.shots
-    rest = (shots[pair[0]] & shots[pair[1]]) - {one.shot for one in contradicting}
-    if not contradicting or len(rest) < MIN_SHOTS:
+    rest = (shots[pair[0]] & shots[pair[1]]) - {one.shot for one in suspected}
+    if not suspected or len(rest) < MIN_SHOTS:
         return None
-    return solve(stored, views.of(pair, rest), pair[1:]), contradicting
+    found = []
+    for one in reversed(suspected):
+        if (worse := _contradiction(stored, views, pair, rest, one)) is None:
+            rest.add(one.shot)
+        else:
+            found.append(worse)
+    return solve(stored, views.of(pair, rest), pair[1:]), found[::-1]
+
+
+def _contradiction(
+    stored: Stored, views: Views, pair: tuple[str, str], rest: set[int], suspected: Contradiction
+) -> Contradiction | None:
+    """The contradiction of a suspected shot with the others; None if it agrees with them."""
+    try:
+        together = solve(stored, views.of(pair, {*rest, suspected.shot}), pair[1:])
+    except NotSolvedError:
+        return suspected
+    found = [one for one in contradictions(together) if one.shot == suspected.shot]
+    return replace(found[0], exchanged_with=suspected.exchanged_with) if found else None
 
 
 def _without_minimum(stored: Stored, views: Views, pair: tuple[str, str], error: NotSolvedError) -> Iterator[Solution]:
