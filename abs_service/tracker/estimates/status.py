@@ -10,7 +10,7 @@ from annotated_types import Gt, Interval
 from abs_service.tracker.estimates.estimate import Status
 from abs_service.tracker.estimates.shape_quality import ShapeQuality
 from abs_service.tracker.terms.agreement import (
-    MIN_JUDGED,
+    contradicting,
     distances_share,
     has_left,
     inlier_share,
@@ -160,11 +160,9 @@ def _faced(fits: Sequence[SensorFit], limits: Settings) -> Iterator[str]:
 
 
 def _contradicted(fits: Sequence[SensorFit], advice: str) -> Iterator[str]:
-    """Reasons by sensors of distances most of which contradict the others: colours that agree do not outvote them."""
-    for fit in of_distances(fits):
-        judged = fit.counts.agreeing + fit.counts.disagreeing
-        if judged >= MIN_JUDGED and fit.counts.agreeing < judged / 2:
-            yield f"only {fit.counts.agreeing / judged:.0%} of the distances of {fit.sensor} agree – {advice}"
+    """Reasons by sensors that contradict the others: colours that agree do not outvote distances, nor these colours."""
+    for name, what, share in contradicting(fits):
+        yield f"only {share:.0%} of the {what} of {name} agree – {advice}"
 
 
 #: What to do if the mesh does not agree.

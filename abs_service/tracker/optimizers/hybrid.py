@@ -38,8 +38,9 @@ class Settings:
 
     Attributes:
         steps: maximum number of steps of the descent per frame.
-        tolerance: the descent ends with a step whose predicted decrease per parameter is less than this [nats]; the
-            noise of a frame moves the estimate by ½.
+        tolerance: the descent ends with a step whose predicted decrease per parameter is less than this [nats]. The
+            noise of a frame moves the estimate by ½, but in all directions alike; what is left here may lie in a
+            single one, along the surface, where ½ in all is a standard deviation.
         population: candidates per generation of CMA-ES; 0: 4 + 3 ln dim, its default.
         generations: maximum number of generations per frame of CMA-ES.
         step: initial standard deviation of its candidates, in deviations of the priors.
@@ -49,7 +50,7 @@ class Settings:
     """
 
     steps: Annotated[int, Ge(1)] = 12
-    tolerance: Annotated[float, Gt(0)] = 0.2
+    tolerance: Annotated[float, Gt(0)] = 0.01
     population: Annotated[int, Ge(0)] = 0
     generations: Annotated[int, Ge(1)] = 25
     step: Annotated[float, Gt(0)] = 1.0

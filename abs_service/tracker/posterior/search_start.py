@@ -5,8 +5,8 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.posterior.curvature import gauss_newton, solved
 from abs_service.tracker.posterior.frame_posterior import FramePosterior
-from abs_service.tracker.terms.patches import Patches
-from abs_service.tracker.terms.photometric.matching import SIGNIFICANT, is_beside
+from abs_service.tracker.terms.patches import Patches, is_beside
+from abs_service.tracker.terms.photometric.matching import SIGNIFICANT
 
 #: Gauss–Newton steps to the places of the appearance: under the motion prior, and under one that allows for the first.
 STEPS = 2

@@ -10,6 +10,12 @@ from abs_service.tracker.terms.vertex_counts import VertexCounts
 #: Minimum number of vertices that agree or disagree with a sensor, or should, for their share to be judged.
 MIN_JUDGED = 20
 
+#: A vertex beside its place has a colour that agrees by chance, every third one on a print. So half of a mesh may be
+#: elsewhere if fewer than this share of a sensor's colours agree …
+LEAST_COLORS = 2 / 3
+#: … and more than this share of the distances disagree: those stay as they were when a lamp goes out.
+UNLIT_DISTANCES = 0.05
+
 
 def inlier_share(fits: Sequence[SensorFit]) -> float:
     """Share of the vertices visible to any sensor that agree with their measurement; 0 if none is visible."""
@@ -76,6 +82,26 @@ def distances_share(fits: Sequence[SensorFit]) -> float:
     inside = [one.facing - one.behind_itself - one.outside for one in counts]
     seen = [(one.agreeing, one.agreeing + one.disagreeing, whole) for one, whole in zip(counts, inside)]
     return max((good / known for good, known, whole in seen if known >= max(MIN_JUDGED, whole / 2)), default=1.0)
+
+
+def contradicting(fits: Sequence[SensorFit]) -> list[tuple[str, str, float]]:
+    """Name, kind of measurement and agreeing share of every sensor that contradicts the mesh.
+
+    Most of its distances disagree, or a third of its colours together with some distances.
+    """
+    distances = of_distances(fits)
+    moved = any(fit.counts.disagreeing > UNLIT_DISTANCES * _judged(fit) for fit in distances)
+    result = []
+    for fit in fits:
+        what, least = ("distances", 1 / 2) if fit in distances else ("colours", LEAST_COLORS if moved else 0.0)
+        if _judged(fit) >= MIN_JUDGED and fit.counts.agreeing < least * _judged(fit):
+            result.append((fit.sensor, what, fit.counts.agreeing / _judged(fit)))
+    return result
+
+
+def _judged(fit: SensorFit) -> int:
+    """Number of vertices that agree with a measurement or do not."""
+    return fit.counts.agreeing + fit.counts.disagreeing
 
 
 def of_distances(fits: Sequence[SensorFit]) -> list[SensorFit]:

@@ -66,7 +66,7 @@ def sections(
         "are processor times of all threads from the depth image, or the points, to the vertices; ours include the "
         "covariances and the verdict on the estimate. Gauss–Newton has 5 × 4 control points of degree 3, is compiled "
         "like ours, begins at the last result and stops by the rule of our descent (at most 12 steps; a step that "
-        "promises less than 0.2 nats per parameter is the last one), or after six steps as until 2026-11-25. Every "
+        "promises less than 0.01 nats per parameter is the last one), or after six steps as until 2026-11-25. Every "
         "tracker follows every sequence once. Ours has the defaults of a user, but for what a template adds: a sheet "
         "that is lost stays the same sheet. Vertex error: distance of every vertex from its own material; surface "
         "error: from the nearest point of the surface."

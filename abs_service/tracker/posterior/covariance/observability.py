@@ -49,6 +49,15 @@ def unobserved_motion(
     return np.asarray(gain @ motion.astype(np.float32) @ gain.T, np.float64)
 
 
+def held_back(optimum: Optimum, prediction: MotionPrediction) -> NDArray[np.float64]:
+    """Change (dim,) of the estimate by which the motion prior has held it back, to first order.
+
+    An object that moves otherwise than was predicted does so for some frames, to the same side: this is no noise that
+    its covariance has already.
+    """
+    return optimum.inverse_curvature @ (prediction.precision @ (optimum.theta - prediction.theta))
+
+
 def _with_widest(optimum: Optimum, prediction: MotionPrediction, share: float) -> NDArray[np.float64]:
     """Curvature (dim, dim) of likelihood and priors with a share of the widest motion prior in place of the frame's."""
     return optimum.linearized.quadratic.curvature + prediction.exchanged(share)

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from abs_service.tracker.models.base import DeformationModel
 from abs_service.tracker.posterior.covariance.design_effect import DesignEffects
 from abs_service.tracker.posterior.covariance.error_propagation import ErrorPropagation, FrameErrors, Motion
-from abs_service.tracker.posterior.covariance.observability import unobserved_motion
+from abs_service.tracker.posterior.covariance.observability import held_back, unobserved_motion
 from abs_service.tracker.posterior.covariance.registration_error import registration_covariance
 from abs_service.tracker.posterior.covariance.sandwich import gradient_covariance, leverages, shared_covariance
 from abs_service.tracker.posterior.optimum import Optimum
@@ -42,4 +42,6 @@ class ThetaCovariance:
             shared=shared_covariance(sensed, len(optimum.theta)),
         )
         unobserved = unobserved_motion(recent.unmeasured, optimum, prediction)
-        return self._errors.update(Motion(recent.unpredicted, unobserved, prediction.persistence), errors)
+        covariance = self._errors.update(Motion(recent.unpredicted, unobserved, prediction.persistence), errors)
+        held = held_back(optimum, prediction)
+        return covariance + np.outer(held, held)

@@ -125,8 +125,8 @@ class ObservedDepth:
         )
 
     def match(self, surface: Surface, sparse_jacobian: SparseJacobian, patches: Patches) -> PointLinearization:
-        """No residuals: there is no appearance."""
-        return PointLinearization.empty(sparse_jacobian)
+        """Residuals of the outermost vertices, if the outline is beside the mesh; there is no other appearance."""
+        return self.outline.match(surface, sparse_jacobian)
 
     def misfit(self, surface: Surface) -> NDArray[np.float64]:
         """Signed distance of each vertex from its measurement, and the deviation of that by noise (2, n) [m].

@@ -6,28 +6,21 @@ within some pixels are compared, as in block matching (J. Jain, A. Jain: Displac
 interframe image coding. IEEE Transactions on Communications 29, 1981), by the cost that the samples have there.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import Synthesis, View
-from abs_service.tracker.synthesis.perspective import project_with_jacobian
 from abs_service.tracker.terms.linearization import PointLinearization
-from abs_service.tracker.terms.patches import Patches
+from abs_service.tracker.terms.patches import NEAR_PX, Patches, found_at
 
 #: Largest shift of a patch to the right or down [px], and largest number of its samples that are compared.
 REACH_PX, MOST = 8, 40
 
 #: A shift that is less likely by this is another one [nats]; of two places that differ by less, either may be right.
 SIGNIFICANT, AMBIGUOUS = 20.0, 10.0
-
-#: Shifts of up to this are the same place [px]; gradients hold as far.
-NEAR_PX = 2
-
-#: Standard deviation of the place of a patch in the image [px].
-SIGMA_PX = 0.5
 
 #: Cost (s,) [nats] of samples at pixels (s, k) of the texture with a border, with attributes (s or 1, channels, k), and
 #: which samples these are (k,). An infinite attribute costs as much as an inlier on average.
@@ -70,14 +63,7 @@ def matched(
     shift = _shifts(seen, (shape[0], shape[1]), of_samples, costs)
     found = np.flatnonzero(np.isfinite(shift[:, 0]))
     vertices = view.spread(surface, surface.vertices[0].T)
-    rows = project_with_jacobian(view.camera, vertices[found])[1].reshape(-1, 3) / SIGMA_PX
-    samples = view.follow(surface, sparse_jacobian)
-    return PointLinearization(-shift[found].ravel() / SIGMA_PX, rows, np.repeat(found, 2), samples, vertices)
-
-
-def is_beside(rows: Sequence[PointLinearization]) -> bool:
-    """True if any patch is found beside the mesh, further than gradients hold."""
-    return any(len(part.residual) and np.abs(part.residual).max() * SIGMA_PX >= NEAR_PX for part in rows)
+    return found_at(view.camera, vertices, found, shift[found], view.follow(surface, sparse_jacobian))
 
 
 def _shifts(seen: Synthesis, shape: tuple[int, int], of_samples: NDArray[np.intp], costs: Costs) -> NDArray[np.float64]:

@@ -192,8 +192,7 @@ def test_a_folded_mesh_and_one_that_nothing_holds_are_degraded():
     status, reasons = judge([fit(1.0)], (), loose, 0.0, SETTINGS)
     assert status == Status.DEGRADED
     assert reasons[0].startswith("nothing holds the surface along itself, vertices are known to 20 mm so far")
-    alone = ShapeQuality(stretch=0.01, folded_share=0.0, deviation_m=1e-3, single_frame_deviation_m=0.2)
-    assert judge([fit(1.0)], (), alone, 0.0, SETTINGS)[0] == Status.DEGRADED
+    assert judge([fit(1.0)], (), replace(SHAPE, single_frame_deviation_m=0.2), 0.0, SETTINGS)[0] == Status.DEGRADED
 
 
 def depth(name: str, agreeing: int, disagreeing: int, share: float = 0.0, surprised: bool = False) -> SensorFit:
@@ -214,6 +213,13 @@ def test_colors_that_agree_do_not_outvote_distances_that_do_not():
     assert judge([depth("tof", 5, 14), colors], (), SHAPE, 0.0, SETTINGS)[0] == Status.TRACKING, "too few say nothing"
     dark = replace(colors, counts=VertexCounts(facing=10_000, agreeing=4_000, disagreeing=6_000))
     assert judge([depth("tof", 300, 0), dark], (), SHAPE, 0.0, SETTINGS)[0] == Status.TRACKING, "a lamp went out"
+
+
+def test_distances_that_agree_do_not_outvote_colors_of_a_mesh_half_of_which_is_elsewhere_on_a_floor():
+    half = replace(fit(0.95), sensor="rgb", counts=VertexCounts(facing=300, agreeing=170, disagreeing=130))
+    reasons = facts(judge([depth("tof", 265, 35), half], (), SHAPE, 0.0, SETTINGS)[1])
+    assert reasons == ("only 57% of the colours of rgb agree",)
+    assert judge([depth("tof", 299, 1), half], (), SHAPE, 0.0, SETTINGS)[0] == Status.TRACKING, "the light changed"
 
 
 def test_a_mesh_whose_colors_agree_while_hardly_a_distance_does_is_lost():

@@ -9,7 +9,7 @@ from abs_service.pairing.images import Window
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.window import WHOLE
 from abs_service.tracker.terms.depth.classification.visibility import Visibility
-from abs_service.tracker.terms.linearization import Linearization
+from abs_service.tracker.terms.linearization import Linearization, PointLinearization
 from abs_service.tracker.terms.sensor_fit import RimFit
 
 
@@ -43,6 +43,10 @@ class Outline(Protocol):
         """Normalised residuals of a population of one and their derivatives with respect to theta."""
         ...
 
+    def match(self, surface: Surface, sparse_jacobian: SparseJacobian) -> PointLinearization:
+        """Residuals of the places of vertices where the outline is looked for beside the mesh, see `Term.match`."""
+        ...
+
     def fit(self, surface: Surface) -> RimFit:
         """Agreement of the free edges of a population of one with the outline."""
         ...
@@ -69,6 +73,10 @@ class NoOutline:
     def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> Linearization:
         """No rows."""
         return Linearization(np.zeros(0), np.zeros((0, sparse_jacobian.dimension)))
+
+    def match(self, surface: Surface, sparse_jacobian: SparseJacobian) -> PointLinearization:
+        """No residuals."""
+        return PointLinearization.empty(sparse_jacobian)
 
     def fit(self, surface: Surface) -> RimFit:
         """No free edges."""

@@ -1,5 +1,6 @@
 """Rim of a mesh, and its distance from the outline in a distance image."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,9 @@ from calib.jit import kernel
 
 #: A vertex of the rim is hidden if the mesh's own surface lies so far in front of it [m].
 HIDDEN_BEHIND_M = 0.01
+
+#: Distances (k,) of places (k, 2) in an image inside an outline [px], huge where unknown, and their gradients (k, 2).
+Look = Callable[[NDArray[np.float64]], tuple[NDArray[np.float64], NDArray[np.float64]]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -70,7 +70,7 @@ def motion(away: NDArray[np.float64], directions: NDArray[np.float64], places: N
         return 0.0
     arms = places - places.mean(axis=0)
     reach = max(float(np.sqrt(np.mean(arms**2) * 2)), np.finfo(float).tiny)
-    rows = _shown_by(directions, arms / reach)
+    rows = shown_by(directions, arms / reach)
     shown_as, sizes, motions = np.linalg.svd(rows, full_matrices=False)
     parts = (away @ shown_as)[sizes >= MIN_SHOWN * np.sqrt(len(away))]
     along, across, turn = (parts / sizes[: len(parts)]) @ motions[: len(parts)]
@@ -88,11 +88,11 @@ def without_motion(
     Args:
         away, directions, places: as in `motion`; at least `MIN_OF_A_SIDE`.
     """
-    rows = _shown_by(directions, places - places.mean(axis=0))
+    rows = shown_by(directions, places - places.mean(axis=0))
     return away - rows @ np.linalg.lstsq(rows, away)[0]
 
 
-def _shown_by(directions: NDArray[np.float64], arms: NDArray[np.float64]) -> NDArray[np.float64]:
+def shown_by(directions: NDArray[np.float64], arms: NDArray[np.float64]) -> NDArray[np.float64]:
     """Displacement of edges across the outline (k, 3), by a slide along the columns, one along the rows, and a turn."""
     right, down = (directions / np.linalg.norm(directions, axis=1, keepdims=True)).T
     return np.stack([right, down, down * arms[:, 0] - right * arms[:, 1]], axis=1)

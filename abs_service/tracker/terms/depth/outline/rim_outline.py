@@ -18,6 +18,7 @@ from abs_service.tracker.terms.depth.classification.visibility import Visibility
 from abs_service.tracker.terms.depth.outline.raggedness import Raggedness
 from abs_service.tracker.terms.depth.outline.rim import (
     Rim,
+    by_side,
     chain,
     extrapolate_rim,
     is_behind,
@@ -27,9 +28,13 @@ from abs_service.tracker.terms.depth.outline.rim import (
 )
 from abs_service.tracker.terms.depth.outline.rim_classes import LARGEST_GAP_STEPS, RimClass, classify_rim
 from abs_service.tracker.terms.depth.outline.rim_cost import FARTHEST, rim_cost
+from abs_service.tracker.terms.depth.outline.rim_gap import exact_gap
+from abs_service.tracker.terms.depth.outline.rim_match import shift_to_outline
 from abs_service.tracker.terms.depth.outline.rim_motion import displacement, motion
+from abs_service.tracker.terms.depth.outline.rim_normal import across_rim
 from abs_service.tracker.terms.depth.outline.round_outline import is_round, without_turn
-from abs_service.tracker.terms.linearization import Linearization
+from abs_service.tracker.terms.linearization import Linearization, PointLinearization
+from abs_service.tracker.terms.patches import found_at
 from abs_service.tracker.terms.sensor_fit import RimFit
 from calib.camera import Camera
 
@@ -38,6 +43,9 @@ UNJUDGED_DEVIATIONS = 3.0
 
 #: A free edge is off the outline if it is farther from it than so many pixels, and than the bound of its cost.
 OFF_PX = 3.0
+
+#: Fewer vertices that hang over the outline, where the object went on at first, may be strays.
+MIN_HANGING = 3
 
 #: Outer and inner vertices and share of a rim.
 Ends = tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float32]]
@@ -91,7 +99,11 @@ class RimOutline:
         if not self._begun:
             _, values, gradients = self._locate(predicted)
             measured = values, gradients, self._inside_at, distance
-            self.classes, self._beyond = classify_rim(self._camera, self._rim, predicted, *measured)
+            self.classes, gap = classify_rim(self._camera, self._rim, predicted, *measured)
+            outer, inner = (
+                predicted.vertices[0].T[which].astype(np.float64) for which in (self._rim.outer, self._rim.inner)
+            )
+            self._beyond = exact_gap(self._camera, outer, outer - inner, gap, self._look)
         free = np.flatnonzero(self.classes == RimClass.FREE)
         ends = predicted.vertices[0].T[self._rim.outer[free]].astype(np.float64)
         visible = free[~is_behind(self._camera, ends, expected, window)]
@@ -119,8 +131,10 @@ class RimOutline:
         points, values, gradients = self._locate(surface)
         residual = values / self._deviation
         use = np.flatnonzero(np.abs(residual) < FARTHEST)
-        by_place = project_with_jacobian(self._camera, points[use].astype(np.float64))[1]
-        shown = without_turn(gradients[use], by_place, points[use]) if self._is_round else gradients[use]
+        places, by_place = project_with_jacobian(self._camera, points.astype(np.float64))
+        by_place, directions = by_place[use], self._directions(surface, places)[use]
+        shown = across_rim(gradients[use], places[use], directions)
+        shown = without_turn(shown, by_place, points[use]) if self._is_round else shown
         rows = np.einsum("vi,vij->vj", shown / self._deviation, by_place)
         outer, inner, beyond = self._ends
         jacobian = np.zeros((len(use), sparse_jacobian.dimension))
@@ -129,6 +143,14 @@ class RimOutline:
         shared = shared_by_side(jacobian, residual[use], gradients[use])
         return Linearization(residual[use], jacobian, places=points[use], shared=shared)
 
+    def match(self, surface: Surface, sparse_jacobian: SparseJacobian) -> PointLinearization:
+        """Residuals of the places of outermost vertices, if a slide and a turn lay the edges on the outline."""
+        _, places, _ = self._edges(surface)
+        shift = shift_to_outline(self._look, places, self._directions(surface, places))
+        if not shift.any():
+            return PointLinearization.empty(sparse_jacobian)
+        return found_at(self._camera, surface.vertices[0].T, self._ends[0], shift, sparse_jacobian)
+
     def fit(self, surface: Surface) -> RimFit:
         """Agreement of the edges of a population of one with the outline."""
         points, places, away = self._edges(surface)
@@ -136,11 +158,12 @@ class RimOutline:
         pixel_m = np.linalg.norm(points - self._camera.center, axis=1) / self._camera.fx
         covered = np.flatnonzero((self.classes == RimClass.OCCLUDED) | (self.classes == RimClass.BORDER))
         beyond = self._beyond_gap(surface, covered)
+        hanging = self._hanging(surface, covered)
         return RimFit(
             visible=int(np.count_nonzero(known)),
             outside=int(np.count_nonzero(away < -self._far)),
             inside=int(np.count_nonzero(away > self._far)),
-            off_m=self._displacement(surface, places, away, pixel_m) if known.any() else 0.0,
+            off_m=max(self._displacement(surface, places, away, pixel_m) if known.any() else 0.0, hanging),
             occluded=self._hidden + int(np.count_nonzero(~known)),
             covered=len(covered),
             uncovered=int(np.count_nonzero(beyond > 0)),
@@ -169,6 +192,20 @@ class RimOutline:
         inner = surface.vertices[0].T[self._ends[1]].astype(np.float64)
         return places - project_with_jacobian(self._camera, inner)[0]
 
+    def _hanging(self, surface: Surface, which: NDArray[np.intp]) -> float:
+        """Distance [m] by which outer vertices (m,), beyond which the object went on, hang over its outline at least.
+
+        0 unless most of a side of the image do: then the mesh has slid, and nothing tells how far.
+        """
+        vertices = surface.vertices[0].T.astype(np.float64)
+        outer, inner = vertices[self._rim.outer[which]], vertices[self._rim.inner[which]]
+        places = project_with_jacobian(self._camera, outer)[0]
+        away = self._inside(places)
+        sides = by_side(places - project_with_jacobian(self._camera, inner)[0])
+        over, known = (np.count_nonzero(sides & part, axis=1) for part in (away < -self._far, ~np.isnan(away)))
+        pixel_m = np.linalg.norm(outer - self._camera.center, axis=1) / self._camera.fx
+        return float(self._far * pixel_m.mean()) if np.any((over >= MIN_HANGING) & (2 * over > known)) else 0.0
+
     def _beyond_gap(self, surface: Surface, which: NDArray[np.intp]) -> NDArray[np.float64]:
         """Distances inside the outline (m,) the largest gap beyond outer vertices (m,), see `_inside_at`."""
         vertices = surface.vertices[0].T.astype(np.float64)
@@ -182,6 +219,12 @@ class RimOutline:
     def _inside(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
         """`_inside_at` of points at places in the image (k, 2) [px]."""
         return read(self._inwards, self._corner, places, (self._camera.width, self._camera.height))
+
+    def _look(self, places: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Distances (k,) of places (k, 2) inside the outline [px], interpolated, and their image gradients (k, 2)."""
+        values, gradients = np.empty(len(places)), np.empty((len(places), 2))
+        look_up(self._inwards, places - self._corner, values, gradients)
+        return values, gradients
 
     def _points(self, surface: Surface) -> NDArray[np.float32]:
         """Extrapolated rim (1, 3, k) [m]."""

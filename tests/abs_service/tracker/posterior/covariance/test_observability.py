@@ -8,6 +8,7 @@ import pytest
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.posterior.covariance.observability import (
     KEPT_PRIOR,
+    held_back,
     single_frame_deviation,
     unobserved_motion,
 )
@@ -56,3 +57,15 @@ def test_the_frame_s_own_motion_prior_counts_for_nothing():
     likelihood, wide = np.diag([1e3, 1e6]), replace(narrow, speed=np.inf)
     found = single_frame_deviation(optimum(likelihood + narrow.precision), narrow)
     assert found == pytest.approx(single_frame_deviation(optimum(likelihood), wide), rel=1e-9)
+
+
+def test_a_lasting_lag_is_in_the_covariance_as_far_as_the_prior_causes_it():
+    """The object is 10 mm farther than predicted along both axes; the second one is measured a hundred times better."""
+    prior = replace(PREDICTION, speed=0.3)
+    information, theta = np.diag([1.0, 100.0]) * prior.precision, np.array([0.01, 0.01])
+    curvature = information + prior.precision
+    estimate = np.linalg.solve(curvature, information @ theta)
+    found = replace(optimum(curvature), theta=estimate, inverse_curvature=np.linalg.inv(curvature))
+    held = held_back(found, prior)
+    np.testing.assert_allclose(held, np.linalg.inv(curvature) @ prior.precision @ estimate, rtol=1e-12)
+    np.testing.assert_allclose(held, -(estimate - theta) * np.diag(information) / np.diag(curvature), rtol=1e-9)

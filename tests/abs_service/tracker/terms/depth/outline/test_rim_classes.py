@@ -189,6 +189,21 @@ def test_a_sheet_that_hangs_over_the_outline_or_ends_inside_it_is_told():
     assert off.visible > off.outside + off.inside
 
 
+def test_a_mesh_that_hangs_over_where_the_image_cut_the_object_has_slid():
+    """The object's end came into the image from the right; the mesh, which the image had cut there, did not move."""
+    rays = CAMERA.unproject(np.ones((CAMERA.height, CAMERA.width)))
+    end = (rays[..., 0] / rays[..., 2]).max()
+    shift = end - MESH.vertices[:, 0].max() - 0.012
+    cut = replace(MESH, vertices=MESH.vertices + np.array([shift, 0, 0]))
+    whole = replace(MESH, vertices=MESH.vertices * (2, 1, 1) + np.array([shift + 0.15, 0, 0]))
+    found = outline(picture(whole), cut)
+    assert found.fit(moved(cut, 0.0)).off_m == 0
+    drawn = picture(whole, end - 0.06 - whole.vertices[:, 0].max())
+    drawn[:, :30] = picture(whole)[:, :30]  # as if the board were longer
+    look(found, drawn, cut)
+    assert found.fit(moved(cut, 0.0)).off_m > 0.015
+
+
 def test_the_distance_of_the_edges_from_the_outline_is_told_in_metres():
     """The sheet is 40 mm longer to the right than when the mesh was made; on the other sides, the edges are on it."""
     found = outline(picture())
