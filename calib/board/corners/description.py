@@ -105,6 +105,8 @@ def _against(target: Target, seen: _Markers) -> str:
 def require_grid(target: AprilGrid, points: NDArray[np.float64]) -> None:
     """Checks detected points (rows, columns, 2) [px], NaN where there are none, against the layout of a grid.
 
+    Neighbours tell, and of tags without any the homography of all.
+
     Raises:
         OtherBoardError: tags do not stand where the description has them; says what is wrong.
     """
@@ -117,7 +119,8 @@ def require_grid(target: AprilGrid, points: NDArray[np.float64]) -> None:
         off.append(np.sqrt(np.sum((gap - target.gap / target.tag * tags) ** 2, axis=-1) / sizes).ravel())
     known = [each[np.isfinite(each)] for each in off]
     ratios = np.concatenate(gaps)
-    if any(len(each) and np.mean(each > _OTHER_LAYOUT) > _MISREAD for each in known):
+    is_off = any(len(each) and np.mean(each > _OTHER_LAYOUT) > _MISREAD for each in known)
+    if is_off or _layout(target, _tags(points))[0] not in (0, target.columns):
         raise OtherBoardError(
             f"the tags do not stand as on a board of {target.columns} × {target.rows} tags with number 0 in the lower "
             "left corner. Are columns and rows right?"
@@ -127,6 +130,14 @@ def require_grid(target: AprilGrid, points: NDArray[np.float64]) -> None:
         raise OtherBoardError(
             f"the gaps between the tags are {ratio:.2f} of a tag wide, but {said:.2f} as described. Measure both"
         )
+
+
+def _tags(points: NDArray[np.float64]) -> _Markers:
+    """Tags of a grid whose corners (rows, columns, 2) [px] were all found."""
+    rows, columns = (count // 2 for count in points.shape[:2])
+    centers = points.reshape(rows, 2, columns, 2, 2).mean(axis=(1, 3))[::-1].reshape(-1, 2)
+    ids = np.flatnonzero(np.isfinite(centers).all(axis=1))
+    return _Markers(_APRIL_GRID, BORDER, ids, centers[ids])
 
 
 def _smaller(levels: Grey) -> Grey:

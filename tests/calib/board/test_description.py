@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
+from calib import pose
 from calib.board.corners.description import mismatch
 from calib.board.corners.detection import detect
 from calib.board.corners.errors import NothingFoundError, OtherBoardError
@@ -26,6 +27,18 @@ def grid() -> np.ndarray:
 def test_a_grid_with_other_columns_is_refused(grid: np.ndarray, described: AprilGrid) -> None:
     with pytest.raises(OtherBoardError, match=f"not stand as on a board of {described.columns} × {described.rows}"):
         detect(described, grid)
+
+
+@pytest.mark.parametrize("described", [AprilGrid(5, 6, 0.03, 0.009), AprilGrid(7, 5, 0.03, 0.009)])
+def test_a_grid_with_other_columns_is_refused_if_no_tag_has_a_neighbour(grid: np.ndarray, described: AprilGrid) -> None:
+    """Such an image was taken, with corners in the wrong places."""
+    corners = VGA.project(pose.transform(centered(GRID, (0.2, 0.1, 0.3), 0.42), GRID.points()))
+    covered = grid.copy()
+    for number in {*range(30)} - {0, 2, 4, 12, 14, 16, 24, 26, 28}:
+        cv2.fillConvexPoly(covered, np.rint(corners[GRID.ids_of_tag(number)]).astype(np.int32), 120)
+    assert len(detect(GRID, covered).ids) > 24
+    with pytest.raises(OtherBoardError, match=f"not stand as on a board of {described.columns} × {described.rows}"):
+        detect(described, covered)
 
 
 def test_a_grid_with_other_gaps_is_refused_with_both(grid: np.ndarray) -> None:
