@@ -1,7 +1,7 @@
 """Boards with markers that are not as described: another dictionary, layout or pattern."""
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -183,20 +183,22 @@ def _markers(levels: Grey, family: str, border: int) -> _Markers:
 def _misplaced(target: Charuco | AprilGrid, seen: _Markers) -> str:
     """Other numbers of columns and rows, or squares of the other colour, by where markers stand."""
     count = target.columns * target.rows // (2 if isinstance(target, Charuco) else 1)
-    size, largest = f"{target.columns} × {target.rows}", int(seen.ids.max())
-    numbers = f"from {seen.ids.min()} to {largest}" if seen.ids.min() else f"up to {largest}"
-    ids = f"shows markers with ids {numbers}, a board of {size} has 0 to {count - 1}"
+    first, hint = (target.first_id, ": is first_id right?") if isinstance(target, Charuco) else (0, "")
+    size, least, largest = f"{target.columns} × {target.rows}", int(seen.ids.min()), int(seen.ids.max())
+    numbers = f"from {least} to {largest}" if least else f"up to {largest}"
+    ids = f"shows markers with ids {numbers}, a board of {size} has {first} to {first + count - 1}{hint}"
+    if least < first:
+        return ids
+    seen, largest = replace(seen, ids=seen.ids - first), largest - first
     columns, is_first_black = _layout(target, seen)
-    if not columns:
-        return ids if largest >= count else ""
-    if is_first_black != _is_first_black(target):
+    if columns and is_first_black != _is_first_black(target):
         return _OTHER_PATTERN[is_first_black]
-    if columns == target.columns:
+    if columns in (0, target.columns):
         return ids if largest >= count else ""
     is_last_row_seen = largest >= count * (1 - 1 / target.columns)
     if columns == target.rows and is_last_row_seen and largest < count:
         return f"fits with columns and rows exchanged, {columns} × {target.columns} instead of {size}"
-    return f"shows markers with ids up to {largest} that stand as on a board of {columns} columns, not of {size}"
+    return f"shows markers with ids {numbers} that stand as on a board of {columns} columns, not of {size}"
 
 
 def _layout(target: Charuco | AprilGrid, seen: _Markers) -> tuple[int, bool]:
