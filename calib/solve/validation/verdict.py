@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Collection, Mapping, Sequence, Set
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -85,7 +86,8 @@ def assess(
         if target != source
     }
     shape, free = shape_errors(solution, distance, needed_px), free_shape(solution)
-    reasons, contradicting, cause = _unlike(free, shape, needed_px)
+    unlike = _unlike(free, shape, needed_px)
+    reasons, contradicting = [*unlike.reasons], unlike.contradicting
     reasons += exchanged(solution.cameras)
     reasons += weak_directions(solution, distance)
     reasons += outliers(solution, {one.shot for one in contradicting})
@@ -100,20 +102,26 @@ def assess(
     reasons += _uncertain(known, needed_px)
     reasons += _narrow(solution, images)
     reasons += [str(one) for one in shape if not one.is_misprint]  # why the halves may differ
-    reasons = [*other_lenses(solution), *cause, *reasons] if reasons else []
+    reasons = [*other_lenses(solution), *unlike.causes, *reasons] if reasons else []
     kept = [name for name, sensor in solution.task.sensors.items() if sensor.fixed_intrinsics]
     praise = _praise(agreements, images, known, distance) + changes.unseen(unseen_change(free)) + _given(kept)
     verdict = f"Do not trust it yet: {reasons[0]}" if reasons else praise
     return Assessment(not reasons, verdict, reasons, contradicting, agreements, images, pairs, distance)
 
 
-def _unlike(
-    free: FreeShape, shape: Sequence[ShapeError], needed_px: float
-) -> tuple[list[str], list[Contradiction], list[str]]:
+class _Unlike(NamedTuple):
     """Reasons to doubt that all shots show one board and one rig, shots that contradict, and likely causes."""
+
+    reasons: Sequence[str]
+    contradicting: Sequence[Contradiction]
+    causes: Sequence[str]
+
+
+def _unlike(free: FreeShape, shape: Sequence[ShapeError], needed_px: float) -> _Unlike:
+    """Looks whether all shots show one board and one rig."""
     solution = free.solution
     if wrong := distance_errors(solution, needed_px):
-        return [*map(str, wrong)], [], []  # they pull everything else along
+        return _Unlike([*map(str, wrong)], [], [])  # they pull everything else along
     moved = changes_of_place(free, needed_px)
     # What happened to a sensor looks as if its image changed, and a wrong board as if every shot had another lens.
     changed = [] if moved else changes_of_optics(free, needed_px)
@@ -133,7 +141,7 @@ def _unlike(
     reasons += [*misprinted, *map(str, mixed), *(changes.of_focus(*each) for each in focus.items())]
     reasons += [*map(str, scattered), *_contradicting(contradicting)]
     reasons += [changes.unexplained(one) for one, is_so in zip(changed, confirmed) if not is_so]
-    return reasons, contradicting, [*map(str, cause)]
+    return _Unlike(reasons, contradicting, [*map(str, cause)])
 
 
 def _excess(of: str, agreements: Sequence[Agreement]) -> float:
