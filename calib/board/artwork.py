@@ -55,7 +55,7 @@ def _markers(target: Charuco) -> NDArray[np.float64]:
     cell = target.marker / cells
     white = _squares(target.columns, target.rows, target.square, odd=int(target.is_first_black))
     found = []
-    for number, (left, top, edge, _) in enumerate(white):
+    for number, (left, top, edge, _) in zip(target.ids().tolist(), white, strict=True):
         image, inset = cv2.aruco.generateImageMarker(dictionary, number, cells), (edge - target.marker) / 2
         found += black_cells(image, left + inset, top + inset, cell)
     return np.array(found)

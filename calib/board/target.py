@@ -75,6 +75,7 @@ class Charuco:
         square, marker: edge lengths of a square and of a marker [m].
         dictionary: OpenCV's marker dictionary.
         legacy: as OpenCV printed it before 4.6: with an even number of rows, the upper left square is white.
+        first_id: number of the first marker, as of one of several boards.
     """
 
     columns: int
@@ -83,6 +84,7 @@ class Charuco:
     marker: float
     dictionary: Dictionary = "5x5_250"
     legacy: bool = False
+    first_id: int = 0
 
     def __post_init__(self) -> None:
         check_counts(self.columns, self.rows, 3)
@@ -96,6 +98,11 @@ class Charuco:
         markers, needed = len(self.markers().bytesList), self.columns * self.rows // 2
         if needed > markers:
             raise TargetError(f"dictionary: {self.dictionary} has {markers} markers, this board needs {needed}")
+        if not 0 <= self.first_id <= markers - needed:
+            raise TargetError(
+                f"first_id: {self.first_id} must be from 0 to {markers - needed}, as {self.dictionary} has {markers} "
+                f"markers and this board needs {needed}"
+            )
 
     @property
     def grid(self) -> tuple[int, int]:
@@ -120,6 +127,10 @@ class Charuco:
     def points(self) -> Points:
         """Corners row by row (n, 3) [m]; the row index is OpenCV's corner id."""
         return _lattice(*self.grid, self.square)
+
+    def ids(self) -> NDArray[np.int32]:
+        """Numbers of the markers, by rows (n,)."""
+        return np.arange(self.first_id, self.first_id + self.columns * self.rows // 2, dtype=np.int32)
 
     def markers(self) -> cv2.aruco.Dictionary:
         """OpenCV's dictionary."""

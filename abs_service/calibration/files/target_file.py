@@ -80,12 +80,12 @@ def from_table(table: Mapping[str, Any], path: str) -> Target:
 
 
 def to_table(target: Target) -> dict[str, Any]:
-    """TOML table of a board, the inverse of `from_table`, with lengths in millimetres and without `legacy = false`."""
+    """TOML table of a board, the inverse of `from_table`, in millimetres; what is false or 0 is left out."""
     kind = next(name for name, Kind in KINDS.items() if type(target) is Kind)
     shown = {
         f"{k}_mm" if k in _LENGTHS else k: round(1e3 * v, 6) if k in _LENGTHS else v for k, v in asdict(target).items()
     }
-    return {"kind": kind, **{key: value for key, value in shown.items() if value is not False}}
+    return {"kind": kind, **{key: value for key, value in shown.items() if value}}
 
 
 def write(target: Target, path: Path) -> None:
@@ -102,7 +102,7 @@ def write(target: Target, path: Path) -> None:
 
 _EXAMPLES: Mapping[str, Target] = {
     "chessboard": Chessboard(9, 6, 0.025),
-    "charuco": Charuco(9, 6, 0.03, 0.022, legacy=True),
+    "charuco": Charuco(9, 6, 0.03, 0.022, legacy=True, first_id=1),
     "circles": Circles(7, 5, 0.03, 0.015),
     "asymmetric_circles": AsymmetricCircles(4, 11, 0.02, 0.015),
     "april_grid": AprilGrid(6, 6, 0.088, 0.0264),

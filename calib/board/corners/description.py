@@ -1,7 +1,7 @@
 """Boards with markers that are not as described: another dictionary, layout or pattern."""
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -105,6 +105,8 @@ def _against(target: Target, seen: _Markers) -> str:
 def require_grid(target: AprilGrid, points: NDArray[np.float64]) -> None:
     """Checks detected points (rows, columns, 2) [px], NaN where there are none, against the layout of a grid.
 
+    Neighbours tell, and of tags without any the homography of all.
+
     Raises:
         OtherBoardError: tags do not stand where the description has them; says what is wrong.
     """
@@ -117,7 +119,8 @@ def require_grid(target: AprilGrid, points: NDArray[np.float64]) -> None:
         off.append(np.sqrt(np.sum((gap - target.gap / target.tag * tags) ** 2, axis=-1) / sizes).ravel())
     known = [each[np.isfinite(each)] for each in off]
     ratios = np.concatenate(gaps)
-    if any(len(each) and np.mean(each > _OTHER_LAYOUT) > _MISREAD for each in known):
+    is_off = any(len(each) and np.mean(each > _OTHER_LAYOUT) > _MISREAD for each in known)
+    if is_off or _layout(target, _tags(points))[0] not in (0, target.columns):
         raise OtherBoardError(
             f"the tags do not stand as on a board of {target.columns} × {target.rows} tags with number 0 in the lower "
             "left corner. Are columns and rows right?"
@@ -127,6 +130,14 @@ def require_grid(target: AprilGrid, points: NDArray[np.float64]) -> None:
         raise OtherBoardError(
             f"the gaps between the tags are {ratio:.2f} of a tag wide, but {said:.2f} as described. Measure both"
         )
+
+
+def _tags(points: NDArray[np.float64]) -> _Markers:
+    """Tags of a grid whose corners (rows, columns, 2) [px] were all found."""
+    rows, columns = (count // 2 for count in points.shape[:2])
+    centers = points.reshape(rows, 2, columns, 2, 2).mean(axis=(1, 3))[::-1].reshape(-1, 2)
+    ids = np.flatnonzero(np.isfinite(centers).all(axis=1))
+    return _Markers(_APRIL_GRID, BORDER, ids, centers[ids])
 
 
 def _smaller(levels: Grey) -> Grey:
@@ -172,20 +183,22 @@ def _markers(levels: Grey, family: str, border: int) -> _Markers:
 def _misplaced(target: Charuco | AprilGrid, seen: _Markers) -> str:
     """Other numbers of columns and rows, or squares of the other colour, by where markers stand."""
     count = target.columns * target.rows // (2 if isinstance(target, Charuco) else 1)
-    size, largest = f"{target.columns} × {target.rows}", int(seen.ids.max())
-    numbers = f"from {seen.ids.min()} to {largest}" if seen.ids.min() else f"up to {largest}"
-    ids = f"shows markers with ids {numbers}, a board of {size} has 0 to {count - 1}"
+    first, hint = (target.first_id, ": is first_id right?") if isinstance(target, Charuco) else (0, "")
+    size, least, largest = f"{target.columns} × {target.rows}", int(seen.ids.min()), int(seen.ids.max())
+    numbers = f"from {least} to {largest}" if least else f"up to {largest}"
+    ids = f"shows markers with ids {numbers}, a board of {size} has {first} to {first + count - 1}{hint}"
+    if least < first:
+        return ids
+    seen, largest = replace(seen, ids=seen.ids - first), largest - first
     columns, is_first_black = _layout(target, seen)
-    if not columns:
-        return ids if largest >= count else ""
-    if is_first_black != _is_first_black(target):
+    if columns and is_first_black != _is_first_black(target):
         return _OTHER_PATTERN[is_first_black]
-    if columns == target.columns:
+    if columns in (0, target.columns):
         return ids if largest >= count else ""
     is_last_row_seen = largest >= count * (1 - 1 / target.columns)
     if columns == target.rows and is_last_row_seen and largest < count:
         return f"fits with columns and rows exchanged, {columns} × {target.columns} instead of {size}"
-    return f"shows markers with ids up to {largest} that stand as on a board of {columns} columns, not of {size}"
+    return f"shows markers with ids {numbers} that stand as on a board of {columns} columns, not of {size}"
 
 
 def _layout(target: Charuco | AprilGrid, seen: _Markers) -> tuple[int, bool]:

@@ -103,7 +103,9 @@ def detect(target: Target, image: Image, largest_saturated: float = MAX_SATURATE
 def _check_whole(
     target: Target, pixels: NDArray[np.float64], points: NDArray[np.float64], shape: tuple[int, ...]
 ) -> None:
-    """Rejects a board cut off by the border; a ChArUco may be cut off, so only its detected points count."""
+    """Rejects a board cut off by the border, unless it may be seen in part."""
+    if isinstance(target, Charuco | AprilGrid):
+        return
     size = np.array([shape[1], shape[0]])
     distance = np.minimum(pixels, size - 1 - pixels).min()
     reach = MIN_BORDER_PX

@@ -15,7 +15,8 @@ def refine(levels: Grey, pixels: NDArray[np.float64], radius: int) -> tuple[NDAr
 
     L. Lucchese and S. K. Mitra, Using saddle points for subpixel feature detection in camera calibration targets,
     APCCAS 2002. On rendered boards the errors are a third of those of OpenCV's refinement. What has no saddle within
-    `radius` is no corner: the middle of an edge, a blank, or a place that was computed from markers far away.
+    `radius` is no corner: the middle of an edge, a blank, or a place that was computed from markers far away. Nor is
+    it one, if a part of that neighbourhood is beyond the border.
 
     Args:
         levels: the image.
@@ -38,7 +39,10 @@ def refine(levels: Grey, pixels: NDArray[np.float64], radius: int) -> tuple[NDAr
         step = np.stack([uv * dv - 2 * vv * du, uv * du - 2 * uu * dv], axis=1) / safe[:, None]
         at = at + np.where(is_saddle[:, None], np.clip(step, -1, 1), 0)
     moved = at - first
-    return pixels + moved, is_saddle & (np.linalg.norm(moved, axis=1) < radius)
+    corners = pixels + moved
+    last = np.array(levels.shape[::-1]) - 1
+    is_inside = np.all((corners >= radius) & (corners <= last - radius), axis=1)
+    return corners, is_saddle & is_inside & (np.linalg.norm(moved, axis=1) < radius)
 
 
 def _around(levels: Grey, pixels: NDArray[np.float64], radius: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

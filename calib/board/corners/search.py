@@ -226,7 +226,8 @@ def _disc_detector(target: Circles | AsymmetricCircles, levels: Grey) -> cv2.Sim
 
 
 def _find_charuco(target: Charuco, levels: Grey) -> Found:
-    layout = cv2.aruco.CharucoBoard((target.columns, target.rows), target.square, target.marker, target.markers())
+    size = (target.columns, target.rows)
+    layout = cv2.aruco.CharucoBoard(size, target.square, target.marker, target.markers(), target.ids())
     layout.setLegacyPattern(target.legacy)
     corners, ids, _, _ = cv2.aruco.CharucoDetector(layout).detectBoard(levels)
     if ids is None or corners is None:

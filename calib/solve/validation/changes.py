@@ -1,5 +1,6 @@
 """Changes of a sensor between shots: whether the shots before and after confirm them, and what is said of them."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -8,7 +9,8 @@ from calib.solve.bundle.adjustment import NotSolvedError
 from calib.solve.bundle.parameters.lens_parameters import ASPECT
 from calib.solve.solution import Solution
 from calib.solve.start.start import fit_camera
-from calib.solve.validation.steadiness import Change, from_middle, rms
+from calib.solve.validation.steadiness import Change, rms
+from calib.solve.validation.support import from_middle
 
 #: A change shifts the corners by less than this many times what the shots before and after, fitted alone, say.
 _CONFIRMED = 2.0
@@ -71,3 +73,13 @@ def of_focus(sensor: str, deviation: float) -> str:
         f"{sensor}: its focal length differs by ± {deviation:.1%} from shot to shot: switch autofocus, zoom and image "
         "stabilisation off; if they are, make sure of a flat board and even, sharp images, and try another kind of lens"
     )
+
+
+def unseen(least: Mapping[str, float]) -> str:
+    """Sentence on the least changes of focal lengths [1] that would have shown, by sensor; "" without any."""
+    if not least:
+        return ""
+    sensor = max(least, key=lambda name: least[name])
+    of = f"the focal length of {sensor}" if len(least) > 1 else "its focal length"
+    size = f" of less than {least[sensor]:.1%}" if np.isfinite(least[sensor]) else ""
+    return f" A change of {of} half way{size} would not have shown."

@@ -7,6 +7,7 @@ because they were paired wrongly or the board moved between them, each fits alon
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 
@@ -92,6 +93,13 @@ class Scatter:
         )
 
 
+class _Seen(NamedTuple):
+    """Pose of the board by one image, and how far its corners miss [px]."""
+
+    T_rb: Pose
+    rms_px: float
+
+
 def contradictions(solution: Solution, left: Mapping[tuple[str, int], float] = {}) -> list[Contradiction]:
     """Shots that contradict the rest, the worst first; empty if they are too many to have a rest.
 
@@ -143,7 +151,7 @@ def _alone(solution: Solution, name: str, shots: Sequence[int]) -> list[float]:
 def _of_shot(
     solution: Solution,
     shot: int,
-    boards: Mapping[tuple[str, int], tuple[Pose, float]],
+    boards: Mapping[tuple[str, int], _Seen],
     left: Mapping[tuple[str, int], float],
 ) -> Contradiction | None:
     """The worst view of a shot, if it contradicts."""
@@ -164,13 +172,15 @@ def _of_shot(
     return None if worst is None else _with_partner(worst, boards)
 
 
-def _with_partner(found: Contradiction, boards: Mapping[tuple[str, int], tuple[Pose, float]]) -> Contradiction:
+def _with_partner(found: Contradiction, boards: Mapping[tuple[str, int], _Seen]) -> Contradiction:
     """With the other sensor of a pair whose views each fit alone, and the shots that would fit instead."""
     own = {sensor: each for (sensor, shot), each in boards.items() if shot == found.shot}
     pairs = [
-        (_apart(own[a][0], own[b][0]), a, b)
+        (_apart(own[a].T_rb, own[b].T_rb), a, b)
         for a, b in combinations(own, 2)
-        if found.of == "corners" and found.sensors[0] in (a, b) and max(own[a][1], own[b][1]) * _BETTER < found.miss
+        if found.of == "corners"
+        and found.sensors[0] in (a, b)
+        and max(own[a].rms_px, own[b].rms_px) * _BETTER < found.miss
     ]
     if not pairs:
         return found
@@ -178,9 +188,12 @@ def _with_partner(found: Contradiction, boards: Mapping[tuple[str, int], tuple[P
     first, second = (a, b) if a == found.sensors[0] else (b, a)
     others = {
         shot
-        for (sensor, shot), (T_rb, _) in boards.items()
+        for (sensor, shot), seen in boards.items()
         for here in (a, b)
-        if shot != found.shot and sensor in (a, b) and sensor != here and _apart(T_rb, own[here][0]) < _SAME * apart
+        if shot != found.shot
+        and sensor in (a, b)
+        and sensor != here
+        and _apart(seen.T_rb, own[here].T_rb) < _SAME * apart
     }
     return replace(found, sensors=(first, second), apart=apart, exchanged_with=tuple(sorted(others)))
 
@@ -189,7 +202,7 @@ def _apart(T_ra: Pose, T_rb: Pose) -> float:
     return float(np.linalg.norm(T_ra[:3, 3] - T_rb[:3, 3]))
 
 
-def _boards(solution: Solution) -> dict[tuple[str, int], tuple[Pose, float]]:
+def _boards(solution: Solution) -> dict[tuple[str, int], _Seen]:
     """Pose of the board `T_rb` and residual [px] by sensor and shot, each from that one image."""
     found = {}
     for view in solution.task.corners:
@@ -198,16 +211,16 @@ def _boards(solution: Solution) -> dict[tuple[str, int], tuple[Pose, float]]:
     return found
 
 
-def _nearest(candidates: Sequence[PoseCandidate], solution: Solution, view: CornerView) -> tuple[Pose, float]:
+def _nearest(candidates: Sequence[PoseCandidate], solution: Solution, view: CornerView) -> _Seen:
     """Of the two poses that a planar board may have, the nearer to the solution's if both fit."""
     T_rs = solution.cameras[view.sensor].T_rs
     allowed = [one for one in candidates if one.rms_px < 2 * candidates[0].rms_px]
     board = solution.boards.get(view.shot)
     if board is None:
-        return T_rs @ candidates[0].T_sb, candidates[0].rms_px
+        return _Seen(T_rs @ candidates[0].T_sb, candidates[0].rms_px)
     turned = [np.linalg.norm(pose.to_rotation_vector(T_rs @ one.T_sb @ pose.inverse(board))[0]) for one in allowed]
     best = allowed[int(np.argmin(turned))]
-    return T_rs @ best.T_sb, best.rms_px
+    return _Seen(T_rs @ best.T_sb, best.rms_px)
 
 
 def outliers(solution: Solution, named: Collection[int]) -> list[str]:

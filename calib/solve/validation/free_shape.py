@@ -8,6 +8,7 @@ much in real sets.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,41 +86,53 @@ def free_shape(solution: Solution) -> FreeShape:
     return FreeShape(solution, poses, robust.covariance_inflation(left[:measured]), misses)
 
 
-def once(poses: PoseInformation) -> tuple[Array, Array]:
-    """Information (poses, k, k) and scores (poses, k), as if every distinct pose had been seen once."""
-    return poses.information / poses.repeats[:, None, None], poses.scores / poses.repeats[:, None] / poses.efficiency
+class Once(NamedTuple):
+    """What poses say if every distinct one had been seen once.
+
+    Attributes:
+        information: of poses (poses, k, k).
+        scores: of poses (poses, k).
+    """
+
+    information: Array
+    scores: Array
 
 
-def along(directions: Array, information: Array, prior: Array) -> tuple[Array, Array, Array]:
+class Along(NamedTuple):
     """Information of poses along directions.
 
-    Args:
+    Attributes:
         directions: (k, m).
-        information: of poses (poses, k, k), to which a prior (k, k) adds.
-
-    Returns:
-        Root of all information, lower triangle (k, k); information of each pose along the directions (poses, m, m), and
-        what all poses know of it already, divided by the root (poses, k, m).
+        lower: root of all information, lower triangle (k, k).
+        own: information of each pose along the directions (poses, m, m).
+        whole: what all poses know of it already, divided by the root (poses, k, m).
     """
+
+    directions: Array
+    lower: Array
+    own: Array
+    whole: Array
+
+
+def once(poses: PoseInformation) -> Once:
+    """Information and scores of poses without their repetitions."""
+    repeats = poses.repeats
+    return Once(poses.information / repeats[:, None, None], poses.scores / repeats[:, None] / poses.efficiency)
+
+
+def along(directions: Array, information: Array, prior: Array) -> Along:
+    """Information of poses along directions (k, m); a prior (k, k) adds to that of all poses (poses, k, k)."""
     lower = linalg.cholesky(information.sum(axis=0) + prior, lower=True)
     whole = linalg.solve_triangular(lower, np.eye(len(lower)), lower=True) @ information @ directions
-    return lower, directions.T @ information @ directions, whole
+    return Along(directions, lower, directions.T @ information @ directions, whole)
 
 
-def without(
-    information: Array, scores: Array, lower: Array, whole: Array, members: Members, directions: Array, change: Array
-) -> Array:
-    """Scores (poses, k) that are left if some poses have a change (m,) along directions (k, m) from the others.
-
-    Args:
-        information, scores: of the poses.
-        lower, whole: see `along`.
-        members: the poses with the change (poses,).
-        directions, change: what changes, and by how much.
-    """
-    others = -linalg.solve_triangular(lower, whole[members].sum(axis=0) @ change, lower=True, trans=1)
-    changes = others + np.outer(members, directions @ change)
-    return scores - (information @ changes[:, :, None])[:, :, 0]
+def without(poses: Once, known: Along, members: Members, change: Array) -> Array:
+    """Scores (poses, k) that are left if some poses (poses,) have a change (m,) along `known` from the others."""
+    moved = known.whole[members].sum(axis=0) @ change
+    others = -linalg.solve_triangular(known.lower, moved, lower=True, trans=1)
+    changes = others + np.outer(members, known.directions @ change)
+    return poses.scores - (poses.information @ changes[:, :, None])[:, :, 0]
 
 
 def disagreement(information: Array, scores: Array) -> float:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from calib.solve.validation.free_shape import FreeShape, Members, along, disagreement, once, without
+from calib.solve.validation.free_shape import Along, FreeShape, Members, along, disagreement, once, without
 from calib.solve.validation.steadiness import HARMLESS, from_middle_px, of_focal, optics
 
 #: Minimum number of distinct poses, as any few fall into two groups, and of those in the smaller group.
@@ -108,21 +108,23 @@ class _Split:
 
 def _split(free: FreeShape, directions: Array) -> _Split:
     """Groups of poses that differ along directions (k, m)."""
-    information, scores = once(free.poses)
-    count = len(scores)
+    poses = once(free.poses)
+    count = len(poses.scores)
     if count < POSES:
         return _Split(0.0, np.zeros(count, np.bool_), np.zeros(directions.shape[1]))
-    lower, own, whole = along(directions, information, free.poses.prior)
-    pulls = scores @ directions
+    known = along(directions, poses.information, free.poses.prior)
+    pulls = poses.scores @ directions
     random = np.random.default_rng(0)
     first = [random.random(count) < share for share in np.resize((0.25, 0.5, 0.75), STARTS)]
-    gain, members, change = max((_grown(guess, own, whole, pulls) for guess in first), key=lambda each: each[0])
-    within = without(information, scores, lower, whole, members, directions, change)
-    gain /= count * disagreement(information, within)
+    best = max((_grown(guess, known, pulls) for guess in first), key=lambda each: each.gain)
+    members, change = best.members, best.change
+    within = without(poses, known, members, change)
+    gain = best.gain / (count * disagreement(poses.information, within))
     is_uneven = False
     if len(change) == 1:
         before, after = (
-            of_focal(information, free.poses.prior, each, directions[:, 0])[0] for each in (scores, within)
+            of_focal(poses.information, free.poses.prior, each, directions[:, 0]).ratio
+            for each in (poses.scores, within)
         )
         is_uneven = after > ALIKE * before
     if 2 * members.sum() > count:
@@ -130,24 +132,25 @@ def _split(free: FreeShape, directions: Array) -> _Split:
     return _Split(gain, members, change, is_uneven)
 
 
-def _grown(members: Members, own: Array, whole: Array, pulls: Array) -> tuple[float, Members, Array]:
-    """Gain [deviations²], poses of a group, and its change (m,), from a first guess; no gain if too few are left.
+def _grown(members: Members, known: Along, pulls: Array) -> _Split:
+    """A group from a first guess (poses,), its gain in squared deviations of all poses; none if too few are left.
 
     Args:
-        members: the guess (poses,).
-        own, whole, pulls: of poses: information (poses, m, m), its root from all (poses, k, m), and pulls (poses, m).
+        members: the guess.
+        known: information of the poses.
+        pulls: their scores along the directions (poses, m).
     """
     gain, change = 0.0, np.zeros(pulls.shape[1])
     for _ in range(STEPS):
-        together = whole[members].sum(axis=0)
-        curvature = own[members].sum(axis=0) - together.T @ together
+        together = known.whole[members].sum(axis=0)
+        curvature = known.own[members].sum(axis=0) - together.T @ together
         if not MIN_MEMBERS <= members.sum() <= len(members) - MIN_MEMBERS or np.linalg.cond(curvature) > CONDITION:
-            return 0.0, members, np.zeros_like(change)
+            return _Split(0.0, members, np.zeros_like(change))
         pull = pulls[members].sum(axis=0)
         change = np.linalg.solve(curvature, pull)
         gain = float(change @ pull)
-        costs = 0.5 * (own @ change) @ change - (whole @ change) @ (together @ change) - pulls @ change
+        costs = 0.5 * (known.own @ change) @ change - (known.whole @ change) @ (together @ change) - pulls @ change
         if np.array_equal(costs < 0, members):
             break
         members = costs < 0
-    return gain, members, change
+    return _Split(gain, members, change)

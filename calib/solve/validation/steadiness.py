@@ -9,6 +9,7 @@ disagree about it more than about everything else.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,8 @@ from calib import pose
 from calib.solve.bundle.parameters.layout import POSE, turned
 from calib.solve.bundle.uncertainty import scaled_inverse
 from calib.solve.solution import Solution
-from calib.solve.validation.free_shape import FreeShape, along, disagreement, once, without
+from calib.solve.validation.free_shape import FreeShape, Once, along, disagreement, once, without
+from calib.solve.validation.support import from_middle
 
 #: Minimum number of distinct poses before and after a change.
 MIN_POSES = 4
@@ -32,6 +34,9 @@ DEVIATIONS = 4.0
 
 #: Probability that noise alone makes one split disagree less.
 CERTAIN = 1 - 1e-5
+
+#: Probability that a change is named, of one that is said to show, and minimum number of poses to say so.
+SHOWN, POSES_TO_SHOW = 0.9, 12
 
 #: Changes below this share of the required accuracy of projections are harmless.
 HARMLESS = 0.5
@@ -72,9 +77,8 @@ def changes_of_optics(free: FreeShape, needed_px: float) -> list[Change]:
     found = []
     for name, directions in optics(free):
         if split := _split(free, directions):
-            shot, values = split
-            shift = rms(values[0] * from_middle(free.solution, name) + values[1:])
-            found.append(Change(name, shot, values, shift))
+            shift = rms(split.values[0] * from_middle(free.solution, name) + split.values[1:])
+            found.append(Change(name, split.shot, split.values, shift))
     return [one for one in found if one.shift_px > HARMLESS * needed_px]
 
 
@@ -85,8 +89,8 @@ def changes_of_place(free: FreeShape, needed_px: float) -> list[Change]:
         if own.moves and not own.free_running:
             directions = np.eye(free.size)[:, layout.columns(name, POSE)]
             if split := _split(free, directions):
-                shot, values = split
-                found.append(Change(name, shot, values, rms(_moved(free.solution, name, values))))
+                shift = rms(_moved(free.solution, name, split.values))
+                found.append(Change(name, split.shot, split.values, shift))
     return [one for one in found if one.shift_px > HARMLESS * needed_px]
 
 
@@ -97,15 +101,48 @@ def focal_scatter(free: FreeShape, needed_px: float) -> dict[str, float]:
         information, scores = once(free.poses)
         if len(scores) < 2 * MIN_POSES:
             continue
-        ratio, deviation = of_focal(information, free.poses.prior, scores, directions[:, 0])
-        harm = deviation * from_middle_px(free.solution, name)
-        if ratio > UNSTEADY and deviation < LARGEST and harm > HARMLESS * needed_px:
-            found[name] = deviation
+        focal = of_focal(information, free.poses.prior, scores, directions[:, 0])
+        harm = focal.deviation * from_middle_px(free.solution, name)
+        if focal.ratio > UNSTEADY and focal.deviation < LARGEST and harm > HARMLESS * needed_px:
+            found[name] = focal.deviation
     return found
 
 
-def of_focal(information: Array, prior: Array, scores: Array, focal: Array) -> tuple[float, float]:
-    """Disagreement of poses about the focal length, a direction (k,), to that about all else, and its deviation [1]."""
+def unseen_change(free: FreeShape) -> dict[str, float]:
+    """Least change of the focal length half way [1] that would have shown, by sensor; infinite with too few poses.
+
+    Of simulated cameras with a dozen poses and more, nine of ten that changed by this much are named.
+    """
+    information, scores = once(free.poses)
+    order = np.argsort(np.unique(free.solution.adjustment.equations.poses, return_index=True)[1])
+    first, found = order[: len(order) // 2], {}
+    for name, directions in optics(free):
+        if len(order) < POSES_TO_SHOW:
+            found[name] = np.inf
+            continue
+        known = along(directions, information, free.poses.prior)
+        together = known.whole[first].sum(axis=0)[:, 0]
+        curvature = float(known.own[first].sum(axis=0)[0, 0] - together @ together)
+        deviations = np.sqrt(_least(free, directions, disagreement(information, scores))) + stats.norm.ppf(SHOWN)
+        found[name] = float(deviations / np.sqrt(max(curvature, 1e-12)))
+    return found
+
+
+def _least(free: FreeShape, directions: Array, left: float) -> float:
+    """Misfit [deviations²] from which on a change along directions (k, m) is named; `left`: see `disagreement`."""
+    certain = free.inflation * stats.chi2.ppf(CERTAIN, directions.shape[1])
+    return max(float(certain), GAIN * len(free.poses.scores) * left)
+
+
+class FocalScatter(NamedTuple):
+    """Disagreement of poses about the focal length, relative to that about all else, and its deviation [1]."""
+
+    ratio: float
+    deviation: float
+
+
+def of_focal(information: Array, prior: Array, scores: Array, focal: Array) -> FocalScatter:
+    """Disagreement of poses about the focal length, a direction (k,)."""
     taken = scaled_inverse(information.sum(axis=0) + prior)
     own = information - information @ taken @ information
     weights = np.maximum(focal @ own @ focal, 1e-12)
@@ -114,7 +151,7 @@ def of_focal(information: Array, prior: Array, scores: Array, focal: Array) -> t
     middle = np.average(estimates, weights=weights)
     excess = float(np.sum(weights * (estimates - middle) ** 2)) - (len(scores) - 1)
     variance = excess / (weights.sum() - float(np.sum(weights**2)) / weights.sum())
-    return ratio, float(np.sqrt(max(variance, 0.0)))
+    return FocalScatter(ratio, float(np.sqrt(max(variance, 0.0))))
 
 
 def optics(free: FreeShape) -> Iterator[tuple[str, Array]]:
@@ -130,22 +167,28 @@ def optics(free: FreeShape) -> Iterator[tuple[str, Array]]:
             yield name, directions
 
 
-def _split(free: FreeShape, directions: Array) -> tuple[int, Array] | None:
-    """First shot after a change along directions (k, m), and its size (m,); None if there is none."""
+class _Found(NamedTuple):
+    """First shot after a change, and its size (m,)."""
+
+    shot: int
+    values: Array
+
+
+def _split(free: FreeShape, directions: Array) -> _Found | None:
+    """Change along directions (k, m); None if there is none."""
     adjustment = free.solution.adjustment
     numbers, first = np.unique(adjustment.equations.poses, return_index=True)
     if len(numbers) < 2 * MIN_POSES:
         return None
     order = np.argsort(first)
-    information, scores = (part[order] for part in once(free.poses))
-    lower, own, whole = along(directions, information, free.poses.prior)
-    pulls = scores @ directions
+    poses = Once(*(part[order] for part in once(free.poses)))
+    known = along(directions, poses.information, free.poses.prior)
+    own, whole, pulls = known.own, known.whole, poses.scores @ directions
     best = _best(own, whole, pulls)
     after = np.arange(len(own)) >= best.first
     is_certain = np.any(np.abs(best.size) > DEVIATIONS * np.sqrt(free.inflation) * best.sigma)
-    least = free.inflation * stats.chi2.ppf(CERTAIN, directions.shape[1])
-    left = disagreement(information, without(information, scores, lower, whole, after, directions, -best.size))
-    if not is_certain or best.misfit < max(least, GAIN * len(own) * left):
+    left = disagreement(poses.information, without(poses, known, after, -best.size))
+    if not is_certain or best.misfit < _least(free, directions, left):
         return None
     unchanged = pulls + after[:, None] * (own @ best.size) - whole.transpose(0, 2, 1) @ whole[after].sum(0) @ best.size
     random, rivals = np.random.default_rng(0), 0
@@ -155,7 +198,7 @@ def _split(free: FreeShape, directions: Array) -> tuple[int, Array] | None:
         rivals += _best(*parts, pulls[shuffled]).misfit >= best.misfit
         if rivals > RIVALS * ORDERS or MARGIN * _best(*parts, unchanged[shuffled]).misfit >= best.misfit:
             return None
-    return int(adjustment.layout.shots[np.sort(first)[best.first]]), best.size
+    return _Found(int(adjustment.layout.shots[np.sort(first)[best.first]]), best.size)
 
 
 @dataclass(frozen=True)
@@ -183,12 +226,6 @@ def _best(own: Array, whole: Array, pulls: Array) -> _Split:
     best = int(np.argmax(squares))
     variances = np.linalg.inv(curvature[best]).diagonal()
     return _Split(float(squares[best]), best + MIN_POSES, sizes[best], np.sqrt(np.maximum(variances, 0)))
-
-
-def from_middle(solution: Solution, name: str) -> Array:
-    """Places of all corners of a sensor relative to its principal point (n, 2) [px]."""
-    pixels = np.concatenate([view.pixels for view in solution.task.corners if view.sensor == name])
-    return pixels - (solution.cameras[name].cx, solution.cameras[name].cy)
 
 
 def from_middle_px(solution: Solution, name: str) -> float:

@@ -1,4 +1,4 @@
-"""Image region supported by corners; outside it the lens is extrapolated."""
+"""Image region supported by corners, and where they are; outside it the lens is extrapolated."""
 
 import cv2
 import numpy as np
@@ -22,3 +22,9 @@ def in_hull(corners: NDArray[np.floating], pixels: NDArray[np.float64]) -> NDArr
     hull = np.asarray(cv2.convexHull(corners.astype(np.float32)), np.float32)
     sides = [cv2.pointPolygonTest(hull, (u, v), False) for u, v in np.nan_to_num(pixels, nan=-1e9).tolist()]
     return np.array(sides) >= 0
+
+
+def from_middle(solution: Solution, name: str) -> NDArray[np.float64]:
+    """Places of all corners of a sensor relative to its principal point (n, 2) [px]."""
+    pixels = np.concatenate([view.pixels for view in solution.task.corners if view.sensor == name])
+    return pixels - (solution.cameras[name].cx, solution.cameras[name].cy)

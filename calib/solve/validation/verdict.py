@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Collection, Mapping, Sequence, Set
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,11 +14,11 @@ from calib.solve.validation.board_shape import ShapeError, shape_errors
 from calib.solve.validation.contradictions import SCATTERS_PX, Contradiction, Scatter, contradictions, outliers, scatter
 from calib.solve.validation.cross_validation import Agreement, TooFewToSplitError, cross_validate
 from calib.solve.validation.distance_errors import distance_errors
-from calib.solve.validation.free_shape import free_shape
+from calib.solve.validation.free_shape import FreeShape, free_shape
 from calib.solve.validation.groups import groups
 from calib.solve.validation.other_lens import other_lenses, undescribed
 from calib.solve.validation.projection_uncertainty import UncertaintyMap
-from calib.solve.validation.steadiness import changes_of_optics, changes_of_place, focal_scatter
+from calib.solve.validation.steadiness import changes_of_optics, changes_of_place, focal_scatter, unseen_change
 from calib.solve.validation.weak_directions import weak_directions
 
 #: Largest ratio of observed to predicted difference of the halves; exceeded by chance in about 1 % of the cases.
@@ -84,8 +85,9 @@ def assess(
         for target in solution.task.sensors
         if target != source
     }
-    shape = shape_errors(solution, distance, needed_px)
-    reasons, contradicting, cause = _unlike(solution, shape, needed_px)
+    shape, free = shape_errors(solution, distance, needed_px), free_shape(solution)
+    unlike = _unlike(free, shape, needed_px)
+    reasons, contradicting = [*unlike.reasons], unlike.contradicting
     reasons += exchanged(solution.cameras)
     reasons += weak_directions(solution, distance)
     reasons += outliers(solution, {one.shot for one in contradicting})
@@ -100,20 +102,26 @@ def assess(
     reasons += _uncertain(known, needed_px)
     reasons += _narrow(solution, images)
     reasons += [str(one) for one in shape if not one.is_misprint]  # why the halves may differ
-    reasons = [*other_lenses(solution), *cause, *reasons] if reasons else []
+    reasons = [*other_lenses(solution), *unlike.causes, *reasons] if reasons else []
     kept = [name for name, sensor in solution.task.sensors.items() if sensor.fixed_intrinsics]
-    praise = _praise(agreements, images, known, distance) + _given(kept)
+    praise = _praise(agreements, images, known, distance) + changes.unseen(unseen_change(free)) + _given(kept)
     verdict = f"Do not trust it yet: {reasons[0]}" if reasons else praise
     return Assessment(not reasons, verdict, reasons, contradicting, agreements, images, pairs, distance)
 
 
-def _unlike(
-    solution: Solution, shape: Sequence[ShapeError], needed_px: float
-) -> tuple[list[str], list[Contradiction], list[str]]:
+class _Unlike(NamedTuple):
     """Reasons to doubt that all shots show one board and one rig, shots that contradict, and likely causes."""
+
+    reasons: Sequence[str]
+    contradicting: Sequence[Contradiction]
+    causes: Sequence[str]
+
+
+def _unlike(free: FreeShape, shape: Sequence[ShapeError], needed_px: float) -> _Unlike:
+    """Looks whether all shots show one board and one rig."""
+    solution = free.solution
     if wrong := distance_errors(solution, needed_px):
-        return [*map(str, wrong)], [], []  # they pull everything else along
-    free = free_shape(solution)
+        return _Unlike([*map(str, wrong)], [], [])  # they pull everything else along
     moved = changes_of_place(free, needed_px)
     # What happened to a sensor looks as if its image changed, and a wrong board as if every shot had another lens.
     changed = [] if moved else changes_of_optics(free, needed_px)
@@ -133,7 +141,7 @@ def _unlike(
     reasons += [*misprinted, *map(str, mixed), *(changes.of_focus(*each) for each in focus.items())]
     reasons += [*map(str, scattered), *_contradicting(contradicting)]
     reasons += [changes.unexplained(one) for one, is_so in zip(changed, confirmed) if not is_so]
-    return reasons, contradicting, [*map(str, cause)]
+    return _Unlike(reasons, contradicting, [*map(str, cause)])
 
 
 def _excess(of: str, agreements: Sequence[Agreement]) -> float:

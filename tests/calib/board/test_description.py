@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
+from calib import pose
 from calib.board.corners.description import mismatch
 from calib.board.corners.detection import detect
 from calib.board.corners.errors import NothingFoundError, OtherBoardError
@@ -26,6 +27,18 @@ def grid() -> np.ndarray:
 def test_a_grid_with_other_columns_is_refused(grid: np.ndarray, described: AprilGrid) -> None:
     with pytest.raises(OtherBoardError, match=f"not stand as on a board of {described.columns} × {described.rows}"):
         detect(described, grid)
+
+
+@pytest.mark.parametrize("described", [AprilGrid(5, 6, 0.03, 0.009), AprilGrid(7, 5, 0.03, 0.009)])
+def test_a_grid_with_other_columns_is_refused_if_no_tag_has_a_neighbour(grid: np.ndarray, described: AprilGrid) -> None:
+    """Such an image was taken, with corners in the wrong places."""
+    corners = VGA.project(pose.transform(centered(GRID, (0.2, 0.1, 0.3), 0.42), GRID.points()))
+    covered = grid.copy()
+    for number in {*range(30)} - {0, 2, 4, 12, 14, 16, 24, 26, 28}:
+        cv2.fillConvexPoly(covered, np.rint(corners[GRID.ids_of_tag(number)]).astype(np.int32), 120)
+    assert len(detect(GRID, covered).ids) > 24
+    with pytest.raises(OtherBoardError, match=f"not stand as on a board of {described.columns} × {described.rows}"):
+        detect(described, covered)
 
 
 def test_a_grid_with_other_gaps_is_refused_with_both(grid: np.ndarray) -> None:
@@ -108,7 +121,13 @@ def test_single_markers_are_not_taken_for_a_charuco(name: str, tags: str) -> Non
     [
         ("DICT_5X5_100", 0, 2, "5x5_100", "shows markers with a black frame of 2 cells; a ChArUco has 1 here"),
         ("DICT_4X4_1000", 500, 1, "4x4_50", "markers of the dictionary 4x4_1000, the description says 4x4_50"),
-        ("DICT_5X5_100", 30, 1, "5x5_50", "markers with ids from 30 to 46, a board of 7 × 5 has 0 to 16"),
+        (
+            "DICT_5X5_100",
+            30,
+            1,
+            "5x5_50",
+            "markers with ids from 30 to 46, a board of 7 × 5 has 0 to 16: is first_id right?",
+        ),
         ("DICT_ARUCO_MIP_36h12", 0, 1, "5x5_50", "the dictionary mip_36h12, the description says 5x5_50"),
         ("DICT_ARUCO_MIP_36h12", 0, 1, "mip_36h12", ""),
     ],
@@ -146,3 +165,26 @@ def test_discs_in_shifted_rows_are_no_regular_grid() -> None:
     image = as_bytes(photograph(board, VGA, centered(board, (0.2, 0.1, 1.5), 0.25)))
     assert other_discs(Circles(4, 11, 0.015, 0.012), image) == "shows an asymmetric grid of 4 × 11 discs"
     assert other_discs(board, 255 - image) == "shows white discs on black instead of black ones on white"
+
+
+@pytest.mark.parametrize(("columns", "rows"), [(7, 5), (8, 6)])
+def test_a_charuco_whose_markers_begin_with_another_number_has_a_key(columns: int, rows: int) -> None:
+    """As OpenCV prints and finds the second of several boards."""
+    described = Charuco(columns, rows, 0.03, 0.022, "5x5_100", first_id=30)
+    ids = np.arange(30, 30 + columns * rows // 2)
+    printed = cv2.aruco.CharucoBoard((columns, rows), 0.03, 0.022, described.markers(), ids)
+    image = grey(printed.generateImage((100 * columns, 100 * rows)))
+    found = detect(described, image)
+    corners, numbers, _, _ = cv2.aruco.CharucoDetector(printed).detectBoard(image)
+    assert found.ids.tolist() == numbers.ravel().tolist() == [*range((columns - 1) * (rows - 1))]
+    assert np.abs(found.pixels - corners.reshape(-1, 2)).max() < 0.3
+    assert mismatch(described, image) == ""
+    assert "is first_id right?" in mismatch(replace(described, first_id=0), image)
+    assert "is first_id right?" in mismatch(replace(described, first_id=40), image)
+    drawn = as_bytes(photograph(described, VGA, centered(described, (0.2, 0.1, 0.3), 0.42)))
+    assert len(detect(described, drawn).ids) > 0.9 * len(found.ids)
+
+
+def test_a_first_number_beyond_the_dictionary_is_refused() -> None:
+    with pytest.raises(ValueError, match="first_id: 90 must be from 0 to 83, as 5x5_100 has 100 markers"):
+        Charuco(7, 5, 0.03, 0.022, "5x5_100", first_id=90)

@@ -7,7 +7,7 @@ import pytest
 from calib import pose
 from calib.board.corners import errors
 from calib.board.corners.detection import detect
-from calib.board.target import Charuco, Chessboard, Target
+from calib.board.target import AprilGrid, Charuco, Chessboard, Target
 from tests.calib.board.boards import VGA, as_bytes, centered, photograph
 
 BOARDS = [Chessboard(9, 6, 0.03), Charuco(10, 7, 0.03, 0.0225, "4x4_100")]
@@ -32,3 +32,14 @@ def test_a_hidden_corner_is_left_out_and_not_guessed(target: Target, hidden: int
         assert hidden not in found.ids
         assert len(found.ids) > 0.8 * len(corners)
         assert np.abs(found.pixels - corners[found.ids]).max() < 0.2
+
+
+@pytest.mark.parametrize("target", [AprilGrid(6, 5, 0.03, 0.009), BOARDS[1]], ids=repr)
+@pytest.mark.parametrize("up", [0.0075, 0.015, 0.0325, 0.045])
+def test_a_board_seen_in_part_has_no_corners_at_the_border(target: Target, up: float) -> None:
+    """A corner 2 px from the border was up to 5 px outside the image, or the whole image refused."""
+    T_sb = centered(target, (0.3, -0.2, 0.1), 0.25)
+    T_sb[1, 3] -= up
+    found = detect(target, as_bytes(photograph(target, VGA, T_sb)))
+    corners = VGA.project(pose.transform(T_sb, target.points()))
+    assert np.abs(found.pixels - corners[found.ids]).max() < 0.1

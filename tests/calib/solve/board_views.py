@@ -58,14 +58,20 @@ def three_heads() -> dict[str, Head]:
     }
 
 
-def random_boards(count: int, random: np.random.Generator, near: float = 0.6, far: float = 1.6) -> dict[int, Pose]:
+def random_boards(
+    count: int,
+    random: np.random.Generator,
+    near: float = 0.6,
+    far: float = 1.6,
+    tilt: tuple[float, float] = (0.15, 0.8),
+) -> dict[int, Pose]:
     """Boards by number of the shot, all over the images of `three_heads`, tilted by up to 45 degrees."""
     boards = {}
     for shot in range(count):
         axis = random.uniform(0, 2 * np.pi)
-        tilt = random.uniform(0.15, 0.8)
+        angle = random.uniform(*tilt)
         spin = pose.from_rotation_vector((0, 0, random.uniform(-0.4, 0.4)), np.zeros(3))
-        turn = pose.from_rotation_vector((tilt * np.cos(axis), tilt * np.sin(axis), 0), np.zeros(3)) @ spin
+        turn = pose.from_rotation_vector((angle * np.cos(axis), angle * np.sin(axis), 0), np.zeros(3)) @ spin
         z = random.uniform(near, far)
         middle = turn[:3, :3] @ board_points().mean(axis=0)
         turn[:3, 3] = (random.uniform(-0.45, 0.45) * z, random.uniform(-0.32, 0.32) * z, z) - middle

@@ -18,11 +18,11 @@ from tests.calib.solve import board_views
 
 
 @cache
-def solved(stretch: float = 1.0, bend: float = 0.0) -> Solution:
-    """Solution from images of a board whose rows are longer, or whose left and right edges are bent back [m]."""
+def solved(stretch: float = 1.0, bend: float = 0.0, power: int = 2) -> Solution:
+    """Solution from images of a board whose rows are longer, or whose edges are bent back, odd powers: one forward."""
     points_b = board_views.board_points()
     made = points_b * (stretch, 1, 1)
-    made[:, 2] = bend * (points_b[:, 0] / 0.16 - 1) ** 2
+    made[:, 2] = bend * (points_b[:, 0] / 0.16 - 1) ** power
     return photographed(points_b, made)
 
 
@@ -79,6 +79,14 @@ def test_a_bent_board_is_named_with_its_size() -> None:
     assert found.shape == Shape.BEND
     assert abs(found.size) == pytest.approx(2, rel=0.35)
     assert any(reason.startswith("a board that is bent by ") for reason in assess(solved(bend=0.002), 1.0, 1.0).reasons)
+
+
+def test_a_board_that_is_bent_to_both_sides_is_named_with_its_size() -> None:
+    """On a fisheye, projections were 1.1 px off where 0.56 px were promised."""
+    (found,) = shape_errors(solved(bend=0.003, power=3), 1.0, 1.0)
+    assert found.shape == Shape.BEND
+    assert abs(found.size) == pytest.approx(3, rel=0.35)
+    assert not assess(solved(bend=0.003, power=3), 1.0, 1.0).trusted
 
 
 def test_halves_that_differ_beyond_chance_say_how_well_projections_are_known() -> None:

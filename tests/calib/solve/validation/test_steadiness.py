@@ -13,7 +13,7 @@ from calib.solve.bundle.tasks import SensorTask, Task
 from calib.solve.calibrate import calibrate
 from calib.solve.solution import Solution
 from calib.solve.validation.free_shape import free_shape
-from calib.solve.validation.steadiness import changes_of_optics, changes_of_place, focal_scatter
+from calib.solve.validation.steadiness import changes_of_optics, changes_of_place, focal_scatter, unseen_change
 from calib.solve.validation.verdict import assess
 from tests.calib.solve import board_views
 
@@ -54,6 +54,28 @@ def test_a_camera_that_focuses_half_way_is_named_with_the_shot() -> None:
     verdict = assess(solution, 1.0, 1.0).verdict
     expected = f"Do not trust it yet: color: projects otherwise from about shot {found.shot} on: focal length by -1."
     assert verdict.startswith(expected)
+
+
+@pytest.mark.parametrize("larger_later", [False, True])
+def test_a_change_of_the_size_that_is_said_to_show_is_named(larger_later: bool) -> None:
+    """A zoom by 3 % half way was trusted without a word, if boards had little tilt."""
+    free = free_shape(solved(views()))
+    least = unseen_change(free)["color"]
+    assert 0.003 < least < 0.03
+    assert (
+        f" A change of its focal length half way of less than {least:.1%} would" in assess(free.solution, 1, 1).verdict
+    )
+    changed = free_shape(solved(zoomed(lambda shot: 1 - least * ((shot < 12) == larger_later))))
+    assert len(changes_of_optics(changed, 1.0)) == 1
+
+
+def test_without_tilt_and_with_few_poses_larger_changes_do_not_show() -> None:
+    generator = np.random.default_rng(3)
+    boards = board_views.random_boards(24, generator, tilt=(0.05, 0.3))
+    head = board_views.Head(replace(HEADS["color"].camera, T_rs=np.eye(4)), 0.1)
+    flat = board_views.look({"color": head}, boards, generator).corners
+    least = [unseen_change(free_shape(solved(seen)))["color"] for seen in (views(), flat, views()[:11])]
+    assert 2 * least[0] < least[1] < least[2] == np.inf
 
 
 def test_an_image_that_is_shifted_by_a_stabiliser_half_way_is_named() -> None:
