@@ -37,7 +37,8 @@ WALL_CLOCK_S, WALL_CLOCK = 2**32, "zenoh needs one between 1970 and 2106; set it
 #: A larger message is refused before it is put together: an image of `message_check.LARGEST_IMAGE` and its attachment.
 LARGEST_MESSAGE_BYTES = LARGEST_IMAGE + (1 << 20)
 
-_ENDPOINT = re.compile(r"(tcp|tls|quic|udp|ws)/(\[[0-9a-fA-F:.]+\]|[^\s:/?#\[\]]+):(?P<port>\d{1,5})([?#]\S*)?")
+#: Without zenoh's ?…, which is for several links between two programs: a mistake in it keeps everybody out, or panics.
+_ENDPOINT = re.compile(r"(tcp|tls|quic|udp|ws)/(\[[0-9a-fA-F:.]+\]|[^\s:/?#\[\]]+):(?P<port>\d{1,5})(#\S+)?")
 
 
 #: Lowest levels of zenoh's log, which has refused clients as warnings.
@@ -107,9 +108,15 @@ def open_session(
 
 
 def is_endpoint(text: str) -> bool:
-    """True for PROTOCOL/HOST:PORT."""
+    """True for PROTOCOL/HOST:PORT, and #… as zenoh can read it."""
     match = _ENDPOINT.fullmatch(text)
-    return match is not None and 1 <= int(match["port"]) <= 65535
+    if match is None or not 1 <= int(match["port"]) <= 65535:
+        return False
+    try:
+        zenoh.Config().insert_json5("connect/endpoints", json.dumps([text]))
+    except zenoh.ZError:
+        return False
+    return True
 
 
 def check_endpoint(endpoint: str, security: NoSecurity | MutualTls = NO_SECURITY, key: str = "bus.endpoint") -> str:
@@ -121,7 +128,7 @@ def check_endpoint(endpoint: str, security: NoSecurity | MutualTls = NO_SECURITY
     if not is_endpoint(endpoint):
         raise BusError(
             f'{key} = "{endpoint}": not an endpoint; write PROTOCOL/HOST:PORT with protocol tcp, tls, quic, udp '
-            "or ws and a port from 1 to 65535, such as tcp/127.0.0.1:7447"
+            "or ws and a port from 1 to 65535, such as tcp/127.0.0.1:7447, without ?…"
         )
     if security.link and not endpoint.startswith("tls/"):
         raise BusError(f'{key} = "{endpoint}": must begin with tls/, because there is a table [bus.tls]')

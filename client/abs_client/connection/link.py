@@ -28,7 +28,7 @@ WAITING = 4
 END_S = 2.0
 
 _LIVE = "live/track/"
-_ENDPOINT = re.compile(r"(tcp|tls|quic|udp|ws)/.+:\d{1,5}([?#]\S*)?")
+_ENDPOINT = re.compile(r"(tcp|tls|quic|udp|ws)/[^?#]+:\d{1,5}(#\S+)?")
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
 
 
