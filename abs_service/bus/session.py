@@ -4,6 +4,7 @@ import json
 import logging
 import os
 import re
+import resource
 import sys
 import time
 from collections.abc import Sequence
@@ -162,6 +163,15 @@ def pool_bytes() -> int:
     return own_size(min(SHARED_MEMORY_POOL_BYTES, free // SHARED_MEMORY_POOLS))
 
 
+def _accept() -> dict[str, int]:
+    """Bounds of the connections that have begun and not said yet who they are.
+
+    By default, a hundred that say nothing keep everybody else out for 10 s.
+    """
+    files, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
+    return {"accept_pending": files // 4, "accept_timeout": connection.UNICAST["open_timeout"]}
+
+
 def _settings(
     endpoint: str,
     mode: SessionMode,
@@ -184,7 +194,7 @@ def _settings(
         "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}, "delay": 0},
         "timestamping": {"enabled": True},  # what caches of late joiners are ordered by
         "transport": {
-            "unicast": {**connection.UNICAST},
+            "unicast": {**connection.UNICAST, **_accept()},
             "link": {
                 "tx": {"lease": connection.LEASE_MS, "queue": connection.QUEUE},
                 "rx": {"max_message_size": LARGEST_MESSAGE_BYTES},
