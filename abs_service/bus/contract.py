@@ -45,12 +45,14 @@ class Sample:
         message: full name of its protobuf type, "" if the publisher gave none.
         payload: the message.
         attachment: bytes sent along with it; b"" if there are none.
+        overwritten: whether the message was lost as it was read: another one was in its shared memory already.
     """
 
     topic: str
     message: str
     payload: bytes
     attachment: bytes = b""
+    overwritten: bool = False
 
     @property
     def size(self) -> int:

@@ -4,6 +4,7 @@ import json
 import logging
 import os
 import re
+import resource
 import sys
 import time
 from collections.abc import Sequence
@@ -37,7 +38,8 @@ WALL_CLOCK_S, WALL_CLOCK = 2**32, "zenoh needs one between 1970 and 2106; set it
 #: A larger message is refused before it is put together: an image of `message_check.LARGEST_IMAGE` and its attachment.
 LARGEST_MESSAGE_BYTES = LARGEST_IMAGE + (1 << 20)
 
-_ENDPOINT = re.compile(r"(tcp|tls|quic|udp|ws)/(\[[0-9a-fA-F:.]+\]|[^\s:/?#\[\]]+):(?P<port>\d{1,5})([?#]\S*)?")
+#: Without zenoh's ?…, which is for several links between two programs: a mistake in it keeps everybody out, or panics.
+_ENDPOINT = re.compile(r"(tcp|tls|quic|udp|ws)/(\[[0-9a-fA-F:.]+\]|[^\s:/?#\[\]]+):(?P<port>\d{1,5})(#\S+)?")
 
 
 #: Lowest levels of zenoh's log, which has refused clients as warnings.
@@ -107,9 +109,15 @@ def open_session(
 
 
 def is_endpoint(text: str) -> bool:
-    """True for PROTOCOL/HOST:PORT."""
+    """True for PROTOCOL/HOST:PORT, and #… as zenoh can read it."""
     match = _ENDPOINT.fullmatch(text)
-    return match is not None and 1 <= int(match["port"]) <= 65535
+    if match is None or not 1 <= int(match["port"]) <= 65535:
+        return False
+    try:
+        zenoh.Config().insert_json5("connect/endpoints", json.dumps([text]))
+    except zenoh.ZError:
+        return False
+    return True
 
 
 def check_endpoint(endpoint: str, security: NoSecurity | MutualTls = NO_SECURITY, key: str = "bus.endpoint") -> str:
@@ -121,7 +129,7 @@ def check_endpoint(endpoint: str, security: NoSecurity | MutualTls = NO_SECURITY
     if not is_endpoint(endpoint):
         raise BusError(
             f'{key} = "{endpoint}": not an endpoint; write PROTOCOL/HOST:PORT with protocol tcp, tls, quic, udp '
-            "or ws and a port from 1 to 65535, such as tcp/127.0.0.1:7447"
+            "or ws and a port from 1 to 65535, such as tcp/127.0.0.1:7447, without ?…"
         )
     if security.link and not endpoint.startswith("tls/"):
         raise BusError(f'{key} = "{endpoint}": must begin with tls/, because there is a table [bus.tls]')
@@ -155,6 +163,15 @@ def pool_bytes() -> int:
     return own_size(min(SHARED_MEMORY_POOL_BYTES, free // SHARED_MEMORY_POOLS))
 
 
+def _accept() -> dict[str, int]:
+    """Bounds of the connections that have begun and not said yet who they are.
+
+    By default, a hundred that say nothing keep everybody else out for 10 s.
+    """
+    files, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
+    return {"accept_pending": files // 4, "accept_timeout": connection.UNICAST["open_timeout"]}
+
+
 def _settings(
     endpoint: str,
     mode: SessionMode,
@@ -177,7 +194,7 @@ def _settings(
         "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}, "delay": 0},
         "timestamping": {"enabled": True},  # what caches of late joiners are ordered by
         "transport": {
-            "unicast": {**connection.UNICAST},
+            "unicast": {**connection.UNICAST, **_accept()},
             "link": {
                 "tx": {"lease": connection.LEASE_MS, "queue": connection.QUEUE},
                 "rx": {"max_message_size": LARGEST_MESSAGE_BYTES},

@@ -15,6 +15,7 @@ from abs_service.bus.security import link_log
 from abs_service.bus.security.mutual_tls import NO_SECURITY, MutualTls, NoSecurity
 from abs_service.bus.session import SessionMode, open_session
 from drivers.zenoh_session.callbacks import from_non_daemon_thread
+from drivers.zenoh_session.shared_memory import copied
 
 _log = logging.getLogger(__name__)
 
@@ -177,12 +178,13 @@ class ZenohBus:
         return keys.key(self._rig, topic)
 
     def _sample(self, sample: zenoh.Sample) -> Sample:
-        attachment = sample.attachment
+        payload, attachment = copied(sample.payload), sample.attachment
         return Sample(
             keys.topic(self._rig, str(sample.key_expr)),
             _message(sample.encoding),
-            sample.payload.to_bytes(),
+            payload or b"",
             b"" if attachment is None else attachment.to_bytes(),
+            overwritten=payload is None,
         )
 
 

@@ -63,8 +63,8 @@ class Edge:
         """Messages that were refused, by cause.
 
         Causes: `topic` that is none of ours, unknown `type`, too many `topics`, too high a `rate`, `size`, `malformed`
-        bytes, `text` that cannot be printed, `number` that is not finite, `range` of a number, `content` that does not
-        fit together or not to the topic.
+        bytes, `overwritten` before they were read, `text` that cannot be printed, `number` that is not finite, `range`
+        of a number, `content` that does not fit together or not to the topic.
         """
         with self._lock:
             return dict(self._refused)
@@ -111,6 +111,10 @@ def check_sample(sample: Sample) -> None:
     Raises:
         MessageError: names the field and the error.
     """
+    if sample.overwritten:
+        raise MessageError(
+            "overwritten", "another message was in its memory before it was read: this process stood still"
+        )
     if sample.message not in SCHEMAS:
         raise MessageError("type", f"{sample.message[:100]!r} is none of {sorted(SCHEMAS)}")
     schema = SCHEMAS[sample.message]

@@ -49,7 +49,8 @@ class Link:
 
         def on_sample(sample: zenoh.Sample) -> None:
             attachment = b"" if sample.attachment is None else sample.attachment.to_bytes()
-            on_message(str(sample.key_expr).removeprefix(prefix), sample.payload.to_bytes(), attachment)
+            payload = shared_memory.copied(sample.payload) or b""  # which is no message of a rig: it is counted
+            on_message(str(sample.key_expr).removeprefix(prefix), payload, attachment)
 
         self._keep(lambda: self._session.declare_subscriber(prefix + pattern, on_sample))
 

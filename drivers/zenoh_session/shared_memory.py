@@ -5,6 +5,8 @@ import resource
 from contextlib import suppress
 from pathlib import Path
 
+import zenoh
+
 FOLDER = Path("/dev/shm")
 PROCESS = Path("/proc/self")
 #: Eight pools of a large rig, at 32 MB and what `abs_service.bus.pools` adds [bytes].
@@ -20,6 +22,16 @@ def free_bytes() -> int:
     except OSError:
         return 0
     return 0 if status.f_flag & os.ST_RDONLY else status.f_bavail * status.f_frsize
+
+
+def copied(payload: zenoh.ZBytes) -> bytes | None:
+    """The bytes of a received message; None if their memory was given to another message before they were copied.
+
+    zenoh takes shared memory back whose reader has not stirred for 100 ms, stopped or starved, and does not look at it
+    again when the reader goes on: its bytes may be of both messages.
+    """
+    copy, shared = payload.to_bytes(), payload.as_shm()
+    return copy if shared is None or shared.is_valid() else None
 
 
 def may_be_locked() -> bool:

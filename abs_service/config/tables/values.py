@@ -29,7 +29,7 @@ URI = re.compile(r"[a-z][a-z0-9_]*:\S+")
 
 def _endpoint(value: str) -> str:
     if not is_endpoint(value):
-        raise ValueError('an endpoint is protocol/address:port, for example "tcp/127.0.0.1:7447"')
+        raise ValueError('an endpoint is protocol/address:port, for example "tcp/127.0.0.1:7447", without ?…')
     return value
 
 

@@ -11,6 +11,7 @@ from typing import Any, Self
 
 import zenoh
 
+from abs_client.connection import shared_memory
 from abs_client.connection.received import Received
 from abs_client.connection.session import opened
 from abs_client.connection.tls import Tls
@@ -27,7 +28,7 @@ WAITING = 4
 END_S = 2.0
 
 _LIVE = "live/track/"
-_ENDPOINT = re.compile(r"(tcp|tls|quic|udp|ws)/.+:\d{1,5}([?#]\S*)?")
+_ENDPOINT = re.compile(r"(tcp|tls|quic|udp|ws)/[^?#]+:\d{1,5}(#\S+)?")
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
 
 
@@ -172,32 +173,34 @@ def _undeclare(subscriber: Any) -> None:
         subscriber.undeclare()
 
 
-def _receive(subscriber: Any, on_message: Callable[[Received], None]) -> None:
+def _receive(subscriber: Any, on_sample: Callable[[zenoh.Sample], None]) -> None:
     with suppress(zenoh.ZError):  # the session has ended
         for sample in subscriber:
-            on_message(_received(sample))
+            on_sample(sample)
 
 
-def _receive_answers(ask: Callable[[], Any], on_message: Callable[[Received], None]) -> None:
+def _receive_answers(ask: Callable[[], Any], on_sample: Callable[[zenoh.Sample], None]) -> None:
     with suppress(zenoh.ZError):
         for answer in ask():
             if answer.ok is not None:
-                on_message(_received(answer.ok))
+                on_sample(answer.ok)
 
 
 def _take(
-    on_message: Callable[[Received], None], malformed: Counter[str], lock: threading.RLock, one: Received
+    on_message: Callable[[Received], None], malformed: Counter[str], lock: threading.RLock, one: zenoh.Sample
 ) -> None:
     try:
-        on_message(one)
+        on_message(_received(one))
     except MalformedError:
         with lock:
-            malformed[one.key] += 1
+            malformed[str(one.key_expr)] += 1
 
 
 def _received(sample: zenoh.Sample) -> Received:
-    attachment = sample.attachment
-    return Received(str(sample.key_expr), sample.payload.to_bytes(), attachment.to_bytes() if attachment else b"")
+    payload, attachment, key = shared_memory.copied(sample.payload), sample.attachment, str(sample.key_expr)
+    if payload is None:
+        raise MalformedError(f"{key}: another message was in its memory before it was read")
+    return Received(key, payload, attachment.to_bytes() if attachment else b"")
 
 
 def _end(session: zenoh.Session, lock: threading.RLock, threads: list[threading.Thread]) -> None:

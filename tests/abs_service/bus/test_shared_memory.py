@@ -5,15 +5,18 @@ import os
 import resource
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 import zenoh
 
-from abs_service.bus import session
+from abs_service.bus import session, zenoh_bus
+from abs_service.bus.contract import IMAGES
 from drivers.remote.address import Address
 from drivers.remote.link import open_link
 from drivers.zenoh_session import shared_memory
 from drivers.zenoh_session.shared_memory import may_be_locked
+from tests.waiting import eventually, repeating
 
 MB = 1 << 20
 
@@ -74,6 +77,30 @@ def test_where_memory_may_not_be_locked_there_is_no_pool(monkeypatch):
 def test_without_shared_memory_there_is_no_pool(monkeypatch):
     monkeypatch.setattr(shared_memory, "FOLDER", Path("/nowhere"))
     assert session.pool_bytes() == 0
+
+
+@pytest.mark.parametrize(
+    ("shared", "copy"),
+    [
+        (None, b"sent"),
+        (SimpleNamespace(is_valid=lambda: True), b"sent"),
+        (SimpleNamespace(is_valid=lambda: False), None),
+    ],
+    ids=["sockets", "shared", "given away"],
+)
+def test_what_was_overwritten_before_it_was_copied_is_no_message(shared, copy):
+    payload: Any = SimpleNamespace(to_bytes=lambda: b"sent", as_shm=lambda: shared)
+    assert shared_memory.copied(payload) == copy
+
+
+def test_a_bus_passes_no_byte_on_of_what_was_overwritten(open_bus, monkeypatch):
+    monkeypatch.setattr(zenoh_bus, "copied", lambda payload: None)
+    arrived = []
+    open_bus().subscribe("tof/depth/image", arrived.append)
+    publisher = open_bus().publisher("tof/depth/image", "foxglove.RawImage", IMAGES)
+    with repeating(lambda: publisher.put(b"pixels"), 0.01):
+        assert eventually(lambda: arrived)
+    assert (arrived[0].payload, arrived[0].overwritten) == (b"", True)
 
 
 def test_a_rig_elsewhere_is_connected_to_without_shared_memory(monkeypatch):

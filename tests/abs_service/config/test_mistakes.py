@@ -51,6 +51,7 @@ CASES = {
         "record.compression = \"gzip\": must be 'none', 'lz4' or 'zstd'",
     ),
     "an endpoint without a port": ('[bus]\nendpoint = "tcp/here"\n', "an endpoint is protocol/address:port"),
+    "an endpoint with priorities": ('[bus]\nendpoint = "tcp/127.0.0.1:7447?prio=0-99"\n', "without ?"),
     "mutual TLS on an endpoint without": (
         '[bus.tls]\nauthority = "a"\ncertificate = "b"\nkey = "c"\n',
         "must begin with tls/, because there is a table [bus.tls]",

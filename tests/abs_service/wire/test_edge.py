@@ -123,6 +123,7 @@ def test_no_text_or_number_of_the_golden_messages_is_refused(name):
         (image(changed(INFO, scale=math.nan)), "number", "scale"),
         (image(width=2**20), "range", "RawImage.width"),
         (Sample("tof/depth/image", "foxglove.RawImage", b"\x08\x01" * 200), "malformed", "more than 100 fields"),
+        (Sample("schema", sensor_metadata.SCHEMA_MESSAGE, b"", overwritten=True), "overwritten", "stood still"),
     ],
 )
 def test_what_no_rig_sends_is_counted_by_its_cause(bad, cause, reason):

@@ -1,16 +1,15 @@
-"""Subscribers that stand still, as after SIGSTOP, keep nobody else from the router, however long they do."""
+"""Programs that stand still, as after SIGSTOP, or say nothing, keep nobody else from the router."""
 
 import signal
+import socket
 import subprocess
 import sys
 import time
-from contextlib import closing
+from contextlib import ExitStack, closing
 
 import pytest
 
 from abs_service.bus.session import SessionMode, open_session
-
-pytestmark = [pytest.mark.slow, pytest.mark.realtime]
 
 PEERS, SECONDS = 40, 25  # longer than the lease of 10 s that zenoh has by default, and than it would wait for a socket
 ROUTER = """
@@ -31,6 +30,8 @@ time.sleep(60)
 """
 
 
+@pytest.mark.slow
+@pytest.mark.realtime
 def test_forty_stopped_subscribers_keep_nobody_from_the_router(endpoint):
     processes = []
     try:
@@ -57,6 +58,15 @@ def test_forty_stopped_subscribers_keep_nobody_from_the_router(endpoint):
         for process in processes:
             process.kill()
             process.communicate()
+
+
+def test_a_hundred_connections_that_say_nothing_keep_nobody_from_the_router(open_bus, endpoint):
+    open_bus()
+    host, _, port = endpoint.removeprefix("tcp/").partition(":")
+    with ExitStack() as stack:
+        for _ in range(120):  # zenoh lets a hundred of them wait, for 10 s
+            stack.enter_context(socket.create_connection((host, int(port))))
+        client(endpoint).close()
 
 
 def client(endpoint):
