@@ -65,8 +65,9 @@ class FarListener(RigListener):
     def _take_lines(self):
         with self._lines:
             for line in self._lines:
-                t_ns, topic, message, *binary = json.loads(line)
-                self.received.append(Received(t_ns, Sample(topic, message, *map(base64.b64decode, binary))))
+                t_ns, topic, message, payload, attachment = json.loads(line)
+                sample = Sample(topic, message, base64.b64decode(payload), base64.b64decode(attachment))
+                self.received.append(Received(t_ns, sample))
 
 
 class FarHosts:
