@@ -87,7 +87,7 @@ def free_shape(solution: Solution) -> FreeShape:
 
 
 class Once(NamedTuple):
-    """What poses say if every distinct one had been seen once.
+    """Information of the poses as if every distinct one had been seen once.
 
     Attributes:
         information: of poses (poses, k, k).
