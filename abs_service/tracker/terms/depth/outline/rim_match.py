@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from abs_service.tracker.terms.depth.outline.rim import Look
 from abs_service.tracker.terms.depth.outline.rim_motion import MIN_EXPLAINED, MIN_OF_A_SIDE, MIN_SHOWN, shown_by
 from abs_service.tracker.terms.median import median
+from abs_service.tracker.terms.patches import NEAR_PX
 
 #: Number of steps of the registration.
 STEPS = 12
@@ -38,18 +39,18 @@ def shift_to_outline(look: Look, places: NDArray[np.float64], directions: NDArra
         directions: out of the mesh, in the image (k, 2).
     """
     still = np.zeros_like(places)
-    if len(places) < MIN_OF_A_SIDE:
+    values, facing = _read(look, places, directions)
+    if np.count_nonzero(np.abs(values[facing]) >= NEAR_PX) < MIN_OF_A_SIDE:
         return still
     arms = places - places.mean(axis=0)
     arms /= max(float(np.sqrt(np.mean(arms**2) * 2)), np.finfo(float).tiny)
     moved, shift = np.zeros(3), still
     for _ in range(STEPS):
-        values, facing = _read(look, places + shift, directions)
         if np.count_nonzero(facing) < MIN_OF_A_SIDE:
             return still
         moved = moved + _step(values[facing], directions[facing], arms[facing])
         shift = moved[:2] + moved[2] * np.stack([-arms[:, 1], arms[:, 0]], axis=1)
-    values, facing = _read(look, places + shift, directions)
+        values, facing = _read(look, places + shift, directions)
     on = np.count_nonzero(facing) >= _KNOWN * len(places) and median(np.abs(values[facing])) < _ON_PX
     return shift if on and _explains(look, places, values, facing, directions) else still
 

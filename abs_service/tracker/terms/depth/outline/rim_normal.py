@@ -17,26 +17,33 @@ _EDGES, _FEWEST = 7, 3
 _FACING = 0.4
 
 
-def across_rim(
-    gradients: NDArray[np.float64], places: NDArray[np.floating], directions: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Image gradients (k, 2) of distances from the outline at edges, without their component along the mesh's rim.
+def rim_directions(places: NDArray[np.float64], directions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Unit directions (k, 2) of the mesh's rim in the image at its edges; 0 where too few edges tell.
 
     Args:
-        gradients: of the distances (k, 2).
         places: of the edges in the image (k, 2) [px].
         directions: out of the mesh, in the image (k, 2).
     """
     if len(places) < _FEWEST:
-        return gradients
+        return np.zeros_like(places)
     units = directions / np.maximum(np.linalg.norm(directions, axis=1, keepdims=True), np.finfo(float).tiny)
-    apart = np.linalg.norm(places[:, None] - places, axis=2)
+    x, y = places.T
+    apart = (x[:, None] - x) ** 2 + (y[:, None] - y) ** 2
     apart[units @ units.T < _FACING] = np.inf
     nearest = np.argsort(apart, axis=1, kind="stable")[:, :_EDGES]
-    alike = np.isfinite(np.take_along_axis(apart, nearest, axis=1))[..., None]
-    count = np.maximum(alike.sum(axis=1, keepdims=True), 1)
-    around = places[nearest].astype(np.float64)
-    arms = np.where(alike, around - np.where(alike, around, 0.0).sum(axis=1, keepdims=True) / count, 0.0)
-    along = np.linalg.eigh(arms.transpose(0, 2, 1) @ arms)[1][:, :, 1]
-    rest = gradients - np.vecdot(gradients, along)[:, None] * along
-    return np.where(count[:, 0] >= _FEWEST, rest, gradients)
+    alike = np.isfinite(np.take_along_axis(apart, nearest, axis=1))
+    count = alike.sum(axis=1)
+    x, y = (_centred(part[nearest], alike, count) for part in (x, y))
+    angles = np.arctan2(2 * np.vecdot(x, y), np.vecdot(x, x) - np.vecdot(y, y)) / 2  # of the longer principal axis
+    return np.stack([np.cos(angles), np.sin(angles)], axis=1) * (count >= _FEWEST)[:, None]
+
+
+def across_rim(gradients: NDArray[np.float64], along: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Image gradients (k, 2) of distances from the outline at edges, without their component along the rim (k, 2)."""
+    return gradients - np.vecdot(gradients, along)[:, None] * along
+
+
+def _centred(values: NDArray[np.float64], which: NDArray[np.bool_], count: NDArray[np.intp]) -> NDArray[np.float64]:
+    """Values (k, n) minus the mean of those which count (k, n), of which there are (k,); 0 for the others."""
+    means = np.where(which, values, 0.0).sum(axis=1) / np.maximum(count, 1)
+    return np.where(which, values - means[:, None], 0.0)

@@ -31,7 +31,7 @@ from abs_service.tracker.terms.depth.outline.rim_cost import FARTHEST, rim_cost
 from abs_service.tracker.terms.depth.outline.rim_gap import exact_gap
 from abs_service.tracker.terms.depth.outline.rim_match import shift_to_outline
 from abs_service.tracker.terms.depth.outline.rim_motion import displacement, motion
-from abs_service.tracker.terms.depth.outline.rim_normal import across_rim
+from abs_service.tracker.terms.depth.outline.rim_normal import across_rim, rim_directions
 from abs_service.tracker.terms.depth.outline.round_outline import is_round, without_turn
 from abs_service.tracker.terms.linearization import Linearization, PointLinearization
 from abs_service.tracker.terms.patches import found_at
@@ -81,6 +81,7 @@ class RimOutline:
         self._corner = np.zeros(2, np.float32)
         self._beyond = np.zeros(len(rim.outer), np.float32)
         self._ends: Ends = (rim.outer, rim.inner, self._beyond)
+        self._along = np.zeros((len(rim.outer), 2))
         self._hidden, self._begun, self._is_round = 0, False, False
 
     def observe(
@@ -114,7 +115,9 @@ class RimOutline:
             self._begun = True
         self._hidden = len(free) - len(visible)
         _, places, away = self._edges(predicted)
-        self._raggedness.update(away, self._directions(predicted, places), places)
+        directions = self._directions(predicted, places)
+        self._along = rim_directions(places, directions)
+        self._raggedness.update(away, directions, places)
         beside = np.zeros(distance.shape, np.bool_)
         beside[part] = (seen.free_m[part] > 0) & (self._inwards > -UNJUDGED_DEVIATIONS * self._deviation)
         return beside
@@ -131,9 +134,8 @@ class RimOutline:
         points, values, gradients = self._locate(surface)
         residual = values / self._deviation
         use = np.flatnonzero(np.abs(residual) < FARTHEST)
-        places, by_place = project_with_jacobian(self._camera, points.astype(np.float64))
-        by_place, directions = by_place[use], self._directions(surface, places)[use]
-        shown = across_rim(gradients[use], places[use], directions)
+        by_place = project_with_jacobian(self._camera, points[use].astype(np.float64))[1]
+        shown = across_rim(gradients[use], self._along[use])
         shown = without_turn(shown, by_place, points[use]) if self._is_round else shown
         rows = np.einsum("vi,vij->vj", shown / self._deviation, by_place)
         outer, inner, beyond = self._ends
