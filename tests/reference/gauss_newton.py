@@ -15,7 +15,8 @@ class GaussNewton:
         vertices: the template (n, 3) [m] in its first pose, row by row.
         sigma: standard deviation of the distances [m].
         steps: most steps in a frame.
-        tolerance: the last step is one whose predicted decrease of the cost is less than this, per parameter [nats].
+        tolerance: a step is the last one if the decrease of the cost predicted for it, or for the one after it, is less
+            than this per parameter [nats].
         knows_hole: True if the mask of the hole is given; otherwise the hole counts as outside the silhouette.
     """
 
@@ -33,7 +34,7 @@ class GaussNewton:
         """Vertices (n, 3) [m] in a frame."""
         points = CAMERA.unproject(frame.distance)
         nearest = _nearest_on(frame.sheet)
-        before = self._control
+        before, decrease_before = self._control, 0.0
         for _ in range(self._steps):
             vertices = self._basis @ self._control
             columns, rows = np.floor(CAMERA.project(vertices) + 0.5).astype(int).T
@@ -59,8 +60,10 @@ class GaussNewton:
             system, target = (np.concatenate(part) for part in zip(*blocks))
             step = np.linalg.solve(system.T @ system, system.T @ target)
             self._control = self._control + step.reshape(-1, 3)
-            if 0.5 * step @ (system.T @ target) < self._tolerance:
+            decrease = 0.5 * float(step @ (system.T @ target))
+            if decrease < self._tolerance or decrease**2 < self._tolerance * decrease_before:
                 break
+            decrease_before = decrease
         return self._basis @ self._control
 
 

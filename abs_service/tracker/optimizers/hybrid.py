@@ -38,9 +38,9 @@ class Settings:
 
     Attributes:
         steps: maximum number of steps of the descent per frame.
-        tolerance: the descent ends with a step whose predicted decrease per parameter is less than this [nats]. The
-            noise of a frame moves the estimate by ½, but in all directions alike; what is left here may lie in a
-            single one, along the surface, where ½ in all is a standard deviation.
+        tolerance: the descent ends with a step if the decrease per parameter predicted for it, or for the next one, is
+            less than this [nats]. The noise of a frame moves the estimate by ½, but in all directions alike; what is
+            left here may lie in a single one, along the surface, where ½ in all is a standard deviation.
         population: candidates per generation of CMA-ES; 0: 4 + 3 ln dim, its default.
         generations: maximum number of generations per frame of CMA-ES.
         step: initial standard deviation of its candidates, in deviations of the priors.

@@ -39,7 +39,8 @@ class GaussNewton:
         vertices: the template (n, 3) [m] in its first pose, row by row.
         sigma: standard deviation of the distances [m].
         steps: most steps in a frame.
-        tolerance: the last step is one whose predicted decrease of the cost is less than this, per parameter [nats].
+        tolerance: a step is the last one if the decrease of the cost predicted for it, or for the one after it, is less
+            than this per parameter [nats].
         knows_hole: True if the mask of the hole is given; otherwise the hole counts as outside the silhouette.
     """
 
@@ -64,7 +65,7 @@ class GaussNewton:
         """Vertices (n, 3) [m] in a frame."""
         hidden = frame.hole if self._knows_hole else np.zeros_like(frame.hole)
         nearest = nearest_on(frame.sheet)
-        before = self._control
+        before, decrease_before = self._control, 0.0
         for _ in range(self._steps):
             vertices = self._basis @ self._control
             _weigh_distances(
@@ -75,8 +76,10 @@ class GaussNewton:
             pull = (self._basis.T @ self._pulls + (before - self._control) / MOTION_M**2).ravel()
             step = solved(self._curvature(), pull)
             self._control = self._control + step.reshape(-1, 3)
-            if 0.5 * step @ pull < self._tolerance:
+            decrease = 0.5 * float(step @ pull)
+            if decrease < self._tolerance or decrease**2 < self._tolerance * decrease_before:
                 break
+            decrease_before = decrease
         return self._basis @ self._control
 
     def _curvature(self) -> NDArray[np.float64]:

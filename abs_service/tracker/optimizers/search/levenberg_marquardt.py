@@ -16,15 +16,18 @@ GROWTH = 10.0
 def descend(problem: Problem, start: NDArray[np.float64], iterations: int, tolerance: float, budget: Budget) -> Search:
     """Descends from start (dim,), one linearisation per accepted step.
 
+    Steps contract: the decrease after a step is foretold from those of this step and the one before, as codes for
+    stiff equations end Newton's method (E. Hairer, G. Wanner: Solving Ordinary Differential Equations II, IV.8).
+
     Args:
         problem: the cost.
         start: initial parameters (dim,).
         iterations: maximum number of accepted steps.
-        tolerance: a step with a smaller predicted decrease [nats] is the last one.
+        tolerance: a step is the last one if the decrease predicted for it, or for the step after it, is smaller [nats].
         budget: evaluations and time; at least one step is tried.
     """
     theta, cost = start, float((yield start[None])[0])
-    stop, damping, steps = None, 0.0, 0
+    stop, damping, steps, before = None, 0.0, 0, 0.0
     linearized = problem.linearize(theta)
     while stop is None and steps < iterations:
         step, decrease = _step(linearized.quadratic, damping)
@@ -33,7 +36,9 @@ def descend(problem: Problem, start: NDArray[np.float64], iterations: int, toler
         if better:
             theta, cost, damping, steps = theta + step, cost_after, damping / GROWTH, steps + 1
             budget.generations += 1
-        stop = Stop.CONVERGED if decrease < tolerance else budget.exhausted()
+        ends = decrease < tolerance or (better and decrease**2 < tolerance * before)
+        stop = Stop.CONVERGED if ends else budget.exhausted()
+        before = decrease if better and not damping else 0.0
         if not better:
             damping = max(damping * GROWTH, FIRST_DAMPING)
         elif stop is None and steps < iterations:

@@ -50,6 +50,26 @@ def test_a_step_that_promises_little_is_taken_and_is_the_last():
     assert (found.stop, spent.generations, spent.evaluations, len(asked)) == (Stop.CONVERGED, 1, 2, 1)
 
 
+def test_steps_that_contract_end_before_the_one_that_would_promise_little():
+    def residuals(x: NDArray[np.float64]) -> NDArray[np.float64]:
+        return 100 * (x - TARGET) * (1 + 0.1 * (x - TARGET))
+
+    (problem, asked), tolerance = counted(Known(3, residuals, lambda _: 0.0)), 1.0
+    start = TARGET + 0.5
+    promises = [problem.cost(theta[None])[0] for theta in _steps(problem, start, 3)]
+    assert promises[1] > tolerance > promises[2]
+    asked.clear()
+    found = descend(problem, start, 5, tolerance, budget())
+    assert (found.stop, len(asked)) == (Stop.CONVERGED, 2)
+    assert found.cost < tolerance
+
+
+def _steps(problem: Known, theta: NDArray[np.float64], count: int) -> list[NDArray[np.float64]]:
+    """Parameters at which the first steps begin; without residuals at the end, a step promises all that there is."""
+    found = [descend(problem, theta, steps, 1e-12, budget()).theta for steps in range(1, count)]
+    return [theta, *found]
+
+
 def test_a_step_that_promises_little_and_does_not_keep_it_is_not_taken():
     def residuals(x: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.column_stack([x - TARGET, np.where(np.abs(x).max(axis=1) > 0.1, 9.0, 0.0)])
