@@ -64,18 +64,19 @@ class DepthTerm:
         expected = np.ascontiguousarray(self._view.render(predicted)[window])
         self._view.look(predicted)
         seen = self._classifier.classify(distance, expected, window, self._texels.shape)
-        doubtful = self._outline.observe(distance, seen, expected, predicted, window)
+        outline = self._outline.observe(distance, seen, expected, predicted, window)
         self._continuation.observe(seen.object, window)
-        free_m = where(~doubtful, seen.free_m)
+        free_m = where(~outline.doubtful, seen.free_m)
+        masked = seen.foreground | seen.hole | outline.doubtful
         return ObservedDepth(
             sensor=self.sensor,
             view=self._view,
             bounds=self._bounds,
             texels=self._texels,
-            missing=self._explain(Unusable(seen.foreground | seen.hole | doubtful, free_m, seen.object), predicted),
-            classes=self._classes.put(seen, doubtful, free_m, window, self._texels.shape),
+            missing=self._explain(Unusable(masked, free_m, seen.object), predicted),
+            classes=self._classes.put(seen, outline.doubtful, free_m, window, self._texels.shape),
             occluders=_points(self._view.camera, distance, seen.foreground, window),
-            outline=self._outline,
+            outline=outline,
             continuation=self._continuation,
             fluctuation=self._fluctuation,
             scale=scale,

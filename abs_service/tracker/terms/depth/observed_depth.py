@@ -10,7 +10,7 @@ from abs_service.tracker.synthesis.base import Synthesis, View
 from abs_service.tracker.terms.base import Bounds, facing
 from abs_service.tracker.terms.depth.depth_cost import FREE_SCALE_M, depth_cost, normalize
 from abs_service.tracker.terms.depth.fluctuation import Fluctuation
-from abs_service.tracker.terms.depth.outline.base import Outline
+from abs_service.tracker.terms.depth.outline.base import ObservedOutline
 from abs_service.tracker.terms.depth.outline.continuation import Continuation
 from abs_service.tracker.terms.depth.pixel_classes import PixelClasses
 from abs_service.tracker.terms.depth.texels import Texels
@@ -39,7 +39,7 @@ class ObservedDepth:
         missing: cost (1, n) of a missing return at each vertex beyond that of an inlier.
         classes: of the pixels.
         occluders: points (k, 3) [m] before the predicted mesh.
-        outline: of the object.
+        outline: end of the object in the image.
         continuation: measured surface beside the mesh.
         fluctuation: of the sensor's distances, for later frames.
         scale: of the noise model's deviations in this frame, from the fluctuation in earlier ones.
@@ -53,7 +53,7 @@ class ObservedDepth:
     missing: NDArray[np.float32]
     classes: PixelClasses
     occluders: NDArray[np.float64]
-    outline: Outline
+    outline: ObservedOutline
     continuation: Continuation
     fluctuation: Fluctuation
     scale: float
