@@ -65,7 +65,6 @@ class DepthTerm:
         self._view.look(predicted)
         seen = self._classifier.classify(distance, expected, window, self._texels.shape)
         outline = self._outline.observe(distance, seen, expected, predicted, window)
-        self._continuation.observe(seen.object, window)
         free_m = where(~outline.doubtful, seen.free_m)
         masked = seen.foreground | seen.hole | outline.doubtful
         return ObservedDepth(
@@ -77,7 +76,7 @@ class DepthTerm:
             classes=self._classes.put(seen, outline.doubtful, free_m, window, self._texels.shape),
             occluders=_points(self._view.camera, distance, seen.foreground, window),
             outline=outline,
-            continuation=self._continuation,
+            remainder=self._continuation.observe(seen.object, window),
             fluctuation=self._fluctuation,
             scale=scale,
             is_surprised=not seen.object.any(),

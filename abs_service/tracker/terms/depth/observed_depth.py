@@ -1,5 +1,6 @@
 """One frame of a depth sensor: cost, residuals and agreement of deformed meshes."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,13 +12,12 @@ from abs_service.tracker.terms.base import Bounds, facing
 from abs_service.tracker.terms.depth.depth_cost import FREE_SCALE_M, depth_cost, normalize
 from abs_service.tracker.terms.depth.fluctuation import Fluctuation
 from abs_service.tracker.terms.depth.outline.base import ObservedOutline
-from abs_service.tracker.terms.depth.outline.continuation import Continuation
 from abs_service.tracker.terms.depth.pixel_classes import PixelClasses
 from abs_service.tracker.terms.depth.texels import Texels
 from abs_service.tracker.terms.gradients import color_rows, depth_rows
 from abs_service.tracker.terms.linearization import Part, PointLinearization
 from abs_service.tracker.terms.patches import Patches
-from abs_service.tracker.terms.sensor_fit import SensorFit, summarize
+from abs_service.tracker.terms.sensor_fit import Remainder, SensorFit, summarize
 from abs_service.tracker.terms.vertex_counts import VertexMasks
 
 #: Nearer to the object than this, a sample in free space is pulled back no more stiffly [m].
@@ -40,7 +40,7 @@ class ObservedDepth:
         classes: of the pixels.
         occluders: points (k, 3) [m] before the predicted mesh.
         outline: end of the object in the image.
-        continuation: measured surface beside the mesh.
+        remainder: measured surface that a mesh leaves unexplained.
         fluctuation: of the sensor's distances, for later frames.
         scale: of the noise model's deviations in this frame, from the fluctuation in earlier ones.
         is_surprised: nothing in the image agrees with the prediction.
@@ -54,7 +54,7 @@ class ObservedDepth:
     classes: PixelClasses
     occluders: NDArray[np.float64]
     outline: ObservedOutline
-    continuation: Continuation
+    remainder: Callable[[Surface], Remainder]
     fluctuation: Fluctuation
     scale: float
     is_surprised: bool
@@ -120,7 +120,7 @@ class ObservedDepth:
             found,
             normalized_residual=found.normalized_residual * self.scale,  # by the model as it is stated
             rim=self.outline.fit(surface),
-            remainder=self.continuation.remainder(surface),
+            remainder=self.remainder(surface),
             is_surprised=self.is_surprised,
         )
 
