@@ -59,9 +59,6 @@ class ObservedDepth:
     scale: float
     is_surprised: bool
 
-    def hide(self, points: NDArray[np.float64]) -> None:
-        """Does nothing: a depth sensor detects occluders in its own image."""
-
     def cost(self, surface: Surface) -> NDArray[np.float64]:
         """−Σ_v log φ (population,) plus the cost of the outline."""
         return self._measured_cost(surface, self.view.synthesize(surface)) + self.outline.cost(surface)
