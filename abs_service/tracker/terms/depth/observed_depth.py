@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import Synthesis, View
 from abs_service.tracker.terms.base import Bounds, facing
-from abs_service.tracker.terms.depth.depth_cost import FREE_SCALE_M, depth_cost, normalize
+from abs_service.tracker.terms.depth.depth_cost import FREE_SCALE_M, Residuals, depth_cost, normalize
 from abs_service.tracker.terms.depth.fluctuation import Fluctuation
 from abs_service.tracker.terms.depth.outline.base import ObservedOutline
 from abs_service.tracker.terms.depth.pixel_classes import PixelClasses
@@ -78,13 +78,13 @@ class ObservedDepth:
         return [measured, free, self.outline.linearize(surface, sparse_jacobian)]
 
     def _linearize_measured(self, surface: Surface, samples: SparseJacobian, seen: Synthesis) -> PointLinearization:
-        residual, inverse_deviation, cost = self._residuals(seen)
-        use = np.flatnonzero(cost < self.bounds.outlier - self.bounds.inlier)
+        found = self._residuals(seen)
+        use = np.flatnonzero(found.cost < self.bounds.outlier - self.bounds.inlier)
         vertices, normals = (
             self.view.spread(surface, values) for values in (surface.vertices[0].T, surface.normals[0].T)
         )
-        rows = depth_rows(vertices, normals, self.view.camera.center, use, inverse_deviation)
-        return PointLinearization(residual[use], rows, use, samples, vertices)
+        rows = depth_rows(vertices, normals, self.view.camera.center, use, found.inverse_deviation)
+        return PointLinearization(found.normalized[use], rows, use, samples, vertices)
 
     def _linearize_free(self, surface: Surface, samples: SparseJacobian, seen: Synthesis) -> PointLinearization:
         """Residuals of samples in free space, which stop a thin sheet from sliding along itself.
@@ -147,8 +147,8 @@ class ObservedDepth:
         distance, deviation = self.misfit(surface)
         self.fluctuation.update(distance, deviation / self.scale)
 
-    def _residuals(self, seen: Synthesis) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Normalised residual, inverse deviation, and unbounded cost, infinite without a measurement, each (n,)."""
-        residual, inverse, cost = np.empty((3, seen.pixel.shape[1]))
-        normalize(seen.pixel[0], seen.distance[0], self.texels.at(seen.pixel), residual, inverse, cost)
-        return residual, inverse, cost
+    def _residuals(self, seen: Synthesis) -> Residuals:
+        """Residuals of the samples of a population of one."""
+        found = Residuals(*np.empty((3, seen.pixel.shape[1])))
+        normalize(seen.pixel[0], seen.distance[0], self.texels.at(seen.pixel), found)
+        return found
