@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from abs_service.pairing.observation import Observation
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import Synthesizer
-from abs_service.tracker.terms.base import ObservedTerm, Term
+from abs_service.tracker.terms.base import NO_OCCLUDERS, ObservedTerm, Term
 from abs_service.tracker.terms.linearization import Part, PointLinearization
 from abs_service.tracker.terms.patches import Patches
 from abs_service.tracker.terms.sensor_fit import SensorFit
@@ -67,15 +67,16 @@ class TermSum:
         self._frames = 0
 
     def observe(self, observation: Observation, predicted: Surface, reach_m: float = np.inf) -> "ObservedTerms":
-        """Passes every sensor's image to its term, and all occluders to every term."""
+        """Passes every sensor's image to its term; occluders that some of them find hide the mesh from the others."""
         self._synthesizer.observe(observation)
         terms = [term for term in self._terms if term.sensor in observation.images]
-        observed = [term.observe(observation.images[term.sensor], predicted, reach_m) for term in terms]
-        occluders = np.concatenate([np.zeros((0, 3)), *(term.occluders for term in observed)])
-        for term in observed:
-            term.hide(occluders)
+        observed: dict[str, ObservedTerm] = {}
+        occluders = NO_OCCLUDERS
+        for term in sorted(terms, key=lambda term: not term.finds_occluders):
+            found = term.observe(observation.images[term.sensor], predicted, reach_m, occluders)
+            observed[term.sensor], occluders = found, np.concatenate([occluders, found.occluders])
         self._frames = frame = self._frames + 1
-        return ObservedTerms(observed, lambda: self._frames == frame)
+        return ObservedTerms([observed[term.sensor] for term in terms], lambda: self._frames == frame)
 
 
 class ObservedTerms:

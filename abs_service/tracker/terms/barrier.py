@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from abs_service.pairing.images import BeamReading, Image
 from abs_service.tracker.models.base import SparseJacobian, Surface
-from abs_service.tracker.terms.base import Bounds
+from abs_service.tracker.terms.base import NO_OCCLUDERS, Bounds
 from abs_service.tracker.terms.linearization import Part, PointLinearization
 from abs_service.tracker.terms.patches import Patches
 from abs_service.tracker.terms.sensor_fit import SensorFit
@@ -19,6 +19,8 @@ from calib.noise.images.binary import LightBarrier
 class BarrierTerm:
     """−log of the probability of the reading, given whether the mesh crosses the beam, in one frame after the other."""
 
+    finds_occluders = False
+
     def __init__(self, sensor: str, camera: Camera, faces: NDArray[np.int32], noise: LightBarrier, bounds: Bounds):
         self.sensor = sensor
         self._faces = np.ascontiguousarray(faces, np.int32)
@@ -27,8 +29,14 @@ class BarrierTerm:
         self._noise = noise
         self._bounds = bounds
 
-    def observe(self, image: Image, predicted: Surface, reach_m: float = np.inf) -> "ObservedBarrier":
-        """Takes a reading."""
+    def observe(
+        self,
+        image: Image,
+        predicted: Surface,
+        reach_m: float = np.inf,
+        occluders: NDArray[np.float64] = NO_OCCLUDERS,
+    ) -> "ObservedBarrier":
+        """Takes a reading; an occluder in the beam counts as the object: the noise model holds the error rate."""
         if not isinstance(image, BeamReading):
             raise TypeError(f"sensor {self.sensor} has noise of a light barrier but delivered {type(image).__name__}")
         costs = np.minimum(np.add(self._noise.cost(image.interrupted), self._bounds.inlier), self._bounds.outlier)
@@ -56,10 +64,7 @@ class ObservedBarrier:
     @property
     def occluders(self) -> NDArray[np.float64]:
         """No points: the position along the beam is unknown."""
-        return np.zeros((0, 3))
-
-    def hide(self, points: NDArray[np.float64]) -> None:
-        """Does nothing: an interruption is attributed to the object; the noise model holds the error rate."""
+        return NO_OCCLUDERS
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
         """−log P(reading | mesh crosses the beam or not), (population,)."""

@@ -14,6 +14,9 @@ from abs_service.tracker.terms.patches import Patches
 from abs_service.tracker.terms.sensor_fit import SensorFit
 from calib.no_return import CAUTIOUS, NoReturn
 
+#: Occluders of a frame without any.
+NO_OCCLUDERS: NDArray[np.float64] = np.zeros((0, 3))
+
 
 @dataclass(frozen=True, slots=True)
 class Bounds:
@@ -56,10 +59,6 @@ class ObservedTerm(Protocol):
         """Measured points (k, 3) [m] between the sensor and the predicted mesh."""
         ...
 
-    def hide(self, points: NDArray[np.float64]) -> None:
-        """Masks pixels occluded by points (k, 3) [m] that other sensors measured, before anything else is asked."""
-        ...
-
     def cost(self, surface: Surface) -> NDArray[np.float64]:
         """Cost (population,) of every deformed mesh."""
         ...
@@ -96,16 +95,25 @@ class Term(Protocol):
 
     Attributes:
         sensor: name of the sensor.
+        finds_occluders: its images show occluders, which hide the mesh from the sensors that do not.
     """
 
     sensor: str
+    finds_occluders: bool
 
-    def observe(self, image: Image, predicted: Surface, reach_m: float = np.inf) -> ObservedTerm:
+    def observe(
+        self,
+        image: Image,
+        predicted: Surface,
+        reach_m: float = np.inf,
+        occluders: NDArray[np.float64] = NO_OCCLUDERS,
+    ) -> ObservedTerm:
         """The cost of deformed meshes given an image; it uses the memory of the image before.
 
         Args:
             image: measurement of the sensor.
             predicted: predicted mesh, a population of one.
             reach_m: radius around the prediction outside which costs need not be exact, only high [m].
+            occluders: points (k, 3) [m] that other sensors measured between themselves and the mesh.
         """
         ...

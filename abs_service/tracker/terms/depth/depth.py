@@ -9,7 +9,7 @@ from abs_service.pairing.images import DepthImage, Image, Window
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.synthesis.window import corner
-from abs_service.tracker.terms.base import Bounds
+from abs_service.tracker.terms.base import NO_OCCLUDERS, Bounds
 from abs_service.tracker.terms.depth.classification.classifier import Classifier
 from abs_service.tracker.terms.depth.classification.visibility import where
 from abs_service.tracker.terms.depth.depth_cost import missing_cost
@@ -29,6 +29,8 @@ class DepthTerm:
 
     Here is what is learnt of a sensor over time, and the memory of the newest frame, which is an `ObservedDepth`.
     """
+
+    finds_occluders = True
 
     def __init__(
         self,
@@ -52,8 +54,14 @@ class DepthTerm:
         self._classes = ClassImages()
         self._begun = False
 
-    def observe(self, image: Image, predicted: Surface, reach_m: float = np.inf) -> ObservedDepth:
-        """Renders the noise model over a depth image; occluded pixels are masked in this frame."""
+    def observe(
+        self,
+        image: Image,
+        predicted: Surface,
+        reach_m: float = np.inf,
+        occluders: NDArray[np.float64] = NO_OCCLUDERS,
+    ) -> ObservedDepth:
+        """Renders the noise model over a depth image; pixels that show an occluder are masked, and no others."""
         if not isinstance(image, DepthImage):
             raise TypeError(f"sensor {self.sensor} has a depth noise model but delivered {type(image).__name__}")
         # What the background is, and where the field of view ends, is learnt from a whole image.
@@ -64,19 +72,19 @@ class DepthTerm:
         expected = np.ascontiguousarray(self._view.render(predicted)[window])
         self._view.look(predicted)
         seen = self._classifier.classify(distance, expected, window, self._texels.shape)
-        doubtful = self._outline.observe(distance, seen, expected, predicted, window)
-        self._continuation.observe(seen.object, window)
-        free_m = where(~doubtful, seen.free_m)
+        outline = self._outline.observe(distance, seen, expected, predicted, window)
+        free_m = where(~outline.doubtful, seen.free_m)
+        masked = seen.foreground | seen.hole | outline.doubtful
         return ObservedDepth(
             sensor=self.sensor,
             view=self._view,
             bounds=self._bounds,
             texels=self._texels,
-            missing=self._explain(Unusable(seen.foreground | seen.hole | doubtful, free_m, seen.object), predicted),
-            classes=self._classes.put(seen, doubtful, free_m, window, self._texels.shape),
+            missing=self._explain(Unusable(masked, free_m, seen.object), predicted),
+            classes=self._classes.put(seen, outline.doubtful, free_m, window, self._texels.shape),
             occluders=_points(self._view.camera, distance, seen.foreground, window),
-            outline=self._outline,
-            continuation=self._continuation,
+            outline=outline,
+            remainder=self._continuation.observe(seen.object, window),
             fluctuation=self._fluctuation,
             scale=scale,
             is_surprised=not seen.object.any(),
@@ -102,7 +110,7 @@ def _points(
 ) -> NDArray[np.float64]:
     """Points (k, 3) [m] of the pixels of a mask (rows, columns) in a window, at measured distances [m]."""
     if not mask.any():
-        return np.zeros((0, 3))
+        return NO_OCCLUDERS
     rows, columns = np.nonzero(mask)
     top, left = corner(window)
     sight = camera.directions(np.stack([left + columns, top + rows], axis=-1))

@@ -1,5 +1,7 @@
 """Kernels of the cost of measured distances; textures as written by `calib.noise.texture.write_texture`."""
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,6 +16,40 @@ FREE_SCALE_M = 0.01
 
 #: Texels are gathered so many at a time, and then compared all at once.
 _TILE = 64
+
+
+class ConstantCosts(NamedTuple):
+    """Costs of the pixels of a window (rows, columns) that have no usable distance [nats].
+
+    Attributes:
+        masked: behind an occluder, in a hole, or left to the outline.
+        distance: measured distances [m], NaN where unknown.
+        free_m: distance from the object where the sensor looks past it [m], else 0.
+        missing: texel (8,) of a missing return.
+        agreeing: cost of a masked pixel, that of an inlier.
+        outlier: cost of a pixel in free space at the end of the object.
+    """
+
+    masked: NDArray[np.bool_]
+    distance: NDArray[np.float32]
+    free_m: NDArray[np.float32]
+    missing: NDArray[np.float32]
+    agreeing: float
+    outlier: float
+
+
+class Residuals(NamedTuple):
+    """Measured distances compared with synthesised ones, each (n,).
+
+    Attributes:
+        normalized: residual, divided by its deviation.
+        inverse_deviation: [1/m].
+        cost: unbounded, infinite without a measurement [nats].
+    """
+
+    normalized: NDArray[np.float64]
+    inverse_deviation: NDArray[np.float64]
+    cost: NDArray[np.float64]
 
 
 def missing_cost(law: NoReturn, predicted: Surface, center: NDArray[np.float64], most: float) -> NDArray[np.float32]:
@@ -50,76 +86,49 @@ def distances(texels: NDArray[np.float32], found: NDArray[np.float32]) -> None:
 
 
 @kernel
-def settle(
-    row: int,
-    column: int,
-    masked: NDArray[np.bool_],
-    distance: NDArray[np.float32],
-    free_m: NDArray[np.float32],
-    missing: NDArray[np.float32],
-    agreeing: float,
-    outlier: float,
-    texel: NDArray[np.float32],
-) -> bool:
+def settle(row: int, column: int, costs: ConstantCosts, texel: NDArray[np.float32]) -> bool:
     """Writes the constant cost of a pixel without a usable distance into its texel (8,); False if it has one.
 
     At a distance d > 0 from the object, in free space, that is outlier + d / s; else at a masked pixel `agreeing`; else
-    at a missing return the texel `missing`, see `depth_cost`. The others are images (rows, columns).
+    at a missing return the texel `missing`, see `depth_cost`.
     """
-    free, is_masked = free_m[row, column], masked[row, column]
-    if not (free > 0 or is_masked or np.isnan(distance[row, column])):
+    free, is_masked = costs.free_m[row, column], costs.masked[row, column]
+    if not (free > 0 or is_masked or np.isnan(costs.distance[row, column])):
         return False
     texel[:] = 0
     if free > 0:
-        texel[6] = np.float32(outlier) + free * np.float32(1 / FREE_SCALE_M)
+        texel[6] = np.float32(costs.outlier) + free * np.float32(1 / FREE_SCALE_M)
     elif is_masked:
-        texel[6] = np.float32(agreeing)
+        texel[6] = np.float32(costs.agreeing)
     else:
-        for i in range(missing.size):
-            texel[i] = missing[i]
+        for i in range(costs.missing.size):
+            texel[i] = costs.missing[i]
     return True
 
 
 @kernel
-def write_constants(
-    masked: NDArray[np.bool_],
-    distance: NDArray[np.float32],
-    free_m: NDArray[np.float32],
-    missing: NDArray[np.float32],
-    agreeing: float,
-    outlier: float,
-    top: int,
-    left: int,
-    texture: NDArray[np.float32],
-) -> None:
-    """`settle` for all pixels of a window (rows, columns) of a texture with a border of one pixel."""
-    for row in range(masked.shape[0]):
-        for column in range(masked.shape[1]):
-            texel = texture[top + row + 1, left + column + 1]
-            settle(row, column, masked, distance, free_m, missing, agreeing, outlier, texel)
+def write_constants(costs: ConstantCosts, corner: tuple[int, int], texture: NDArray[np.float32]) -> None:
+    """`settle` for all pixels of a window, which begins at (row, column), of a texture with a border of one pixel."""
+    top, left = corner
+    for row in range(costs.masked.shape[0]):
+        for column in range(costs.masked.shape[1]):
+            settle(row, column, costs, texture[top + row + 1, left + column + 1])
 
 
 @kernel
 def normalize(
-    pixel: NDArray[np.int32],
-    distance: NDArray[np.float32],
-    texture: NDArray[np.float32],
-    residual: NDArray[np.float64],
-    inverse: NDArray[np.float64],
-    cost: NDArray[np.float64],
+    pixel: NDArray[np.int32], distance: NDArray[np.float32], texture: NDArray[np.float32], found: Residuals
 ) -> None:
-    """Normalised residuals, inverse deviations and unbounded costs of samples, each (n,).
-
-    The cost is infinite without a measurement.
-    """
+    """Writes the residuals of samples (n,), see `Synthesis`, with the texels (pixels, 8) of a texture."""
     for v in range(pixel.size):
         texel = texture[max(pixel[v], 0)]
         t = np.float64(texel[0]) - distance[v]
         inside = min(max(t, -WINDOW_M), WINDOW_M)
-        inverse[v] = texel[3] + inside * (texel[4] + inside * texel[5])
-        residual[v] = (t - texel[1] - texel[2] * inside) * inverse[v]
-        explained = 0.5 * residual[v] * residual[v] + texel[6] + texel[7] * inside
-        cost[v] = explained if pixel[v] > 0 and texel[3] > 0 else np.inf
+        inverse = texel[3] + inside * (texel[4] + inside * texel[5])
+        residual = (t - texel[1] - texel[2] * inside) * inverse
+        explained = 0.5 * residual * residual + texel[6] + texel[7] * inside
+        found.normalized[v], found.inverse_deviation[v] = residual, inverse
+        found.cost[v] = explained if pixel[v] > 0 and texel[3] > 0 else np.inf
 
 
 @kernel

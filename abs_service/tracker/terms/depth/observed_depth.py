@@ -1,5 +1,6 @@
 """One frame of a depth sensor: cost, residuals and agreement of deformed meshes."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -8,16 +9,15 @@ from numpy.typing import NDArray
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import Synthesis, View
 from abs_service.tracker.terms.base import Bounds, facing
-from abs_service.tracker.terms.depth.depth_cost import FREE_SCALE_M, depth_cost, normalize
+from abs_service.tracker.terms.depth.depth_cost import FREE_SCALE_M, Residuals, depth_cost, normalize
 from abs_service.tracker.terms.depth.fluctuation import Fluctuation
-from abs_service.tracker.terms.depth.outline.base import Outline
-from abs_service.tracker.terms.depth.outline.continuation import Continuation
+from abs_service.tracker.terms.depth.outline.base import ObservedOutline
 from abs_service.tracker.terms.depth.pixel_classes import PixelClasses
 from abs_service.tracker.terms.depth.texels import Texels
 from abs_service.tracker.terms.gradients import color_rows, depth_rows
 from abs_service.tracker.terms.linearization import Part, PointLinearization
 from abs_service.tracker.terms.patches import Patches
-from abs_service.tracker.terms.sensor_fit import SensorFit, summarize
+from abs_service.tracker.terms.sensor_fit import Remainder, SensorFit, summarize
 from abs_service.tracker.terms.vertex_counts import VertexMasks
 
 #: Nearer to the object than this, a sample in free space is pulled back no more stiffly [m].
@@ -39,8 +39,8 @@ class ObservedDepth:
         missing: cost (1, n) of a missing return at each vertex beyond that of an inlier.
         classes: of the pixels.
         occluders: points (k, 3) [m] before the predicted mesh.
-        outline: of the object.
-        continuation: measured surface beside the mesh.
+        outline: end of the object in the image.
+        remainder: measured surface that a mesh leaves unexplained.
         fluctuation: of the sensor's distances, for later frames.
         scale: of the noise model's deviations in this frame, from the fluctuation in earlier ones.
         is_surprised: nothing in the image agrees with the prediction.
@@ -53,14 +53,11 @@ class ObservedDepth:
     missing: NDArray[np.float32]
     classes: PixelClasses
     occluders: NDArray[np.float64]
-    outline: Outline
-    continuation: Continuation
+    outline: ObservedOutline
+    remainder: Callable[[Surface], Remainder]
     fluctuation: Fluctuation
     scale: float
     is_surprised: bool
-
-    def hide(self, points: NDArray[np.float64]) -> None:
-        """Does nothing: a depth sensor detects occluders in its own image."""
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
         """−Σ_v log φ (population,) plus the cost of the outline."""
@@ -81,13 +78,13 @@ class ObservedDepth:
         return [measured, free, self.outline.linearize(surface, sparse_jacobian)]
 
     def _linearize_measured(self, surface: Surface, samples: SparseJacobian, seen: Synthesis) -> PointLinearization:
-        residual, inverse_deviation, cost = self._residuals(seen)
-        use = np.flatnonzero(cost < self.bounds.outlier - self.bounds.inlier)
+        found = self._residuals(seen)
+        use = np.flatnonzero(found.cost < self.bounds.outlier - self.bounds.inlier)
         vertices, normals = (
             self.view.spread(surface, values) for values in (surface.vertices[0].T, surface.normals[0].T)
         )
-        rows = depth_rows(vertices, normals, self.view.camera.center, use, inverse_deviation)
-        return PointLinearization(residual[use], rows, use, samples, vertices)
+        rows = depth_rows(vertices, normals, self.view.camera.center, use, found.inverse_deviation)
+        return PointLinearization(found.normalized[use], rows, use, samples, vertices)
 
     def _linearize_free(self, surface: Surface, samples: SparseJacobian, seen: Synthesis) -> PointLinearization:
         """Residuals of samples in free space, which stop a thin sheet from sliding along itself.
@@ -120,7 +117,7 @@ class ObservedDepth:
             found,
             normalized_residual=found.normalized_residual * self.scale,  # by the model as it is stated
             rim=self.outline.fit(surface),
-            remainder=self.continuation.remainder(surface),
+            remainder=self.remainder(surface),
             is_surprised=self.is_surprised,
         )
 
@@ -150,8 +147,8 @@ class ObservedDepth:
         distance, deviation = self.misfit(surface)
         self.fluctuation.update(distance, deviation / self.scale)
 
-    def _residuals(self, seen: Synthesis) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Normalised residual, inverse deviation, and unbounded cost, infinite without a measurement, each (n,)."""
-        residual, inverse, cost = np.empty((3, seen.pixel.shape[1]))
-        normalize(seen.pixel[0], seen.distance[0], self.texels.at(seen.pixel), residual, inverse, cost)
-        return residual, inverse, cost
+    def _residuals(self, seen: Synthesis) -> Residuals:
+        """Residuals of the samples of a population of one."""
+        found = Residuals(*np.empty((3, seen.pixel.shape[1])))
+        normalize(seen.pixel[0], seen.distance[0], self.texels.at(seen.pixel), found)
+        return found

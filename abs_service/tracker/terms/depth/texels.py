@@ -13,7 +13,13 @@ from abs_service.pairing.images import DepthImage, Window
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.synthesis.window import Bordered, corner, within
 from abs_service.tracker.terms.base import Bounds
-from abs_service.tracker.terms.depth.depth_cost import distances, median_inlier_cost, settle, write_constants
+from abs_service.tracker.terms.depth.depth_cost import (
+    ConstantCosts,
+    distances,
+    median_inlier_cost,
+    settle,
+    write_constants,
+)
 from abs_service.tracker.terms.median import median
 from calib.jit import kernel
 from calib.noise.base import DepthNoise
@@ -107,8 +113,8 @@ class WholeTexels:
         """Writes the constants into the window."""
         agreeing = median_inlier_cost(within(self._texture, self._window), unusable.shown)
         missing, outlier = missing_texel(agreeing), float(self._image.beyond[6])
-        parts = unusable.masked, self._distance, unusable.free_m, missing
-        write_constants(*parts, agreeing, outlier, *corner(self._window), self._texture)
+        costs = ConstantCosts(unusable.masked, self._distance, unusable.free_m, missing, agreeing, outlier)
+        write_constants(costs, corner(self._window), self._texture)
         return agreeing
 
     def at(self, pixel: NDArray[np.int32]) -> NDArray[np.float32]:
@@ -131,21 +137,21 @@ class TexelsOnDemand:
         self._noise, self._scaled, self._image = noise, Scaled(noise, 1), image
         self._texture = np.zeros((2, 2, 8), np.float32)
         self._window: Window = image.window
-        self._distance = self._amplitude = self._corrected = self._free_m = np.zeros((0, 0), np.float32)
-        self._masked = self._done = np.zeros((0, 0), np.bool_)
-        self._missing = image.border
-        self._agreeing = 0.0
+        self._distance = self._amplitude = np.zeros((0, 0), np.float32)
+        self._done = np.zeros((0, 0), np.bool_)
+        self._costs = ConstantCosts(self._done, self._distance, self._distance, image.border, 0.0, 0.0)
 
     def observe(self, image: DepthImage, window: Window, scale: float) -> NDArray[np.float32]:
         """Corrects the distances in the window, and renders nothing yet."""
         self._texture, self._window = self._image.move(image.shape, window), window
         self._scaled = Scaled(self._noise, scale)
         self._distance, self._amplitude = image.within(window)
-        self._corrected = corrected_distances(self._noise, self._distance, self._amplitude, corner(window))
-        shape = self._corrected.shape
-        self._masked, self._done = np.zeros(shape, np.bool_), np.zeros(shape, np.bool_)
-        self._free_m, self._missing = np.zeros(shape, np.float32), self._image.border
-        return self._corrected
+        corrected = corrected_distances(self._noise, self._distance, self._amplitude, corner(window))
+        self._done = np.zeros(corrected.shape, np.bool_)
+        none, outlier = np.zeros(corrected.shape, np.bool_), float(self._image.beyond[6])
+        nowhere = np.zeros(corrected.shape, np.float32)
+        self._costs = ConstantCosts(none, corrected, nowhere, self._image.border, 0.0, outlier)
+        return corrected
 
     def explain(self, unusable: Unusable) -> float:
         """Remembers what is unusable, and renders some pixels on the object."""
@@ -154,17 +160,17 @@ class TexelsOnDemand:
         top, left = corner(self._window)
         some = ((rows + top + 1) * self._texture.shape[1] + columns + left + 1).astype(np.int32)
         texture = self.at(some[None])
-        self._agreeing = median(texture[some, 6]) + 0.5 if len(some) else 0.0
-        self._missing = missing_texel(self._agreeing)
-        self._masked, self._free_m = unusable.masked, unusable.free_m
-        return self._agreeing
+        agreeing = median(texture[some, 6]) + 0.5 if len(some) else 0.0
+        self._costs = self._costs._replace(
+            masked=unusable.masked, free_m=unusable.free_m, missing=missing_texel(agreeing), agreeing=agreeing
+        )
+        return agreeing
 
     def at(self, pixel: NDArray[np.int32]) -> NDArray[np.float32]:
         """The texture after rendering what is still missing of it."""
         is_single, place = len(pixel) == 1, corner(self._window)
         wanted = np.empty((2, pixel.size if is_single else self._done.size), np.int64)
-        constants = self._missing, self._agreeing, float(self._image.beyond[6])
-        rest = *place, self._corrected, self._masked, self._free_m, *constants, self._done, self._texture, wanted
+        rest = place, self._costs, self._done, self._texture, wanted
         count = _take(pixel[0], *rest) if is_single else _take_all(*rest)
         if count:
             row, column = wanted[:, :count]
@@ -181,14 +187,8 @@ class TexelsOnDemand:
 @kernel
 def _take(
     pixels: NDArray[np.int32],
-    top: int,
-    left: int,
-    corrected: NDArray[np.float32],
-    masked: NDArray[np.bool_],
-    free_m: NDArray[np.float32],
-    missing: NDArray[np.float32],
-    agreeing: float,
-    outlier: float,
+    corner: tuple[int, int],
+    costs: ConstantCosts,
     done: NDArray[np.bool_],
     texture: NDArray[np.float32],
     wanted: NDArray[np.int64],
@@ -197,24 +197,20 @@ def _take(
 
     Args:
         pixels: indices (m,) into the flattened texture.
-        top, left: first row and column of the window.
-        corrected: distances (rows, columns), NaN where unknown.
-        masked, free_m: see `Unusable`.
-        missing: texel (8,) of a missing return.
-        agreeing, outlier: cost of a masked pixel, and of one in free space beside the object.
+        corner: first row and column of the window.
+        costs: of pixels without a usable distance.
         done: pixels (rows, columns) that are rendered; those that are taken become so.
         texture: (height + 2, width + 2, 8).
         wanted: rows and columns (2, …) in the window of those with a usable distance.
     """
-    count, stride = 0, texture.shape[1]
+    (top, left), count, stride = corner, 0, texture.shape[1]
     for m in range(pixels.size):
         pixel = int(pixels[m])
         row, column = pixel // stride - 1 - top, pixel % stride - 1 - left
         inside = pixel > 0 and row >= 0 and row < done.shape[0] and column >= 0 and column < done.shape[1]
         if inside and not done[row, column]:
             done[row, column] = True
-            texel = texture[top + row + 1, left + column + 1]
-            if not settle(row, column, masked, corrected, free_m, missing, agreeing, outlier, texel):
+            if not settle(row, column, costs, texture[top + row + 1, left + column + 1]):
                 wanted[0, count], wanted[1, count] = row, column
                 count += 1
     return count
@@ -222,26 +218,19 @@ def _take(
 
 @kernel
 def _take_all(
-    top: int,
-    left: int,
-    corrected: NDArray[np.float32],
-    masked: NDArray[np.bool_],
-    free_m: NDArray[np.float32],
-    missing: NDArray[np.float32],
-    agreeing: float,
-    outlier: float,
+    corner: tuple[int, int],
+    costs: ConstantCosts,
     done: NDArray[np.bool_],
     texture: NDArray[np.float32],
     wanted: NDArray[np.int64],
 ) -> int:
     """`_take` for all pixels of the window."""
-    count = 0
+    (top, left), count = corner, 0
     for row in range(done.shape[0]):
         for column in range(done.shape[1]):
             if not done[row, column]:
                 done[row, column] = True
-                texel = texture[top + row + 1, left + column + 1]
-                if not settle(row, column, masked, corrected, free_m, missing, agreeing, outlier, texel):
+                if not settle(row, column, costs, texture[top + row + 1, left + column + 1]):
                     wanted[0, count], wanted[1, count] = row, column
                     count += 1
     return count

@@ -9,12 +9,12 @@ from abs_service.pairing.images import ChannelImage, Image, limits
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.synthesis.window import NOTHING_HAS, Bordered, corner
-from abs_service.tracker.terms.base import Bounds
+from abs_service.tracker.terms.base import NO_OCCLUDERS, Bounds
 from abs_service.tracker.terms.photometric.channel_cost import VALUE, copy, fill
 from abs_service.tracker.terms.photometric.illumination import Illumination
 from abs_service.tracker.terms.photometric.observed_channel import ObservedChannel
+from abs_service.tracker.terms.photometric.occlusion import occluded_pixels
 from abs_service.tracker.terms.photometric.registration_bias import RegistrationBias
-from abs_service.tracker.terms.photometric.shadow import Shadow
 from abs_service.tracker.terms.photometric.texture_registration_noise import (
     NO_REGISTRATION_NOISE,
     NO_WIDENING,
@@ -32,6 +32,8 @@ class ChannelTerm:
     Behind a Bayer mosaic only the channel that the pixel has is compared, and nothing is interpolated (section 4.1).
     """
 
+    finds_occluders = False
+
     def __init__(
         self,
         sensor: str,
@@ -46,7 +48,6 @@ class ChannelTerm:
         self._synthesizer = synthesizer
         self._view = synthesizer.view(sensor, appearance)
         self._illumination = illumination
-        self._shadow = Shadow(self._view.camera)
         self._bias = RegistrationBias(self._view)
         self._noise = noise
         self._bounds = bounds
@@ -54,8 +55,14 @@ class ChannelTerm:
         self._texels = np.zeros((0, 0, 4), np.float32)
         self._bordered = Bordered(UNKNOWN, np.array([NOTHING_HAS, 0, 1, 0], np.float32))
 
-    def observe(self, image: Image, predicted: Surface, reach_m: float = np.inf) -> ObservedChannel:
-        """Sets the image; NaN, also in the border, means no measurement."""
+    def observe(
+        self,
+        image: Image,
+        predicted: Surface,
+        reach_m: float = np.inf,
+        occluders: NDArray[np.float64] = NO_OCCLUDERS,
+    ) -> ObservedChannel:
+        """Sets the image; NaN, also in the border, means no measurement, and infinity an occluder."""
         if not isinstance(image, ChannelImage):
             raise TypeError(f"sensor {self.sensor} has noise of one channel but delivered {type(image).__name__}")
         window = self._synthesizer.window(self.sensor, predicted, reach_m)
@@ -77,11 +84,11 @@ class ChannelTerm:
             illumination=self._illumination,
             widening=NO_WIDENING,
             bias=self._bias,
-            shadow=self._shadow,
             image=picture,
             texture=texture.reshape(-1, 4),
-            window=window,
             is_mosaic=is_mosaic,
         ).exposed(predicted)
         widening = self._registration_noise.widening(self._view, predicted, observed.deviation(predicted))
+        if len(occluders):
+            self._bordered.inside[occluded_pixels(self._view.camera, occluders)[window], VALUE] = np.inf
         return replace(observed, widening=widening)

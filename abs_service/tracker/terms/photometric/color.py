@@ -8,15 +8,15 @@ from numpy.typing import NDArray
 from abs_service.pairing.images import ColorImage, Image, Window
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import Synthesis, Synthesizer, View
-from abs_service.tracker.synthesis.window import NOTHING_HAS, Bordered, within
-from abs_service.tracker.terms.base import Bounds, facing
+from abs_service.tracker.synthesis.window import NOTHING_HAS, Bordered
+from abs_service.tracker.terms.base import NO_OCCLUDERS, Bounds, facing
 from abs_service.tracker.terms.gradients import noiseless_color_rows
 from abs_service.tracker.terms.linearization import Part, PointLinearization
 from abs_service.tracker.terms.patches import Patches
 from abs_service.tracker.terms.photometric.illumination import Exposed
 from abs_service.tracker.terms.photometric.matching import Measured, costs_of, matched
+from abs_service.tracker.terms.photometric.occlusion import occluded_pixels
 from abs_service.tracker.terms.photometric.registration_bias import RegistrationBias
-from abs_service.tracker.terms.photometric.shadow import Shadow
 from abs_service.tracker.terms.photometric.texture_registration_noise import (
     NO_REGISTRATION_NOISE,
     TextureRegistrationNoise,
@@ -31,6 +31,8 @@ from calib.noise.images.color import GaussianColor
 class ColorTerm:
     """−log of the density of the measured colour given the vertex's own, in one frame after the other."""
 
+    finds_occluders = False
+
     def __init__(
         self,
         sensor: str,
@@ -43,7 +45,6 @@ class ColorTerm:
         self.sensor = sensor
         self._synthesizer = synthesizer
         self._view = synthesizer.view(sensor, colors)
-        self._shadow = Shadow(self._view.camera)
         self._bias = RegistrationBias(self._view)
         self._bounds = bounds
         self._sigma = np.array([[noise.sigma]], np.float32)
@@ -52,8 +53,14 @@ class ColorTerm:
         self._levels = np.zeros((0, 0, 3), np.uint8)
         self._bordered = Bordered(np.full(3, np.nan, np.float32), np.full(3, NOTHING_HAS, np.float32))
 
-    def observe(self, image: Image, predicted: Surface, reach_m: float = np.inf) -> "ObservedColor":
-        """Sets the colour image; NaN, as in the border, means no measurement."""
+    def observe(
+        self,
+        image: Image,
+        predicted: Surface,
+        reach_m: float = np.inf,
+        occluders: NDArray[np.float64] = NO_OCCLUDERS,
+    ) -> "ObservedColor":
+        """Sets the colour image; NaN, as in the border, means no measurement, and infinity an occluder."""
         if not isinstance(image, ColorImage):
             raise TypeError(f"sensor {self.sensor} has a colour noise model but delivered {type(image).__name__}")
         window = self._synthesizer.window(self.sensor, predicted, reach_m)
@@ -65,16 +72,17 @@ class ColorTerm:
         seen = self._view.synthesize(predicted)
         widening = self._registration_noise.widening(self._view, predicted, self._sigma)
         inverse = np.float32(1) / (self._sigma * widening.factor)
+        illumination = Exposed().adapt(texture[seen.pixel[0]], seen.attributes[0].T)
+        if len(occluders):
+            self._bordered.inside[occluded_pixels(self._view.camera, occluders)[window]] = np.inf
         return ObservedColor(
             sensor=self.sensor,
             view=self._view,
             bounds=self._bounds,
-            illumination=Exposed().adapt(texture[seen.pixel[0]], seen.attributes[0].T),
+            illumination=illumination,
             bias=self._bias,
-            shadow=self._shadow,
             image=picture,
             texture=texture,
-            window=window,
             inverse=np.repeat(inverse, 3 // widening.factor.shape[1], axis=1),
             normalizer=(self._constant + 3 * widening.log.mean(axis=1)).astype(np.float32),
         )
@@ -105,10 +113,8 @@ class ObservedColor:
         bounds: costs of the outlier model.
         illumination: exposure of the image.
         bias: of the registration of edges.
-        shadow: of occluders.
         image: colours (height, width, 3) in the view's camera.
         texture: the same with a border of one pixel, flattened (pixels, 3).
-        window: of the image that is compared.
         inverse: inverse deviations (n or 1, 3) of the samples' colours.
         normalizer: cost (n or 1,) of a colour that agrees exactly.
     """
@@ -118,23 +124,15 @@ class ObservedColor:
     bounds: Bounds
     illumination: Exposed
     bias: RegistrationBias
-    shadow: Shadow
     image: NDArray[np.float32] | NDArray[np.uint8]
     texture: NDArray[np.float32]
-    window: Window
     inverse: NDArray[np.float32]
     normalizer: NDArray[np.float32]
 
     @property
     def occluders(self) -> NDArray[np.float64]:
         """No points: colours carry no distance."""
-        return np.zeros((0, 3))
-
-    def hide(self, points: NDArray[np.float64]) -> None:
-        """Masks the pixels occluded by points (k, 3) [m]."""
-        if len(points):
-            bordered = self.texture.reshape(self.image.shape[0] + 2, -1, 3)
-            within(bordered, self.window)[self.shadow.mask(points)[self.window]] = np.inf
+        return NO_OCCLUDERS
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
         """−Σ_v log of the density of the measured colours (population,)."""

@@ -5,12 +5,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.pairing.images import Window
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import Synthesis, View
 from abs_service.tracker.synthesis.perspective import project_with_jacobian
-from abs_service.tracker.synthesis.window import within
-from abs_service.tracker.terms.base import Bounds, facing
+from abs_service.tracker.terms.base import NO_OCCLUDERS, Bounds, facing
 from abs_service.tracker.terms.gradients import channel_gradients, shortened
 from abs_service.tracker.terms.image_noise import NORMAL_MEDIAN, noise_deviation
 from abs_service.tracker.terms.linearization import Part, PointLinearization
@@ -19,7 +17,6 @@ from abs_service.tracker.terms.photometric.channel_cost import CHANNEL, INVERSE,
 from abs_service.tracker.terms.photometric.illumination import Illumination
 from abs_service.tracker.terms.photometric.matching import Measured, costs_of, matched
 from abs_service.tracker.terms.photometric.registration_bias import RegistrationBias
-from abs_service.tracker.terms.photometric.shadow import Shadow
 from abs_service.tracker.terms.photometric.texture_registration_noise import Widening
 from abs_service.tracker.terms.sensor_fit import SensorFit, summarize
 from abs_service.tracker.terms.vertex_counts import VertexMasks
@@ -36,10 +33,8 @@ class ObservedChannel:
         illumination: light of the frame.
         widening: of the noise, by that of the texture's registration.
         bias: of the registration of edges.
-        shadow: of occluders.
         image: texels (height, width, 4) in the view's camera, see `channel_cost`.
         texture: the same with a border of one pixel, flattened (pixels, 4).
-        window: of the image that is compared.
         is_mosaic: each pixel shows one of several channels.
     """
 
@@ -49,22 +44,14 @@ class ObservedChannel:
     illumination: Illumination
     widening: Widening
     bias: RegistrationBias
-    shadow: Shadow
     image: NDArray[np.float32]
     texture: NDArray[np.float32]
-    window: Window
     is_mosaic: bool
 
     @property
     def occluders(self) -> NDArray[np.float64]:
         """No points: brightness carries no distance."""
-        return np.zeros((0, 3))
-
-    def hide(self, points: NDArray[np.float64]) -> None:
-        """Masks the pixels occluded by points (k, 3) [m]."""
-        if len(points):
-            bordered = self.texture.reshape(self.image.shape[0] + 2, -1, 4)
-            within(bordered, self.window)[self.shadow.mask(points)[self.window], VALUE] = np.inf
+        return NO_OCCLUDERS
 
     def exposed(self, predicted: Surface) -> "ObservedChannel":
         """The frame in the light that it shows on the predicted mesh, a population of one."""

@@ -16,7 +16,7 @@ from abs_service.tracker.posterior.priors.settings import Settings
 from abs_service.tracker.synthesis.projection import Projection
 from abs_service.tracker.synthesis.rasterization.raster import Raster
 from abs_service.tracker.synthesis.window import WHOLE, Bordered, Placed, around
-from abs_service.tracker.terms.base import Bounds
+from abs_service.tracker.terms.base import NO_OCCLUDERS, Bounds
 from abs_service.tracker.terms.depth.depth import DepthTerm
 from abs_service.tracker.terms.depth.outline.rim import Rim
 from abs_service.tracker.terms.depth.outline.rim_outline import RimOutline
@@ -117,10 +117,10 @@ def test_within_reach_colours_cost_the_same_as_in_the_whole_image():
     occluder = np.array([[0.0, 0.0, 0.9], [1.0, 0.0, 0.9]])  # one on the sheet, one outside the window
     for seed, x in enumerate((0.0, 0.03)):
         picture = ColorImage(np.random.default_rng(seed).integers(0, 255, (120, 200, 3)).astype(np.uint8))
-        seen = [term.observe(picture, moved(x, 0, 0), reach) for term, reach in zip(terms, (np.inf, REACH_M))]
-        for hide in (np.zeros((0, 3)), occluder):
-            for term in seen:
-                term.hide(hide)
+        for hidden_by in (NO_OCCLUDERS, occluder):
+            seen = [
+                term.observe(picture, moved(x, 0, 0), reach, hidden_by) for term, reach in zip(terms, (np.inf, REACH_M))
+            ]
             for step in np.random.default_rng(1).uniform(-0.02, 0.02, (20, 3)):
                 surface = moved(x + step[0], step[1], 0.3 * step[2])
                 np.testing.assert_array_equal(seen[1].cost(surface), seen[0].cost(surface))
@@ -135,10 +135,10 @@ def test_within_reach_a_mosaic_costs_the_same_as_in_the_whole_image(order):
     for seed, x in enumerate((0.0, 0.03, 0.0341)):
         values = np.random.default_rng(seed).uniform(0, 255, (120, 200)).astype(np.float32)
         image, predicted = ChannelImage(values, pattern), moved(x, 0, 0)
-        whole, window = (term.observe(image, predicted, by) for term, by in zip(terms, (np.inf, REACH_M)))
-        for hide in (np.zeros((0, 3)), occluder):
-            whole.hide(hide)
-            window.hide(hide)
+        for hidden_by in (NO_OCCLUDERS, occluder):
+            whole, window = (
+                term.observe(image, predicted, by, hidden_by) for term, by in zip(terms, (np.inf, REACH_M))
+            )
             for step in np.random.default_rng(1).uniform(-0.02, 0.02, (20, 3)):
                 surface = moved(x + step[0], step[1], 0.3 * step[2])
                 np.testing.assert_array_equal(window.cost(surface), whole.cost(surface))

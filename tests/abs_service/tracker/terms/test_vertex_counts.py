@@ -1,5 +1,6 @@
 """Every vertex has one class in every sensor, and surface beside the mesh is noticed."""
 
+from collections.abc import Callable
 from dataclasses import fields
 
 import numpy as np
@@ -12,7 +13,7 @@ from abs_service.tracker.terms.base import Bounds
 from abs_service.tracker.terms.depth.depth import DepthTerm
 from abs_service.tracker.terms.depth.outline.continuation import CoarseContinuation
 from abs_service.tracker.terms.photometric.color import ColorTerm
-from abs_service.tracker.terms.sensor_fit import SensorFit
+from abs_service.tracker.terms.sensor_fit import Remainder, SensorFit
 from abs_service.tracker.terms.vertex_counts import VertexCounts
 from calib.camera import Camera
 from calib.noise.constant import Constant
@@ -122,14 +123,13 @@ def test_shares_are_of_the_vertices_that_face_the_sensor(name: str):
     assert VertexCounts().share(name) == 0.0
 
 
-def continuation(size: tuple[float, float], camera: Camera = CAMERA) -> CoarseContinuation:
-    result = CoarseContinuation(camera, MESH)
-    result.observe(picture(size) < 1.3)
-    return result
+def remainder(size: tuple[float, float]) -> Callable[[Surface], Remainder]:
+    """Of a sheet of a size in its first image."""
+    return CoarseContinuation(CAMERA, MESH).observe(picture(size) < 1.3)
 
 
 def test_nothing_is_left_of_a_sheet_that_the_mesh_covers():
-    assert continuation((0.32, 0.22)).remainder(moved()).share < 0.01
+    assert remainder((0.32, 0.22))(moved()).share < 0.01
 
 
 def test_what_is_left_is_measured_near_the_mesh():
@@ -137,34 +137,32 @@ def test_what_is_left_is_measured_near_the_mesh():
     cell, side = 0.3 / 18, np.sqrt(0.3 * 0.2)
     for wider in (0.06, 0.1):
         beside = 2 * (wider / 2 - cell) * 0.2
-        found = continuation((0.3 + wider, 0.2)).remainder(moved())
+        found = remainder((0.3 + wider, 0.2))(moved())
         assert found.share == pytest.approx(beside / (beside + 0.06), abs=0.03)  # the grid has 7 mm
         assert found.share == found.at_first
     reach = side / 4
-    wall = continuation((9.0, 9.0)).remainder(moved()).share
+    wall = remainder((9.0, 9.0))(moved()).share
     around = 2 * (0.3 + 0.2) * reach + np.pi * ((reach + cell) ** 2 - cell**2)
     assert wall == pytest.approx(around / (around + 0.06), rel=0.1)
 
 
 def test_a_mesh_that_slides_leaves_surface_behind():
-    shown = continuation((0.32, 0.22))
-    assert shown.remainder(moved()).gained == 0.0
-    assert shown.remainder(moved(0.08)).gained == pytest.approx(0.2, abs=0.05)
-    assert shown.remainder(moved(0.0)).gained == 0.0
+    left = remainder((0.32, 0.22))
+    assert left(moved()).gained == 0.0
+    assert left(moved(0.08)).gained == pytest.approx(0.2, abs=0.05)
+    assert left(moved(0.0)).gained == 0.0
 
 
 def test_only_the_window_is_looked_at():
     whole, part = CoarseContinuation(CAMERA, MESH), CoarseContinuation(CAMERA, MESH)
     shown = picture((0.4, 0.2)) < 1.3
     window = (slice(21, 101), slice(3, 157))
-    whole.observe(shown)
-    part.observe(shown[window], window)
-    assert whole.remainder(moved()).share == part.remainder(moved()).share > 0
+    left, left_in_part = whole.observe(shown), part.observe(shown[window], window)
+    assert left(moved()).share == left_in_part(moved()).share > 0
 
 
 def test_without_the_object_the_remainder_is_unknown():
-    shown = CoarseContinuation(CAMERA, MESH)
-    shown.observe(np.zeros((CAMERA.height, CAMERA.width), bool))
-    found = shown.remainder(moved())
+    nothing = np.zeros((CAMERA.height, CAMERA.width), bool)
+    found = CoarseContinuation(CAMERA, MESH).observe(nothing)(moved())
     assert np.isnan(found.share)
     assert found.gained == 0.0

@@ -1,5 +1,6 @@
 """Interface of the outline of an object in one camera, and the null object without one."""
 
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -13,26 +14,12 @@ from abs_service.tracker.terms.linearization import Linearization, PointLineariz
 from abs_service.tracker.terms.sensor_fit import RimFit
 
 
-class Outline(Protocol):
-    """Cost of the outline in one camera."""
+class ObservedOutline(Protocol):
+    """Cost of the outline in one frame of one camera."""
 
-    def observe(
-        self,
-        distance: NDArray[np.float32],
-        seen: Visibility,
-        expected: NDArray[np.float32],
-        predicted: Surface,
-        window: Window = WHOLE,
-    ) -> NDArray[np.bool_]:
-        """Sets the outline from a window of a depth image; True for pixels beside the object that serve for it only.
-
-        Args:
-            distance: measured distances (rows, columns) [m] in the window.
-            seen: their classification.
-            expected: distances of the predicted surface there, infinite beside it [m].
-            predicted: predicted surface, a population of one.
-            window: of the image.
-        """
+    @property
+    def doubtful(self) -> NDArray[np.bool_]:
+        """Pixels of the window (rows, columns) near the outline that are held against no vertex."""
         ...
 
     def cost(self, surface: Surface) -> NDArray[np.float64] | float:
@@ -44,7 +31,7 @@ class Outline(Protocol):
         ...
 
     def match(self, surface: Surface, sparse_jacobian: SparseJacobian) -> PointLinearization:
-        """Residuals of the places of vertices where the outline is looked for beside the mesh, see `Term.match`."""
+        """Residuals of the places of vertices where the outline is looked for beside the mesh, see `ObservedTerm`."""
         ...
 
     def fit(self, surface: Surface) -> RimFit:
@@ -52,8 +39,8 @@ class Outline(Protocol):
         ...
 
 
-class NoOutline:
-    """Null object for objects whose outline is not compared: zero cost."""
+class Outline(Protocol):
+    """The outline of an object in one camera, frame after frame."""
 
     def observe(
         self,
@@ -62,9 +49,43 @@ class NoOutline:
         expected: NDArray[np.float32],
         predicted: Surface,
         window: Window = WHOLE,
-    ) -> NDArray[np.bool_]:
-        """Empty mask."""
-        return np.zeros(distance.shape, np.bool_)
+    ) -> ObservedOutline:
+        """The cost of the outline in a window of a depth image.
+
+        Args:
+            distance: measured distances (rows, columns) [m] in the window.
+            seen: their classification.
+            expected: distances of the predicted surface there, infinite beside it [m].
+            predicted: predicted surface, a population of one.
+            window: of the image.
+        """
+        ...
+
+
+class NoOutline:
+    """Null object for objects whose outline is not compared."""
+
+    def observe(
+        self,
+        distance: NDArray[np.float32],
+        seen: Visibility,
+        expected: NDArray[np.float32],
+        predicted: Surface,
+        window: Window = WHOLE,
+    ) -> "UnobservedOutline":
+        """Nothing to compare."""
+        return UnobservedOutline(np.zeros(distance.shape, np.bool_))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class UnobservedOutline:
+    """Null object: zero cost.
+
+    Attributes:
+        doubtful: no pixel of the window (rows, columns).
+    """
+
+    doubtful: NDArray[np.bool_]
 
     def cost(self, surface: Surface) -> float:
         """Zero."""

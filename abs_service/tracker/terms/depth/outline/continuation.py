@@ -1,6 +1,8 @@
 """Measured surface of the object beside its mesh: what a mesh leaves unexplained, on a coarse grid of pixels."""
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Protocol
 
 import cv2
@@ -23,26 +25,24 @@ LARGEST_REACH = 0.25
 
 
 class Continuation(Protocol):
-    """The measured surface that is continuous with the object in one camera's image."""
+    """The measured surface that is continuous with the object in one camera's images."""
 
-    def observe(self, shown: NDArray[np.bool_], window: Window = WHOLE) -> None:
-        """Sets the pixels (rows, columns) in a window that show the object."""
-        ...
+    def observe(self, shown: NDArray[np.bool_], window: Window = WHOLE) -> Callable[[Surface], Remainder]:
+        """Surface in one image that a population of one leaves unexplained.
 
-    def remainder(self, surface: Surface) -> Remainder:
-        """Surface that a population of one leaves unexplained."""
+        Args:
+            shown: pixels (rows, columns) in the window that show the object.
+            window: of the image.
+        """
         ...
 
 
 class NoContinuation:
     """Null object: the share is unknown."""
 
-    def observe(self, shown: NDArray[np.bool_], window: Window = WHOLE) -> None:
-        """No effect."""
-
-    def remainder(self, surface: Surface) -> Remainder:
-        """Unknown."""
-        return Remainder()
+    def observe(self, shown: NDArray[np.bool_], window: Window = WHOLE) -> Callable[[Surface], Remainder]:
+        """Unknown for every surface."""
+        return lambda surface: Remainder()
 
 
 class CoarseContinuation:
@@ -55,37 +55,38 @@ class CoarseContinuation:
         self._step = max(camera.width // COLUMNS, 1)
         few = _every(camera, self._step)
         self._raster = Raster(few, mesh.faces)
-        self._shown = np.zeros((few.height, few.width), np.bool_)
+        self._shape = few.height, few.width
         self._focal = camera.fx / self._step
         self._gap_m = float(np.median(edge_lengths(mesh.vertices, mesh.edges)))
         self._reach_m = LARGEST_REACH * float(np.sqrt(mesh.area)) + self._gap_m
         self._at_first = float("nan")
 
-    def observe(self, shown: NDArray[np.bool_], window: Window = WHOLE) -> None:
-        """Takes every few pixels."""
-        rows, columns = self._shown.shape
+    def observe(self, shown: NDArray[np.bool_], window: Window = WHOLE) -> Callable[[Surface], Remainder]:
+        """See `Continuation`; of every few pixels."""
+        rows, columns = self._shape
         top, _, left, _ = limits(window, (rows * self._step, columns * self._step))
         few = shown[-top % self._step :: self._step, -left % self._step :: self._step]
         row, column = -(-top // self._step), -(-left // self._step)
-        self._shown[:] = False
-        self._shown[row : row + few.shape[0], column : column + few.shape[1]] = few
+        whole = np.zeros(self._shape, np.bool_)
+        whole[row : row + few.shape[0], column : column + few.shape[1]] = few
+        return partial(self._remainder, whole)
 
-    def remainder(self, surface: Surface) -> Remainder:
+    def _remainder(self, shown: NDArray[np.bool_], surface: Surface) -> Remainder:
         """Share of the object's pixels that lie beside a population of one, now and the first time."""
-        share = self._share(surface)
+        share = self._share(shown, surface)
         self._at_first = share if np.isnan(self._at_first) else self._at_first
         return Remainder(share, self._at_first)
 
-    def _share(self, surface: Surface) -> float:
+    def _share(self, shown: NDArray[np.bool_], surface: Surface) -> float:
         """Share of the pixels beside the mesh in those and the ones on it; NaN without any."""
         distance = self._raster.render(surface.vertices[0])
         on_mesh = np.isfinite(distance)
-        explained = int(np.count_nonzero(on_mesh & self._shown))
+        explained = int(np.count_nonzero(on_mesh & shown))
         if not explained:
             return float("nan")
         pixel_m = float(distance[on_mesh].mean()) / self._focal
         away_m = pixel_m * cv2.distanceTransform((~on_mesh).view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_3)
-        beside = self._shown & (away_m > max(self._gap_m, pixel_m)) & (away_m <= self._reach_m)
+        beside = shown & (away_m > max(self._gap_m, pixel_m)) & (away_m <= self._reach_m)
         left = int(np.count_nonzero(beside))
         return left / (left + explained)
 

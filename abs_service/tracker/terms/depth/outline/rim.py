@@ -2,13 +2,16 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.pairing.images import Window
 from abs_service.tracker.mesh import Mesh, edges_of
+from abs_service.tracker.models.base import Surface
 from abs_service.tracker.synthesis.perspective import project_with_jacobian
+from abs_service.tracker.synthesis.projection import Projection
 from abs_service.tracker.synthesis.window import corner
 from calib.camera import Camera
 from calib.jit import kernel
@@ -46,6 +49,84 @@ class Rim:
         across = across[np.argsort(length, kind="stable")]
         outer, nearest = np.unique(across[:, 0], return_index=True)
         return cls(outer.astype(np.intp), across[nearest, 1].astype(np.intp), mesh.is_complete)
+
+
+class Edges(NamedTuple):
+    """Edges of a mesh's rim, extrapolated to where the object ends: outer + beyond (outer − inner).
+
+    Attributes:
+        outer: outermost vertices (k,).
+        inner: for each, a neighbour (k,) inside.
+        beyond: for each, the gap to the end of the object (k,), as a share of the distance from the inner vertex.
+    """
+
+    outer: NDArray[np.intp]
+    inner: NDArray[np.intp]
+    beyond: NDArray[np.float32]
+
+    def some(self, which: NDArray[np.intp]) -> "Edges":
+        """Some of the edges, by their indices (m,)."""
+        return Edges(self.outer[which], self.inner[which], self.beyond[which])
+
+    def vertices(self, surface: Surface) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Outer and inner vertices of a population of one, each (k, 3) [m]."""
+        outer, inner = (surface.vertices[0].T[which].astype(np.float64) for which in (self.outer, self.inner))
+        return outer, inner
+
+    def points(self, surface: Surface) -> NDArray[np.float32]:
+        """The extrapolated rim (1, 3, k) [m] of a population of one."""
+        points = np.empty((1, 3, len(self.outer)), np.float32)
+        extrapolate_rim(surface.vertices, *self, points)
+        return points
+
+    def directions(self, camera: Camera, surface: Surface, places: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Directions out of the mesh in the image (k, 2), at the edges' places (k, 2) [px]."""
+        return places - project_with_jacobian(camera, self.vertices(surface)[1])[0]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OutlineImage:
+    """Distances from the outline of the object in one depth image.
+
+    Attributes:
+        camera: the depth camera.
+        projection: of the same camera.
+        inwards: distances of the pixels of a part of the image inside the outline (rows, columns) [px], NaN if unknown.
+        corner: column and row of the first of these pixels (2,).
+    """
+
+    camera: Camera
+    projection: Projection
+    inwards: NDArray[np.float32]
+    corner: NDArray[np.float32]
+
+    def inside(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Distance inside the outline (k,) of the pixels at places (k, 2) [px]: −∞ far outside, NaN if unknown."""
+        return read(self.inwards, self.corner, places, (self.camera.width, self.camera.height))
+
+    def inside_at(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """`inside` of points (k, 3) [m]."""
+        return self.inside(project_with_jacobian(self.camera, points)[0])
+
+    def locate(
+        self, edges: Edges, surface: Surface
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Edges of a population of one (k, 3) [m], their places in the image (k, 2) [px], and `inside` there (k,)."""
+        points = edges.points(surface)[0].T.astype(np.float64)
+        places = project_with_jacobian(self.camera, points)[0]
+        return points, places, self.inside(places)
+
+    def look(self, places: NDArray[np.floating]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Distances (k,) of places (k, 2) inside the outline [px], interpolated, and their image gradients (k, 2)."""
+        values, gradients = np.empty(len(places)), np.empty((len(places), 2))
+        look_up(self.inwards, places - self.corner, values, gradients)
+        return values, gradients
+
+    def look_at(self, points: NDArray[np.float32]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """`look` of points (1, 3, k) [m], huge where the camera does not see them."""
+        (place,), (inverse_z,) = self.projection.project(points)
+        place[np.isnan(inverse_z)] = np.nan
+        return self.look(place)
 
 
 @kernel
@@ -160,23 +241,6 @@ def extrapolate_rim(
         for v in range(outer.size):
             end = of_vertices[outer[v]]
             points[0, i, v] = end + beyond[v] * (end - of_vertices[inner[v]])
-
-
-def shared_by_side(
-    jacobian: NDArray[np.float64], residual: NDArray[np.float64], gradients: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Sums (4, dim) of the rows (k, dim) of edges that face one side of the image, times their shared deviation.
-
-    It is one, that of the outline, or what the normalised residuals (k,) show: an edge that the mesh cannot follow is
-    not where the outline says.
-
-    Args:
-        jacobian, residual: of the free edges.
-        gradients: image gradients (k, 2) of their distances from the outline, which tell the side.
-    """
-    sides = by_side(gradients)
-    mean_square = sides @ residual**2 / np.maximum(sides.sum(axis=1), 1)
-    return np.sqrt(np.maximum(mean_square, 1.0))[:, None] * (sides @ jacobian)
 
 
 def by_side(directions: NDArray[np.float64]) -> NDArray[np.bool_]:

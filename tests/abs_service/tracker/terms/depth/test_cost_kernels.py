@@ -9,7 +9,7 @@ from abs_service.tracker.objectives import euclidean, likelihood
 from abs_service.tracker.posterior.priors.stretch_prior import StretchPrior
 from abs_service.tracker.terms.base import Bounds
 from abs_service.tracker.terms.depth.depth import DepthTerm
-from abs_service.tracker.terms.depth.depth_cost import FREE_SCALE_M, depth_cost, write_constants
+from abs_service.tracker.terms.depth.depth_cost import FREE_SCALE_M, ConstantCosts, depth_cost, write_constants
 from abs_service.tracker.terms.depth.texels import missing_texel
 from abs_service.tracker.terms.photometric.color import ColorTerm
 from calib.camera import Camera
@@ -92,7 +92,8 @@ def test_pixels_that_say_nothing_of_distances_become_constants(seed):
     inner[silent] = np.eye(8)[6] * -2.5
     inner[free_m > 0] = np.eye(8)[6] * (7.0 + free_m[free_m > 0, None] / FREE_SCALE_M)
     distance = np.where(missing, np.nan, 1).astype(np.float32)
-    write_constants(silent, distance, free_m, missing_texel(-2.5), -2.5, 7.0, top, left, texture)
+    costs = ConstantCosts(silent, distance, free_m, missing_texel(-2.5), -2.5, 7.0)
+    write_constants(costs, (top, left), texture)
     np.testing.assert_allclose(texture, expected, rtol=1e-5)
 
 

@@ -12,7 +12,7 @@ from abs_service.tracker.terms.photometric.channel import ChannelTerm
 from abs_service.tracker.terms.photometric.channel_cost import copy, fill
 from abs_service.tracker.terms.photometric.exposure import gains
 from abs_service.tracker.terms.photometric.illumination import Active, Passive, lambert
-from abs_service.tracker.terms.photometric.shadow import Shadow
+from abs_service.tracker.terms.photometric.occlusion import occluded_pixels
 from calib.noise.images.bayer import GaussianBayer
 from calib.noise.images.grey import GaussianGrey
 from calib.noise.images.intensity import GaussianIntensity
@@ -65,10 +65,9 @@ def test_the_cost_is_the_likelihood(name, seed):
     looks[::7] = np.nan
     made = term(noise, looks)
     hands = CAMERA.center + 0.5 * (vertices[vertices[:, 2] > 0][:3] - CAMERA.center)
-    covered = Shadow(CAMERA).mask(hands)
+    covered = occluded_pixels(CAMERA, hands)
     image.values[~covered & (generator.random(SHAPE) < 0.1)] = np.nan
-    made = made.observe(image, in_sight(CAMERA, len(vertices)))
-    made.hide(hands)
+    made = made.observe(image, in_sight(CAMERA, len(vertices)), occluders=hands)
     expected = reference.channel_cost(
         *(CAMERA, noise, image.values, image.channel, covered),
         *(looks * shine[:, None], vertices.astype(float), normals.astype(float), SHARE),

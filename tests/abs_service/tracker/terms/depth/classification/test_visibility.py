@@ -19,7 +19,7 @@ from abs_service.tracker.terms.depth.depth_cost import FREE_SCALE_M
 from abs_service.tracker.terms.depth.observed_depth import ObservedDepth
 from abs_service.tracker.terms.linearization import stack
 from abs_service.tracker.terms.photometric.color import ColorTerm
-from abs_service.tracker.terms.photometric.shadow import Shadow
+from abs_service.tracker.terms.photometric.occlusion import occluded_pixels
 from calib import pose
 from calib.camera import Camera
 from calib.noise.gaussian_polynomial import GaussianPolynomial
@@ -187,10 +187,10 @@ def test_an_occluder_that_a_depth_sensor_sees_hides_colours_from_another_camera(
     term = ColorTerm("color", sparse(camera, MESH), MESH.colors, GaussianColor(), Bounds(0.05, 16, 19))
     black = ColorImage(np.zeros((120, 160, 3), np.uint8))
     surface = as_surface((MESH.vertices, MESH.normals))
-    term = term.observe(black, surface)
-    before, cost = term.fit(surface), term.cost(surface)[0]
-    term.hide(points)
-    after = term.fit(surface)
+    uncovered = term.observe(black, surface)
+    before, cost = uncovered.fit(surface), uncovered.cost(surface)[0]
+    covered = term.observe(black, surface, occluders=points)
+    after = covered.fit(surface)
     assert before.occluded == 0
     low, high = camera.project(points).min(axis=0), camera.project(points).max(axis=0)
     place = camera.project(MESH.vertices)
@@ -198,14 +198,14 @@ def test_an_occluder_that_a_depth_sensor_sees_hides_colours_from_another_camera(
     near = np.all((place > low - 3) & (place < high + 3), axis=1)
     assert np.count_nonzero(inside) > 5
     assert np.count_nonzero(inside) <= after.occluded <= np.count_nonzero(near)
-    assert term.cost(surface)[0] == pytest.approx(
+    assert covered.cost(surface)[0] == pytest.approx(
         cost - after.occluded * (19 - 0.05 - 3 * np.log(15 * np.sqrt(2 * np.pi)) - 1.5)
     )
 
 
-def test_points_behind_a_camera_cast_no_shadow():
+def test_points_behind_a_camera_occlude_nothing():
     points = np.array([[0.0, 0, -1], [0, 0, 0], [5, 0, 0.5]])
-    assert not Shadow(STRAIGHT).mask(points).any()
+    assert not occluded_pixels(STRAIGHT, points).any()
 
 
 def test_missing_returns_of_an_object_that_fills_the_image_are_holes():

@@ -5,6 +5,7 @@ import numpy as np
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.terms.depth.classification.visibility import classify, surfaces_of
+from abs_service.tracker.terms.depth.outline.observed_outline import ObservedRimOutline
 from abs_service.tracker.terms.depth.outline.rim import Rim
 from abs_service.tracker.terms.depth.outline.rim_outline import RimOutline
 from calib.camera import Camera
@@ -28,13 +29,20 @@ def moved(mesh: Mesh, x: float, y: float = 0.0) -> Surface:
     return as_surface((mesh.vertices + np.array([x, y, 0.0]), mesh.normals))
 
 
-def outline(distance: np.ndarray, mesh: Mesh = MESH, deviation: float = 0.5) -> RimOutline:
-    result = RimOutline(CAMERA, Rim.of(mesh), deviation)
+def begun(distance: np.ndarray, mesh: Mesh = MESH) -> RimOutline:
+    """The outline of a mesh after its first image."""
+    result = RimOutline(CAMERA, Rim.of(mesh), 0.5)
     look(result, distance, mesh)
     return result
 
 
-def look(at: RimOutline, distance: np.ndarray, mesh: Mesh = MESH) -> np.ndarray:
+def outline(distance: np.ndarray, mesh: Mesh = MESH) -> ObservedRimOutline:
+    """The outline of a mesh in its first image."""
+    return look(RimOutline(CAMERA, Rim.of(mesh), 0.5), distance, mesh)
+
+
+def look(at: RimOutline, distance: np.ndarray, mesh: Mesh = MESH) -> ObservedRimOutline:
+    """The outline in the next image, where the mesh has not moved."""
     view = sparse(CAMERA, mesh).view("tof", np.zeros((len(mesh.vertices), 0), np.float32))
     predicted = moved(mesh, 0.0)
     expected = view.render(predicted)

@@ -25,7 +25,15 @@ from calib.noise.constant import Constant
 from calib.rig import Sensor
 from tests import reference
 from tests.abs_service.tracker.scenes import depth_image, sparse
-from tests.abs_service.tracker.terms.depth.outline.outline_scene import CAMERA, MESH, look, moved, outline, picture
+from tests.abs_service.tracker.terms.depth.outline.outline_scene import (
+    CAMERA,
+    MESH,
+    begun,
+    look,
+    moved,
+    outline,
+    picture,
+)
 
 
 @settings(max_examples=50, deadline=None)
@@ -163,9 +171,9 @@ def test_rows_predict_what_residuals_do():
 def test_a_mesh_that_ends_inside_the_object_is_continued():
     """Its rim stays as far inside the outline as it was when it was made."""
     small = replace(MESH, vertices=MESH.vertices * (0.92, 0.92, 1.0))
-    term = outline(picture(), small)
-    assert term.cost(moved(small, 0.0))[0] < 1
-    look(term, picture(by=0.01), small)
+    known = begun(picture(), small)
+    assert look(known, picture(), small).cost(moved(small, 0.0))[0] < 1
+    term = look(known, picture(by=0.01), small)
     costs = [term.cost(moved(small, x))[0] for x in (0.0, 5e-3, 10e-3, 15e-3, 20e-3)]
     assert np.argmin(costs) == 2
 

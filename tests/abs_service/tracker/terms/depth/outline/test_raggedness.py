@@ -65,13 +65,11 @@ def test_a_frayed_outline_holds_the_mesh_less_and_its_edges_are_not_off():
     generator = np.random.default_rng(3)
     off_outline = np.zeros(2)
     for distance in [picture(), *(frayed(generator) for _ in range(40))]:
-        look(steady, distance)
-        look(wide, distance)
-        fits = [term.fit(moved(MESH, 0.0)) for term in (steady, wide)]
+        fits = [look(term, distance).fit(moved(MESH, 0.0)) for term in (steady, wide)]
         off_outline += [fit.outside + fit.inside for fit in fits]
     assert off_outline[1] < 0.9 * off_outline[0]
     costs = []
     for term in (steady, wide):
-        look(term, picture())
-        costs.append(term.cost(moved(MESH, 6e-3))[0] - term.cost(moved(MESH, 0.0))[0])
+        seen = look(term, picture())
+        costs.append(seen.cost(moved(MESH, 6e-3))[0] - seen.cost(moved(MESH, 0.0))[0])
     assert 0 < costs[1] < costs[0] / 2

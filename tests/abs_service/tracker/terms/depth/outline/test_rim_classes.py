@@ -15,6 +15,7 @@ from tests.abs_service.tracker.terms.depth.outline.outline_scene import (
     BESIDE_M,
     CAMERA,
     MESH,
+    begun,
     look,
     moved,
     outline,
@@ -23,7 +24,7 @@ from tests.abs_service.tracker.terms.depth.outline.outline_scene import (
 
 
 def classes(distance: np.ndarray, mesh: Mesh = MESH) -> dict[RimClass, int]:
-    found = outline(distance, mesh).classes
+    found = begun(distance, mesh).classes
     return {one: int(np.count_nonzero(found == one)) for one in RimClass}
 
 
@@ -41,11 +42,11 @@ def test_an_edge_on_a_table_or_cut_by_a_mask_is_in_contact():
     rays = CAMERA.unproject(np.ones_like(table))
     right = (rays[..., 0] / rays[..., 2] > 0.1) & (np.abs(rays[..., 1] / rays[..., 2]) < 0.12)
     table[right] = (1.0 / rays[..., 2])[right]
-    found = outline(table)
+    found = begun(table)
     x = MESH.vertices[Rim.of(MESH).outer, 0]
     assert np.mean(found.classes[x > 0.14] == RimClass.CONTACT) > 0.9  # but for a corner
     assert np.all(found.classes[x < 0.0] == RimClass.FREE)
-    here = found.fit(moved(MESH, 0.0))
+    here = look(found, table).fit(moved(MESH, 0.0))
     assert here.visible == np.count_nonzero(found.classes == RimClass.FREE)
 
 
@@ -55,12 +56,13 @@ def test_an_edge_beside_a_notch_of_a_larger_object_is_no_free_edge():
     rays = CAMERA.unproject(np.ones((CAMERA.height, CAMERA.width)))
     x, y = rays[..., 0] / rays[..., 2], rays[..., 1] / rays[..., 2]
     goes_on = (x > 0) & (np.abs(y) < 0.1) & ~((x > 0.18) & (y < -0.04))
-    found = outline(np.where(goes_on, 1.0 / rays[..., 2], picture(coarse)).astype(np.float32), coarse)
+    seen = np.where(goes_on, 1.0 / rays[..., 2], picture(coarse)).astype(np.float32)
+    found = begun(seen, coarse)
     outer = coarse.vertices[Rim.of(coarse).outer]
     right = outer[:, 0] > 0.14
     assert found.classes[right & (outer[:, 1] < -0.04)] == RimClass.FREE  # before the notch
     assert np.all(found.classes[right & (np.abs(outer[:, 1] - 0.025) < 0.03)] == RimClass.CONTACT)
-    here = found.fit(moved(coarse, 0.0))
+    here = look(found, seen, coarse).fit(moved(coarse, 0.0))
     assert (here.outside, here.inside) == (0, 0)
 
 
@@ -82,7 +84,7 @@ def test_the_outline_of_a_side_is_not_that_of_the_top(slope: float, expected: Ri
     x, y = rays[..., 0] / rays[..., 2], rays[..., 1] / rays[..., 2]
     z = (1 - 0.16 * slope) / (1 - slope * x)  # on the side, which begins at 0.16 m
     goes_on = (x > 0) & (z * x < 0.22) & (np.abs(y * z) < 0.1)
-    found = outline(np.where(goes_on, np.maximum(z, 1.0) / rays[..., 2], picture(coarse)).astype(np.float32), coarse)
+    found = begun(np.where(goes_on, np.maximum(z, 1.0) / rays[..., 2], picture(coarse)).astype(np.float32), coarse)
     outer = coarse.vertices[Rim.of(coarse).outer]
     middle = np.abs(outer[:, 1]) < 0.03
     assert np.all(found.classes[(outer[:, 0] > 0.14) & middle] == expected)
@@ -96,13 +98,11 @@ def test_an_edge_up_to_two_cells_before_an_occluder_is_occluded_until_that_leave
     rays = CAMERA.unproject(np.ones((CAMERA.height, CAMERA.width)))
     covered = picture(larger)
     covered[rays[..., 0] / rays[..., 2] > 0.15 + beyond] = 0.8
-    found = outline(covered)
+    found = begun(covered)
     right = MESH.vertices[Rim.of(MESH).outer, 0] > 0.14
     assert np.mean(found.classes[right] == RimClass.OCCLUDED) > 0.8  # but for the corners
     assert not np.any(found.classes[~right] == RimClass.OCCLUDED)
-    hidden = found.fit(moved(MESH, 0.0))
-    look(found, picture(larger))
-    seen = found.fit(moved(MESH, 0.0))
+    hidden, seen = (look(found, image).fit(moved(MESH, 0.0)) for image in (covered, picture(larger)))
     assert seen.covered == hidden.covered > 8
     assert hidden.uncovered == 0
     assert seen.uncovered >= 0.9 * hidden.covered  # a corner's own continuation is beside the sheet
@@ -125,7 +125,7 @@ def test_an_edge_before_columns_in_which_nothing_is_measured_is_cut_by_the_borde
     seen = picture(replace(MESH, vertices=MESH.vertices * (2, 1, 1) + np.array([shift + 0.15, 0, 0])))
     seen[:, last + 1 :] = np.nan
     seen[::2, last] = np.nan
-    found = outline(seen, cut)
+    found = begun(seen, cut)
     right = cut.vertices[Rim.of(cut).outer, 0] > cut.vertices[:, 0].max() - 0.01
     assert np.mean(found.classes[right] == RimClass.BORDER) > 0.8  # but for the corners
     assert not np.any(found.classes[~right] == RimClass.BORDER)
@@ -138,7 +138,7 @@ def test_a_sheet_that_is_alone_before_no_return_ends_by_itself_near_the_border_t
     aside = replace(MESH, vertices=MESH.vertices + np.array([shift, 0, 0]))
     alone = picture(aside)
     alone[alone > 1.3] = np.nan
-    assert np.all(outline(alone, aside).classes == RimClass.FREE)
+    assert np.all(begun(alone, aside).classes == RimClass.FREE)
 
 
 def test_an_edge_up_to_two_cells_before_the_border_is_cut_by_it_until_the_object_comes_into_the_image():
@@ -148,20 +148,19 @@ def test_an_edge_up_to_two_cells_before_the_border_is_cut_by_it_until_the_object
     shift = end - MESH.vertices[:, 0].max() - 0.012
     cut, left = (replace(MESH, vertices=MESH.vertices + np.array([by, 0, 0])) for by in (shift, shift - 0.1))
     whole = replace(MESH, vertices=MESH.vertices * (2, 1, 1) + np.array([shift + 0.15, 0, 0]))
-    found = outline(picture(whole), cut)
+    found = begun(picture(whole), cut)
     right = cut.vertices[Rim.of(cut).outer, 0] > end - 0.02
     assert np.mean(found.classes[right] == RimClass.BORDER) > 0.8  # but for the corners
     assert not np.any(found.classes == RimClass.OCCLUDED)
-    assert found.fit(moved(cut, 0.0)).uncovered == 0
-    look(found, picture(whole, -0.1), left)
-    seen = found.fit(moved(left, 0.0))
+    assert look(found, picture(whole), cut).fit(moved(cut, 0.0)).uncovered == 0
+    seen = look(found, picture(whole, -0.1), left).fit(moved(left, 0.0))
     assert seen.uncovered >= 0.8 * seen.covered > 8
 
 
 def test_the_edge_of_a_body_that_turns_away_is_a_silhouette():
     """A roll: its mesh ends where its surface is seen at a grazing angle."""
     roll = sheet(13, 19, lambda x, y: 1.15 - np.sqrt(0.15**2 - np.clip(x, -0.1495, 0.1495) ** 2) + 0 * y)
-    found = outline(picture(), roll).classes
+    found = begun(picture(), roll).classes
     x = np.abs(roll.vertices[Rim.of(roll).outer, 0])
     assert np.mean(found[x > 0.14] == RimClass.SILHOUETTE) > 0.9
 
@@ -196,19 +195,17 @@ def test_a_mesh_that_hangs_over_where_the_image_cut_the_object_has_slid():
     shift = end - MESH.vertices[:, 0].max() - 0.012
     cut = replace(MESH, vertices=MESH.vertices + np.array([shift, 0, 0]))
     whole = replace(MESH, vertices=MESH.vertices * (2, 1, 1) + np.array([shift + 0.15, 0, 0]))
-    found = outline(picture(whole), cut)
-    assert found.fit(moved(cut, 0.0)).off_m == 0
+    found = begun(picture(whole), cut)
+    assert look(found, picture(whole), cut).fit(moved(cut, 0.0)).off_m == 0
     drawn = picture(whole, end - 0.06 - whole.vertices[:, 0].max())
     drawn[:, :30] = picture(whole)[:, :30]  # as if the board were longer
-    look(found, drawn, cut)
-    assert found.fit(moved(cut, 0.0)).off_m > 0.015
+    assert look(found, drawn, cut).fit(moved(cut, 0.0)).off_m > 0.015
 
 
 def test_the_distance_of_the_edges_from_the_outline_is_told_in_metres():
     """The sheet is 40 mm longer to the right than when the mesh was made; on the other sides, the edges are on it."""
-    found = outline(picture())
-    look(found, np.minimum(picture(), picture(by=0.04)))
-    here, y = found.fit(moved(MESH, 0.0)), np.linspace(-0.1, 0.1, 13)[1:-1]
+    longer = look(begun(picture()), np.minimum(picture(), picture(by=0.04)))
+    here, y = longer.fit(moved(MESH, 0.0)), np.linspace(-0.1, 0.1, 13)[1:-1]
     nearest = np.minimum(0.04, 0.1 - np.abs(y))
     off = nearest > FARTHEST * 0.5 / CAMERA.fx  # beyond the bound of the cost
     assert (here.outside, here.inside) == (0, np.count_nonzero(off))
@@ -218,9 +215,9 @@ def test_the_distance_of_the_edges_from_the_outline_is_told_in_metres():
 def test_the_surface_hides_its_own_edge():
     """A sheet that is rolled up: the vertices of the far end lie behind the near one."""
     rolled = replace(MESH, vertices=MESH.vertices * (1.0, 1.0, 1.0) + (MESH.vertices[:, :1] > 0.1) * (0.0, 0.0, 0.05))
-    result = outline(picture())
+    known = begun(picture())
     view = sparse(CAMERA, MESH).view("tof", np.zeros((len(MESH.vertices), 0), np.float32))
     expected = view.render(moved(MESH, 0.0))
     distance = picture()
-    result.observe(distance, classify(surfaces_of(distance), expected, CAMERA.fx), expected, moved(rolled, 0.0))
-    assert result.fit(moved(rolled, 0.0)).occluded >= 11
+    seen = known.observe(distance, classify(surfaces_of(distance), expected, CAMERA.fx), expected, moved(rolled, 0.0))
+    assert seen.fit(moved(rolled, 0.0)).occluded >= 11

@@ -1,0 +1,145 @@
+"""One frame of an outline: the free edges of a mesh compared with the end of the object in one depth image."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.tracker.models.base import SparseJacobian, Surface
+from abs_service.tracker.synthesis.perspective import project_with_jacobian
+from abs_service.tracker.terms.depth.outline.rim import Edges, OutlineImage, by_side, chain
+from abs_service.tracker.terms.depth.outline.rim_classes import LARGEST_GAP_STEPS
+from abs_service.tracker.terms.depth.outline.rim_cost import FARTHEST
+from abs_service.tracker.terms.depth.outline.rim_match import shift_to_outline
+from abs_service.tracker.terms.depth.outline.rim_motion import displacement, motion
+from abs_service.tracker.terms.depth.outline.rim_normal import across_rim
+from abs_service.tracker.terms.depth.outline.round_outline import without_turn
+from abs_service.tracker.terms.linearization import Linearization, PointLinearization
+from abs_service.tracker.terms.patches import found_at
+from abs_service.tracker.terms.sensor_fit import RimFit
+
+#: Fewer vertices that hang over the outline, where the object went on at first, may be strays.
+MIN_HANGING = 3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ObservedRimOutline:
+    """Distances of the free edges from the outline, normal with zero mean and bounded; see `ObservedOutline`.
+
+    Attributes:
+        image: distances from the outline.
+        edges: the free edges (k,) in sight.
+        hidden: number of free edges that the predicted mesh itself hides.
+        covered: edges beyond which something hid the object in the first image, or that its border cut.
+        along: unit directions of the rim in the image (k, 2) at the free edges, see `rim_directions`.
+        is_round: the outline does not show a turn of the object in its plane.
+        deviation: σ of the position of the outline [px].
+        off_px: an edge that is farther from the outline is off it [px].
+        doubtful: pixels of the window (rows, columns) near the outline that are held against no vertex.
+        kernel: `rim_cost` of the camera's lens.
+    """
+
+    image: OutlineImage
+    edges: Edges
+    hidden: int
+    covered: Edges
+    along: NDArray[np.float64]
+    is_round: bool
+    deviation: float
+    off_px: float
+    doubtful: NDArray[np.bool_]
+    kernel: Callable[..., None]
+
+    def cost(self, surface: Surface) -> NDArray[np.float64]:
+        """Cost (population,) of every deformed mesh."""
+        out, image = np.empty(len(surface.vertices)), self.image
+        ends_and_optics = *self.edges, *image.projection.arguments
+        self.kernel(surface.vertices, self.deviation, *ends_and_optics, image.corner, image.inwards, out)
+        return out
+
+    def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> Linearization:
+        """Normalised residuals of the free edges near the outline, and their derivatives with respect to theta."""
+        points = self.edges.points(surface)
+        values, gradients = self.image.look_at(points)
+        residual, points = values / self.deviation, points[0].T
+        use = np.flatnonzero(np.abs(residual) < FARTHEST)
+        by_place = project_with_jacobian(self.image.camera, points[use].astype(np.float64))[1]
+        shown = across_rim(gradients[use], self.along[use])
+        shown = without_turn(shown, by_place, points[use]) if self.is_round else shown
+        rows = np.einsum("vi,vij->vj", shown / self.deviation, by_place)
+        jacobian = np.zeros((len(use), sparse_jacobian.dimension))
+        of_points = sparse_jacobian.group, sparse_jacobian.parameters, sparse_jacobian.local
+        chain(rows, *self.edges.some(use), *of_points, jacobian)
+        shared = _shared_by_side(jacobian, residual[use], gradients[use])
+        return Linearization(residual[use], jacobian, places=points[use], shared=shared)
+
+    def match(self, surface: Surface, sparse_jacobian: SparseJacobian) -> PointLinearization:
+        """Residuals of the places of outermost vertices, if a slide and a turn lay the edges on the outline."""
+        camera, (_, places, _) = self.image.camera, self.image.locate(self.edges, surface)
+        shift = shift_to_outline(self.image.look, places, self.edges.directions(camera, surface, places))
+        if not shift.any():
+            return PointLinearization.empty(sparse_jacobian)
+        return found_at(camera, surface.vertices[0].T, self.edges.outer, shift, sparse_jacobian)
+
+    def fit(self, surface: Surface) -> RimFit:
+        """Agreement of the edges of a population of one with the outline."""
+        points, places, away = self.image.locate(self.edges, surface)
+        known, (outer, inner) = ~np.isnan(away), self.covered.vertices(surface)
+        beyond = self.image.inside_at(outer + LARGEST_GAP_STEPS * (outer - inner))
+        displaced = self._displacement(surface, places, away, self._pixel_m(points)) if known.any() else 0.0
+        return RimFit(
+            visible=int(np.count_nonzero(known)),
+            outside=int(np.count_nonzero(away < -self.off_px)),
+            inside=int(np.count_nonzero(away > self.off_px)),
+            off_m=max(displaced, self._hanging(outer, inner)),
+            occluded=self.hidden + int(np.count_nonzero(~known)),
+            covered=len(outer),
+            uncovered=int(np.count_nonzero(beyond > 0)),
+        )
+
+    def _displacement(
+        self, surface: Surface, places: NDArray[np.float64], away: NDArray[np.float64], pixel_m: NDArray[np.float64]
+    ) -> float:
+        """The larger of `displacement` and `motion` [m], of free edges at places (k, 2) and distances (k,) [px]."""
+        known, bound = ~np.isnan(away), FARTHEST * self.deviation
+        directions = self.edges.directions(self.image.camera, surface, places)[known]
+        # Outside, distances are known up to there; how much farther, nothing tells.
+        off_px = np.where(away < -self.off_px, -np.inf, np.where(away > self.off_px, away, 0.0))
+        moved = motion(np.clip(away[known], -bound, bound), directions, places[known])
+        typical_m = float(np.mean(pixel_m))
+        off_m = displacement(off_px[known] * pixel_m[known], directions, self.off_px * typical_m)
+        return max(off_m, moved * typical_m)
+
+    def _hanging(self, outer: NDArray[np.float64], inner: NDArray[np.float64]) -> float:
+        """Distance [m] by which covered edges, with vertices (m, 3) [m], hang over the outline at least.
+
+        0 unless most of a side of the image do: then the mesh has slid, and nothing tells how far.
+        """
+        places, before = (project_with_jacobian(self.image.camera, points)[0] for points in (outer, inner))
+        away, sides = self.image.inside(places), by_side(places - before)
+        over, known = (np.count_nonzero(sides & part, axis=1) for part in (away < -self.off_px, ~np.isnan(away)))
+        has_slid = np.any((over >= MIN_HANGING) & (2 * over > known))
+        return float(self.off_px * self._pixel_m(outer).mean()) if has_slid else 0.0
+
+    def _pixel_m(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Size (k,) of a pixel at points (k, 3) [m]."""
+        camera = self.image.camera
+        return np.linalg.norm(points - camera.center, axis=1) / camera.fx
+
+
+def _shared_by_side(
+    jacobian: NDArray[np.float64], residual: NDArray[np.float64], gradients: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Sums (4, dim) of the rows (k, dim) of edges that face one side of the image, times their shared deviation.
+
+    It is one, that of the outline, or what the normalised residuals (k,) show: an edge that the mesh cannot follow is
+    not where the outline says.
+
+    Args:
+        jacobian, residual: of the free edges.
+        gradients: image gradients (k, 2) of their distances from the outline, which tell the side.
+    """
+    sides = by_side(gradients)
+    mean_square = sides @ residual**2 / np.maximum(sides.sum(axis=1), 1)
+    return np.sqrt(np.maximum(mean_square, 1.0))[:, None] * (sides @ jacobian)
