@@ -54,8 +54,8 @@ class ObservedRimOutline:
     def cost(self, surface: Surface) -> NDArray[np.float64]:
         """Cost (population,) of every deformed mesh."""
         out, image = np.empty(len(surface.vertices)), self.image
-        ends_and_optics = *self.edges, *image.projection.arguments
-        self.kernel(surface.vertices, self.deviation, *ends_and_optics, image.corner, image.inwards, out)
+        measured = image.inwards, image.corner, self.deviation
+        self.kernel(surface.vertices, self.edges, image.projection.optics, *measured, out)
         return out
 
     def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> Linearization:
@@ -70,7 +70,7 @@ class ObservedRimOutline:
         rows = np.einsum("vi,vij->vj", shown / self.deviation, by_place)
         jacobian = np.zeros((len(use), sparse_jacobian.dimension))
         of_points = sparse_jacobian.group, sparse_jacobian.parameters, sparse_jacobian.local
-        chain(rows, *self.edges.some(use), *of_points, jacobian)
+        chain(rows, self.edges.some(use), *of_points, jacobian)
         shared = _shared_by_side(jacobian, residual[use], gradients[use])
         return Linearization(residual[use], jacobian, places=points[use], shared=shared)
 

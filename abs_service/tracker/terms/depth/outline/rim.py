@@ -76,7 +76,7 @@ class Edges(NamedTuple):
     def points(self, surface: Surface) -> NDArray[np.float32]:
         """The extrapolated rim (1, 3, k) [m] of a population of one."""
         points = np.empty((1, 3, len(self.outer)), np.float32)
-        extrapolate_rim(surface.vertices, *self, points)
+        extrapolate_rim(surface.vertices, self, points)
         return points
 
     def directions(self, camera: Camera, surface: Surface, places: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -202,25 +202,24 @@ def is_behind(
 @kernel
 def chain(
     rows: NDArray[np.float64],
-    outer: NDArray[np.intp],
-    inner: NDArray[np.intp],
-    beyond: NDArray[np.float32],
+    edges: Edges,
     group: NDArray[np.int32],
     parameters: NDArray[np.int64],
     local: NDArray[np.float64],
     jacobian: NDArray[np.float64],
 ) -> None:
-    """Derivatives with respect to theta (k, dim) from those with respect to outer + beyond (outer − inner).
+    """Derivatives of extrapolated edges with respect to theta (k, dim).
 
     Args:
-        rows: derivatives (k, 3) with respect to these points.
-        outer, inner, beyond: vertices and share (k,).
+        rows: derivatives (k, 3) with respect to the extrapolated points.
+        edges: of the rim (k,).
         group, parameters, local: as in `SparseJacobian`.
         jacobian: zeros before.
     """
     for k in range(rows.shape[0]):
         for end in range(2):
-            v, share = (outer[k], 1.0 + beyond[k]) if end == 0 else (inner[k], 0.0 - beyond[k])
+            beyond = edges.beyond[k]
+            v, share = (edges.outer[k], 1.0 + beyond) if end == 0 else (edges.inner[k], 0.0 - beyond)
             own = parameters[group[v]]
             for d in range(own.size):
                 along = rows[k, 0] * local[v, 0, d] + rows[k, 1] * local[v, 1, d] + rows[k, 2] * local[v, 2, d]
@@ -228,14 +227,9 @@ def chain(
 
 
 @kernel
-def extrapolate_rim(
-    vertices: NDArray[np.float32],
-    outer: NDArray[np.intp],
-    inner: NDArray[np.intp],
-    beyond: NDArray[np.float32],
-    points: NDArray[np.float32],
-) -> None:
-    """Extrapolated rim (1, 3, k) [m] of one candidate (1, 3, n) [m]: outer + beyond (outer − inner), each (k,)."""
+def extrapolate_rim(vertices: NDArray[np.float32], edges: Edges, points: NDArray[np.float32]) -> None:
+    """Writes the extrapolated rim (1, 3, k) [m] of one candidate (1, 3, n) [m]."""
+    outer, inner, beyond = edges
     for i in range(3):
         of_vertices = vertices[0, i]
         for v in range(outer.size):
