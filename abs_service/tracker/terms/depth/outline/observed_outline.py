@@ -69,8 +69,7 @@ class ObservedRimOutline:
         shown = without_turn(shown, by_place, points[use]) if self.is_round else shown
         rows = np.einsum("vi,vij->vj", shown / self.deviation, by_place)
         jacobian = np.zeros((len(use), sparse_jacobian.dimension))
-        of_points = sparse_jacobian.group, sparse_jacobian.parameters, sparse_jacobian.local
-        chain(rows, self.edges.some(use), *of_points, jacobian)
+        chain(rows, self.edges.some(use), sparse_jacobian.blocks, jacobian)
         shared = _shared_by_side(jacobian, residual[use], gradients[use])
         return Linearization(residual[use], jacobian, places=points[use], shared=shared)
 
@@ -85,7 +84,7 @@ class ObservedRimOutline:
     def fit(self, surface: Surface) -> RimFit:
         """Agreement of the edges of a population of one with the outline."""
         points, places, away = self.image.locate(self.edges, surface)
-        known, (outer, inner) = ~np.isnan(away), self.covered.vertices(surface)
+        known, outer, inner = ~np.isnan(away), self.covered.ends(surface), self.covered.starts(surface)
         beyond = self.image.inside_at(outer + LARGEST_GAP_STEPS * (outer - inner))
         displaced = self._displacement(surface, places, away, self._pixel_m(points)) if known.any() else 0.0
         return RimFit(

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from abs_service.pairing.images import Window
 from abs_service.tracker.mesh import Mesh, edges_of
-from abs_service.tracker.models.base import Surface
+from abs_service.tracker.models.base import JacobianBlocks, Surface
 from abs_service.tracker.synthesis.perspective import project_with_jacobian
 from abs_service.tracker.synthesis.projection import Projection
 from abs_service.tracker.synthesis.window import corner
@@ -68,10 +68,13 @@ class Edges(NamedTuple):
         """Some of the edges, by their indices (m,)."""
         return Edges(self.outer[which], self.inner[which], self.beyond[which])
 
-    def vertices(self, surface: Surface) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Outer and inner vertices of a population of one, each (k, 3) [m]."""
-        outer, inner = (surface.vertices[0].T[which].astype(np.float64) for which in (self.outer, self.inner))
-        return outer, inner
+    def ends(self, surface: Surface) -> NDArray[np.float64]:
+        """Outermost vertices of a population of one (k, 3) [m]."""
+        return surface.vertices[0].T[self.outer].astype(np.float64)
+
+    def starts(self, surface: Surface) -> NDArray[np.float64]:
+        """Their neighbours inside (k, 3) [m]."""
+        return surface.vertices[0].T[self.inner].astype(np.float64)
 
     def points(self, surface: Surface) -> NDArray[np.float32]:
         """The extrapolated rim (1, 3, k) [m] of a population of one."""
@@ -81,7 +84,7 @@ class Edges(NamedTuple):
 
     def directions(self, camera: Camera, surface: Surface, places: NDArray[np.float64]) -> NDArray[np.float64]:
         """Directions out of the mesh in the image (k, 2), at the edges' places (k, 2) [px]."""
-        return places - project_with_jacobian(camera, self.vertices(surface)[1])[0]
+        return places - project_with_jacobian(camera, self.starts(surface))[0]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -203,9 +206,7 @@ def is_behind(
 def chain(
     rows: NDArray[np.float64],
     edges: Edges,
-    group: NDArray[np.int32],
-    parameters: NDArray[np.int64],
-    local: NDArray[np.float64],
+    vertices: JacobianBlocks,
     jacobian: NDArray[np.float64],
 ) -> None:
     """Derivatives of extrapolated edges with respect to theta (k, dim).
@@ -213,9 +214,10 @@ def chain(
     Args:
         rows: derivatives (k, 3) with respect to the extrapolated points.
         edges: of the rim (k,).
-        group, parameters, local: as in `SparseJacobian`.
+        vertices: their derivatives.
         jacobian: zeros before.
     """
+    group, parameters, local = vertices
     for k in range(rows.shape[0]):
         for end in range(2):
             beyond = edges.beyond[k]
