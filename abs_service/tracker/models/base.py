@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,14 @@ class Surface:
     normals: NDArray[np.float32]
 
 
+class JacobianBlocks(NamedTuple):
+    """The arrays of a `SparseJacobian`, as kernels take them."""
+
+    group: NDArray[np.int32]
+    parameters: NDArray[np.int64]
+    local: NDArray[np.float64]
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class SparseJacobian:
     """Jacobian of points with respect to theta, without the columns that are zero for a whole group of points.
@@ -47,6 +55,11 @@ class SparseJacobian:
         """One group of all points, from a dense Jacobian (n, 3, dim)."""
         n, _, dimension = jacobian.shape
         return cls(np.ascontiguousarray(jacobian), np.zeros(n, np.int32), np.arange(dimension)[None], dimension)
+
+    @property
+    def blocks(self) -> JacobianBlocks:
+        """The arguments of kernels."""
+        return JacobianBlocks(self.group, self.parameters, self.local)
 
     @property
     def dense(self) -> NDArray[np.float64]:

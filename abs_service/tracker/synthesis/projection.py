@@ -11,11 +11,31 @@ from calib.lenses.forward import brown_conrady_coefficients as coefficients
 from calib.lenses.forward import distort, lens_parts
 
 
-def optics(camera: Camera) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
-    """Camera parameters for kernels: pose T_sr (3, 4), fx, fy, cx and cy (4,), and the coefficients of the lens."""
-    pose = np.ascontiguousarray(camera.T_sr[:3], np.float32)
-    matrix = np.array([camera.fx, camera.fy, camera.cx, camera.cy], np.float32)
-    return pose, matrix, camera.lens.coefficients.astype(np.float32)
+class Optics(NamedTuple):
+    """A camera, as kernels take it.
+
+    Attributes:
+        pose: T_sr (3, 4).
+        matrix: fx, fy, cx and cy (4,) [px].
+        lens: coefficients of the lens.
+        limit: largest u² + w² of a line of sight (u, w, 1) within the field of view.
+        height, width: of the image [px].
+    """
+
+    pose: NDArray[np.float32]
+    matrix: NDArray[np.float32]
+    lens: NDArray[np.float32]
+    limit: float
+    height: int
+    width: int
+
+    @classmethod
+    def of(cls, camera: Camera) -> "Optics":
+        """Those of a camera, in single precision."""
+        pose = np.ascontiguousarray(camera.T_sr[:3], np.float32)
+        matrix = np.array([camera.fx, camera.fy, camera.cx, camera.cy], np.float32)
+        lens = camera.lens.coefficients.astype(np.float32)
+        return cls(pose, matrix, lens, camera.field_radius**2, camera.height, camera.width)
 
 
 class Projected(NamedTuple):
@@ -34,18 +54,18 @@ class Projection:
     """Eq. 10 for populations, in single precision.
 
     Attributes:
-        arguments: of the camera: pose T_sr (3, 4), matrix and lens, see `optics`, and limit of r².
+        optics: of the camera.
     """
 
     def __init__(self, camera: Camera):
-        self.arguments = *optics(camera), camera.field_radius**2
+        self.optics = Optics.of(camera)
         self._project = composed(_project, **lens_parts(camera.lens))
 
     def project(self, vertices: NDArray[np.float32]) -> Projected:
         """The vertices (population, 3, n) [m] in the image."""
         population, _, n = vertices.shape
         found = Projected(np.empty((population, n, 2), np.float32), np.empty((population, n), np.float32))
-        self._project(vertices, *self.arguments, *found)
+        self._project(vertices, self.optics, found)
         return found
 
 
@@ -87,18 +107,11 @@ def _count_inside(seen: Projected, height: int, width: int, count: NDArray[np.in
 
 
 @kernel
-def _project(
-    vertices: NDArray[np.float32],
-    pose: NDArray[np.float32],
-    matrix: NDArray[np.float32],
-    lens: NDArray[np.float32],
-    limit: float,
-    place: NDArray[np.float32],
-    inverse_z: NDArray[np.float32],
-) -> None:
-    """Eq. 10; arguments as `Projection.arguments`, results as in `Projection.project`."""
-    one, farthest = np.float32(1), np.float32(limit)
-    (fx, fy, cx, cy), own_lens = matrix, coefficients(lens)
+def _project(vertices: NDArray[np.float32], optics: Optics, found: Projected) -> None:
+    """Writes eq. 10 of vertices (population, 3, n) [m]."""
+    one, farthest, pose = np.float32(1), np.float32(optics.limit), optics.pose
+    (fx, fy, cx, cy), own_lens = optics.matrix, coefficients(optics.lens)
+    place, inverse_z = found.place, found.inverse_z
     for k in range(vertices.shape[0]):
         for v in range(vertices.shape[2]):
             a, b, c = vertices[k, 0, v], vertices[k, 1, v], vertices[k, 2, v]

@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from abs_service.tracker.synthesis.projection import Optics
 from calib.jit import composed, kernel, prange
 from calib.lenses.forward import brown_conrady_coefficients as coefficients
 from calib.lenses.forward import distort, lens_parts, undistort_step
@@ -40,26 +41,21 @@ def _sample(
     vertices: NDArray[np.float32],
     normals: NDArray[np.float32],
     hidden: NDArray[np.bool_],
-    pose: NDArray[np.float32],
-    matrix: NDArray[np.float32],
-    lens: NDArray[np.float32],
-    limit: float,
-    height: int,
-    width: int,
+    optics: Optics,
     pixel: NDArray[np.int32],
     distance: NDArray[np.float32],
     steps: NDArray[np.float32],
 ) -> None:
-    """Eqs. 10, 11 and 20 for a population; as in `SparseView` and `Synthesis`, pose (3, 4) = T_sr, limit of r².
+    """Eqs. 10, 11 and 20 for a population; as in `SparseView` and `Synthesis`.
 
     A pixel's line of sight d, which differs from the vertex's by Δ, meets the tangent plane at z (1 − n · Δ / (n · d)).
     The steps (2, population, n) from a vertex to the centre of its pixel, right and down [px], are 0 where it has none.
     """
     zero, half, one = np.float32(0), np.float32(0.5), np.float32(1)
-    (fx, fy, cx, cy), own_lens = matrix, coefficients(lens)
-    stride = width + 2
+    (fx, fy, cx, cy), own_lens, pose = optics.matrix, coefficients(optics.lens), optics.pose
+    stride = optics.width + 2
     per_fx, per_fy, flattest = one / fx, one / fy, np.float32(-MIN_COSINE)
-    columns, rows, farthest = np.float32(width), np.float32(height), np.float32(limit)
+    columns, rows, farthest = np.float32(optics.width), np.float32(optics.height), np.float32(optics.limit)
     for k in prange(vertices.shape[0]):
         for v in range(vertices.shape[2]):
             a, b, c = vertices[k, 0, v], vertices[k, 1, v], vertices[k, 2, v]

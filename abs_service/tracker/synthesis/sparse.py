@@ -17,7 +17,7 @@ from abs_service.tracker.synthesis.attribute_gradients import (
     surroundings,
 )
 from abs_service.tracker.synthesis.base import Synthesis, View
-from abs_service.tracker.synthesis.projection import Projection, optics
+from abs_service.tracker.synthesis.projection import Optics, Projection
 from abs_service.tracker.synthesis.rasterization.raster import Raster
 from abs_service.tracker.synthesis.window import around
 from calib.camera import Camera
@@ -98,7 +98,7 @@ class SparseView:
         self._hidden = np.zeros(len(attributes), np.bool_)
         self._rendered: tuple[Surface | None, NDArray[np.float32]] = (None, np.zeros((0, 0), np.float32))
         self._seen: dict[Surface, Synthesis] = {}  # in this frame, without populations
-        self._optics = *optics(camera), camera.field_radius**2, camera.height, camera.width
+        self._optics = Optics.of(camera)
         self._sample = gradients.sampler(camera.lens)
 
     def look(self, predicted: Surface) -> None:
@@ -129,7 +129,7 @@ class SparseView:
         pixel = np.empty((population, n), np.int32)
         distance = np.empty((population, n), np.float32)
         steps = self._gradients.steps(population, n)
-        self._sample(surface.vertices, surface.normals, self._hidden, *self._optics, pixel, distance, steps)
+        self._sample(surface.vertices, surface.normals, self._hidden, self._optics, pixel, distance, steps)
         return Synthesis(pixel, distance, self._gradients.at_centers(self._attributes, steps))
 
     def attribute_gradients(self, surface: Surface) -> NDArray[np.float32]:

@@ -8,6 +8,7 @@ products of 3 × 3 by 3 × k.
 import numpy as np
 from numpy.typing import NDArray
 
+from abs_service.tracker.models.base import JacobianBlocks
 from calib.jit import kernel
 
 #: Share of its trace below which what is left of a point's matrix is rounding.
@@ -29,12 +30,11 @@ def sum_at_points(
 @kernel
 def transpose_times(
     at_points: NDArray[np.float64],
-    group: NDArray[np.int32],
-    parameters: NDArray[np.int64],
-    local: NDArray[np.float64],
+    jacobian: JacobianBlocks,
     result: NDArray[np.float64],
 ) -> None:
     """Adds the transposed Jacobian of the points times values at the points (n, 3, k) to a matrix (dim, k)."""
+    group, parameters, local = jacobian
     own, first = np.empty(local.shape[2]), 0
     while first < group.size:
         last = first + 1
@@ -66,15 +66,14 @@ def sum_squares(
 @kernel
 def add_squares(
     squares: NDArray[np.float64],
-    group: NDArray[np.int32],
-    parameters: NDArray[np.int64],
-    local: NDArray[np.float64],
+    jacobian: JacobianBlocks,
     total: NDArray[np.float64],
 ) -> None:
     """Adds DᵀMD of points with matrices M (n, 3, 3), symmetric and not negative, to a matrix (dim, dim); uses M up.
 
     M is CᵀC with as many rows C as its rank, by a Cholesky decomposition with pivots, and DᵀMD the square of CD.
     """
+    group, parameters, local = jacobian
     n, k, half, first = group.size, local.shape[2], local.shape[2] // 2, 0
     row = np.empty(3)
     while first < n:
@@ -134,13 +133,12 @@ def extrapolate(
     residual: NDArray[np.float64],
     rows: NDArray[np.float64],
     points: NDArray[np.int64],
-    group: NDArray[np.int32],
-    parameters: NDArray[np.int64],
-    local: NDArray[np.float64],
+    jacobian: JacobianBlocks,
     by: NDArray[np.float64],
     result: NDArray[np.float64],
 ) -> None:
     """Residuals plus rows times what a step (dim,) of theta moves their points by."""
+    group, parameters, local = jacobian
     moved, step = np.empty((group.size, 3)), np.empty(local.shape[2])
     for v in range(group.size):
         if v == 0 or group[v] != group[v - 1]:
@@ -175,13 +173,11 @@ def add_scores(
     residual: NDArray[np.float64],
     rows: NDArray[np.float64],
     points: NDArray[np.int64],
-    group: NDArray[np.int32],
-    parameters: NDArray[np.int64],
-    local: NDArray[np.float64],
+    jacobian: JacobianBlocks,
     scores: NDArray[np.float64],
 ) -> None:
     """Adds residual row D of every residual to the row of `scores` (…, dim) that its cluster (m,) names."""
-    x = y = z = 0.0
+    (group, parameters, local), x, y, z = jacobian, 0.0, 0.0, 0.0
     for m in range(points.size):
         x, y, z = x + residual[m] * rows[m, 0], y + residual[m] * rows[m, 1], z + residual[m] * rows[m, 2]
         v = points[m]

@@ -98,7 +98,7 @@ class PointLinearization:
     def moved(self, by: NDArray[np.float64]) -> "PointLinearization":
         """Linearisation with its residuals extrapolated to first order by a step (dim,) of theta."""
         residual = np.empty_like(self.residual)
-        chain_rule.extrapolate(self.residual, self.rows, self.points, *self._chain, by, residual)
+        chain_rule.extrapolate(self.residual, self.rows, self.points, self.sparse_jacobian.blocks, by, residual)
         return replace(self, residual=residual)
 
     def transposed_times(self, values: NDArray[np.float64], dimension: int) -> NDArray[np.float64]:
@@ -106,7 +106,7 @@ class PointLinearization:
         result = np.zeros((dimension, values.shape[1]))
         at_points = np.zeros((len(self.sparse_jacobian.local), 3, values.shape[1]))
         chain_rule.sum_at_points(self.rows, self.points, values, at_points)
-        chain_rule.transpose_times(at_points, *self._chain, result)
+        chain_rule.transpose_times(at_points, self.sparse_jacobian.blocks, result)
         return result
 
     def shared_gradients(self) -> NDArray[np.float64]:
@@ -125,12 +125,7 @@ class PointLinearization:
 
     def add_scores(self, clusters: NDArray[np.int64], scores: NDArray[np.float64]) -> None:
         """Adds the score Jᵀr of every residual to that of its cluster (m,), one of the rows of `scores` (…, dim)."""
-        chain_rule.add_scores(clusters, self.residual, self.rows, self.points, *self._chain, scores)
-
-    @property
-    def _chain(self) -> tuple[NDArray[np.int32], NDArray[np.int64], NDArray[np.float64]]:
-        """Arguments of the kernels of `chain_rule`."""
-        return self.sparse_jacobian.group, self.sparse_jacobian.parameters, self.sparse_jacobian.local
+        chain_rule.add_scores(clusters, self.residual, self.rows, self.points, self.sparse_jacobian.blocks, scores)
 
 
 #: Linearised residuals whose errors have one origin; those of a sensor are of one or several.
@@ -152,7 +147,7 @@ def add_squares(parts: Sequence[Part], weights: Sequence[NDArray[np.float64]], t
             weighted = part.jacobian * np.sqrt(own)[:, None]
             total += weighted.T @ weighted  # of one matrix: half the products
     for samples, squares in at_points.items():
-        chain_rule.add_squares(squares, samples.group, samples.parameters, samples.local, total)
+        chain_rule.add_squares(squares, samples.blocks, total)
 
 
 def stack(parts: Sequence[Part | GroupedLinearization], dimension: int) -> Linearization:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.models.base import DeformationModel, SparseJacobian, Surface
+from abs_service.tracker.models.base import DeformationModel, JacobianBlocks, SparseJacobian, Surface
 from abs_service.tracker.posterior.covariance.appearance_misfit import AppearanceMisfit, Displacement, NoDisplacement
 from abs_service.tracker.posterior.covariance.first_frame_slide import FirstFrameSlide, NoSlide, Slide
 from abs_service.tracker.posterior.covariance.mesh_noise import MeshNoise
@@ -65,20 +65,14 @@ class VertexCovariance:
 def propagated(sparse_jacobian: SparseJacobian, covariance: NDArray[np.float64]) -> NDArray[np.float64]:
     """Covariance D Σ Dᵀ (n, 3, 3) of every vertex, from its Jacobian D and the covariance Σ (dim, dim) of Θ."""
     result = np.empty((len(sparse_jacobian.local), 3, 3))
-    of_points = sparse_jacobian.local, sparse_jacobian.group, sparse_jacobian.parameters
-    _propagate(*of_points, np.ascontiguousarray(covariance), result)
+    _propagate(sparse_jacobian.blocks, np.ascontiguousarray(covariance), result)
     return result
 
 
 @kernel
-def _propagate(
-    local: NDArray[np.float64],
-    group: NDArray[np.int32],
-    parameters: NDArray[np.int64],
-    covariance: NDArray[np.float64],
-    result: NDArray[np.float64],
-) -> None:
+def _propagate(jacobian: JacobianBlocks, covariance: NDArray[np.float64], result: NDArray[np.float64]) -> None:
     """See `propagated`; points of a group that follow each other share one product of matrices."""
+    group, parameters, local = jacobian
     n, _, k = local.shape
     part, first = np.empty((k, k)), 0
     while first < n:

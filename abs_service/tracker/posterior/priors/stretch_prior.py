@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.mesh import Mesh, edge_lengths
-from abs_service.tracker.models.base import SparseJacobian, Surface
+from abs_service.tracker.models.base import JacobianBlocks, SparseJacobian, Surface
 from abs_service.tracker.posterior.priors.edge_runs import EdgeRuns
 from abs_service.tracker.terms.grouped import GroupedLinearization
 from abs_service.tracker.terms.linearization import Linearization
@@ -49,9 +49,8 @@ class StretchPrior:
         rows = np.empty((within, sparse_jacobian.local.shape[2]))
         across = np.zeros((len(self._edges) - within, sparse_jacobian.dimension))
         scales = self._inverse_lengths * self._inverse_deviation
-        of_points = sparse_jacobian.local, sparse_jacobian.group, sparse_jacobian.parameters
         edges = surface.vertices[0], self._edges, scales, self._inverse_deviation
-        _stretch_rows(*edges, *of_points, start[:-1].copy(), residual, rows, across)
+        _stretch_rows(*edges, sparse_jacobian.blocks, start[:-1].copy(), residual, rows, across)
         grouped = GroupedLinearization(residual[:within], rows, sparse_jacobian.parameters, start[:-1])
         return [grouped, Linearization(residual[within:], across)]
 
@@ -72,9 +71,7 @@ def _stretch_rows(
     edges: NDArray[np.int32],
     scales: NDArray[np.float32],
     rest: float,
-    local: NDArray[np.float64],
-    group: NDArray[np.int32],
-    parameters: NDArray[np.int64],
+    jacobian: JacobianBlocks,
     place: NDArray[np.int64],
     residual: NDArray[np.float64],
     rows: NDArray[np.float64],
@@ -85,13 +82,13 @@ def _stretch_rows(
     Args:
         vertices, edges: (3, n) [m] and (edges, 2).
         scales, rest: 1 / (σ length at rest) (edges,) [1/m], and 1 / σ, the scaled length at rest.
-        local, group, parameters: as in `SparseJacobian`.
+        jacobian: of the vertices.
         place: index of the first edge within each group, and of the first between groups.
         residual: (edges,).
         rows: of the edges within a group, by its parameters.
         across: of those between groups by all parameters (edges, dim), zeros before.
     """
-    between = place.size - 1
+    (group, parameters, local), between = jacobian, place.size - 1
     for e in range(edges.shape[0]):
         i, j = edges[e, 0], edges[e, 1]
         x = np.float64(vertices[0, i]) - vertices[0, j]

@@ -54,8 +54,8 @@ class ObservedRimOutline:
     def cost(self, surface: Surface) -> NDArray[np.float64]:
         """Cost (population,) of every deformed mesh."""
         out, image = np.empty(len(surface.vertices)), self.image
-        ends_and_optics = *self.edges, *image.projection.arguments
-        self.kernel(surface.vertices, self.deviation, *ends_and_optics, image.corner, image.inwards, out)
+        measured = image.inwards, image.corner, self.deviation
+        self.kernel(surface.vertices, self.edges, image.projection.optics, *measured, out)
         return out
 
     def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> Linearization:
@@ -69,8 +69,7 @@ class ObservedRimOutline:
         shown = without_turn(shown, by_place, points[use]) if self.is_round else shown
         rows = np.einsum("vi,vij->vj", shown / self.deviation, by_place)
         jacobian = np.zeros((len(use), sparse_jacobian.dimension))
-        of_points = sparse_jacobian.group, sparse_jacobian.parameters, sparse_jacobian.local
-        chain(rows, *self.edges.some(use), *of_points, jacobian)
+        chain(rows, self.edges.some(use), sparse_jacobian.blocks, jacobian)
         shared = _shared_by_side(jacobian, residual[use], gradients[use])
         return Linearization(residual[use], jacobian, places=points[use], shared=shared)
 
@@ -85,7 +84,7 @@ class ObservedRimOutline:
     def fit(self, surface: Surface) -> RimFit:
         """Agreement of the edges of a population of one with the outline."""
         points, places, away = self.image.locate(self.edges, surface)
-        known, (outer, inner) = ~np.isnan(away), self.covered.vertices(surface)
+        known, outer, inner = ~np.isnan(away), self.covered.ends(surface), self.covered.starts(surface)
         beyond = self.image.inside_at(outer + LARGEST_GAP_STEPS * (outer - inner))
         displaced = self._displacement(surface, places, away, self._pixel_m(points)) if known.any() else 0.0
         return RimFit(

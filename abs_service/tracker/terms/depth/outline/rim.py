@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from abs_service.pairing.images import Window
 from abs_service.tracker.mesh import Mesh, edges_of
-from abs_service.tracker.models.base import Surface
+from abs_service.tracker.models.base import JacobianBlocks, Surface
 from abs_service.tracker.synthesis.perspective import project_with_jacobian
 from abs_service.tracker.synthesis.projection import Projection
 from abs_service.tracker.synthesis.window import corner
@@ -68,20 +68,23 @@ class Edges(NamedTuple):
         """Some of the edges, by their indices (m,)."""
         return Edges(self.outer[which], self.inner[which], self.beyond[which])
 
-    def vertices(self, surface: Surface) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Outer and inner vertices of a population of one, each (k, 3) [m]."""
-        outer, inner = (surface.vertices[0].T[which].astype(np.float64) for which in (self.outer, self.inner))
-        return outer, inner
+    def ends(self, surface: Surface) -> NDArray[np.float64]:
+        """Outermost vertices of a population of one (k, 3) [m]."""
+        return surface.vertices[0].T[self.outer].astype(np.float64)
+
+    def starts(self, surface: Surface) -> NDArray[np.float64]:
+        """Their neighbours inside (k, 3) [m]."""
+        return surface.vertices[0].T[self.inner].astype(np.float64)
 
     def points(self, surface: Surface) -> NDArray[np.float32]:
         """The extrapolated rim (1, 3, k) [m] of a population of one."""
         points = np.empty((1, 3, len(self.outer)), np.float32)
-        extrapolate_rim(surface.vertices, *self, points)
+        extrapolate_rim(surface.vertices, self, points)
         return points
 
     def directions(self, camera: Camera, surface: Surface, places: NDArray[np.float64]) -> NDArray[np.float64]:
         """Directions out of the mesh in the image (k, 2), at the edges' places (k, 2) [px]."""
-        return places - project_with_jacobian(camera, self.vertices(surface)[1])[0]
+        return places - project_with_jacobian(camera, self.starts(surface))[0]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -202,25 +205,23 @@ def is_behind(
 @kernel
 def chain(
     rows: NDArray[np.float64],
-    outer: NDArray[np.intp],
-    inner: NDArray[np.intp],
-    beyond: NDArray[np.float32],
-    group: NDArray[np.int32],
-    parameters: NDArray[np.int64],
-    local: NDArray[np.float64],
+    edges: Edges,
+    vertices: JacobianBlocks,
     jacobian: NDArray[np.float64],
 ) -> None:
-    """Derivatives with respect to theta (k, dim) from those with respect to outer + beyond (outer − inner).
+    """Derivatives of extrapolated edges with respect to theta (k, dim).
 
     Args:
-        rows: derivatives (k, 3) with respect to these points.
-        outer, inner, beyond: vertices and share (k,).
-        group, parameters, local: as in `SparseJacobian`.
+        rows: derivatives (k, 3) with respect to the extrapolated points.
+        edges: of the rim (k,).
+        vertices: their derivatives.
         jacobian: zeros before.
     """
+    group, parameters, local = vertices
     for k in range(rows.shape[0]):
         for end in range(2):
-            v, share = (outer[k], 1.0 + beyond[k]) if end == 0 else (inner[k], 0.0 - beyond[k])
+            beyond = edges.beyond[k]
+            v, share = (edges.outer[k], 1.0 + beyond) if end == 0 else (edges.inner[k], 0.0 - beyond)
             own = parameters[group[v]]
             for d in range(own.size):
                 along = rows[k, 0] * local[v, 0, d] + rows[k, 1] * local[v, 1, d] + rows[k, 2] * local[v, 2, d]
@@ -228,14 +229,9 @@ def chain(
 
 
 @kernel
-def extrapolate_rim(
-    vertices: NDArray[np.float32],
-    outer: NDArray[np.intp],
-    inner: NDArray[np.intp],
-    beyond: NDArray[np.float32],
-    points: NDArray[np.float32],
-) -> None:
-    """Extrapolated rim (1, 3, k) [m] of one candidate (1, 3, n) [m]: outer + beyond (outer − inner), each (k,)."""
+def extrapolate_rim(vertices: NDArray[np.float32], edges: Edges, points: NDArray[np.float32]) -> None:
+    """Writes the extrapolated rim (1, 3, k) [m] of one candidate (1, 3, n) [m]."""
+    outer, inner, beyond = edges
     for i in range(3):
         of_vertices = vertices[0, i]
         for v in range(outer.size):

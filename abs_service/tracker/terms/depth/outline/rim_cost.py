@@ -5,6 +5,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from abs_service.tracker.synthesis.projection import Optics
+from abs_service.tracker.terms.depth.outline.rim import Edges
 from calib.jit import composed, kernel
 from calib.lenses.forward import brown_conrady_coefficients as coefficients
 from calib.lenses.forward import distort, lens_parts
@@ -25,16 +27,11 @@ def rim_cost(lens: LensModel) -> Callable[..., None]:
 @kernel
 def _rim_cost(
     vertices: NDArray[np.float32],
-    deviation: float,
-    outer: NDArray[np.intp],
-    inner: NDArray[np.intp],
-    beyond: NDArray[np.float32],
-    pose: NDArray[np.float32],
-    matrix: NDArray[np.float32],
-    lens: NDArray[np.float32],
-    limit: float,
-    corner: NDArray[np.float32],
+    edges: Edges,
+    optics: Optics,
     inwards: NDArray[np.float32],
+    corner: NDArray[np.float32],
+    deviation: float,
     out: NDArray[np.float64],
 ) -> None:
     """Half the sum of squared, bounded distances of the rim from the outline in units of σ.
@@ -43,15 +40,15 @@ def _rim_cost(
 
     Args:
         vertices: (population, 3, n) [m].
+        edges: of the rim.
+        optics: of the camera.
+        inwards, corner: distances (rows, columns) [px] and their first pixel, see `OutlineImage`.
         deviation: σ [px].
-        outer, inner, beyond: vertices and share (k,), as in `rim.extrapolate_rim`.
-        pose, matrix, lens, limit: as in `Projection.arguments`.
-        corner: column and row of the image's first pixel (2,).
-        inwards: distances (rows, columns) [px].
         out: costs (population,) [nats].
     """
-    one, zero, farthest = np.float32(1), np.float32(0), np.float32(limit)
-    (fx, fy, cx, cy), own_lens = matrix, coefficients(lens)
+    one, zero, farthest = np.float32(1), np.float32(0), np.float32(optics.limit)
+    (fx, fy, cx, cy), own_lens, pose = optics.matrix, coefficients(optics.lens), optics.pose
+    outer, inner, beyond = edges
     last_row, last_column = np.float32(inwards.shape[0] - 1), np.float32(inwards.shape[1] - 1)
     pixels, stride, width = inwards.reshape(-1), np.int32(inwards.shape[1]), np.uintp(inwards.shape[1])
     most, per_deviation = np.float32(FARTHEST**2), np.float32(1 / deviation)

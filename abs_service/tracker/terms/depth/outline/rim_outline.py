@@ -76,7 +76,7 @@ class RimOutline:
         if not self._begun:
             self._classify(image, predicted, distance)
         free = np.flatnonzero(self.classes == RimClass.FREE)
-        ends = self._edges.some(free).vertices(predicted)[0]
+        ends = self._edges.some(free).ends(predicted)
         edges = self._edges.some(free[~is_behind(self._camera, ends, expected, window)])
         points, places, of_edges = image.locate(edges, predicted)
         if not self._begun:
@@ -105,6 +105,6 @@ class RimOutline:
         values, gradients = image.look_at(self._edges.points(predicted))
         measured = values, gradients, image.inside_at, distance
         self.classes, gap = classify_rim(self._camera, self._rim, predicted, *measured)
-        outer, inner = self._edges.vertices(predicted)
+        outer, inner = self._edges.ends(predicted), self._edges.starts(predicted)
         gap = exact_gap(self._camera, outer, outer - inner, gap, image.look)
         self._edges = Edges(self._rim.outer, self._rim.inner, gap)

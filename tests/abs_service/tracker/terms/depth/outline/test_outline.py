@@ -13,11 +13,11 @@ from abs_service.tracker.measurements.base import Comparison
 from abs_service.tracker.models.base import SparseJacobian
 from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.objectives import likelihood
-from abs_service.tracker.synthesis.projection import optics
+from abs_service.tracker.synthesis.projection import Optics
 from abs_service.tracker.terms.base import Bounds
 from abs_service.tracker.terms.depth.classification.outline_distance import inwards, outvoted
 from abs_service.tracker.terms.depth.classification.visibility import classify, surfaces_of
-from abs_service.tracker.terms.depth.outline.rim import Rim, look_up, read
+from abs_service.tracker.terms.depth.outline.rim import Edges, Rim, look_up, read
 from abs_service.tracker.terms.depth.outline.rim_cost import FARTHEST, rim_cost
 from calib.lenses.fisheye import KannalaBrandt
 from calib.lenses.lens import Lens
@@ -101,14 +101,14 @@ def test_the_cost_of_the_rim_is_that_of_its_bounded_distances(lens: Lens, seed: 
         reference.rim_cost(camera, member.astype(float), *rim, corner, inwards, 0.5, FARTHEST) for member in vertices
     ]
     costs, population = np.empty(2), np.ascontiguousarray(vertices.transpose(0, 2, 1))
-    rim_cost(lens)(population, 0.5, *rim, *optics(camera), camera.field_radius**2, corner, inwards, costs)
+    rim_cost(lens)(population, Edges(*rim), Optics.of(camera), inwards, corner, 0.5, costs)
     np.testing.assert_allclose(costs, expected, rtol=1e-4)
 
 
 def test_a_rim_beside_an_image_part_of_one_row_is_far_away():
-    rim, costs = (np.array([0]), np.array([1]), np.zeros(1, np.float32)), np.empty(3)
-    camera = *optics(CAMERA), CAMERA.field_radius**2
-    rim_cost(CAMERA.lens)(np.ones((3, 3, 2), np.float32), 0.5, *rim, *camera, np.zeros(2), np.zeros((1, 5)), costs)
+    rim, costs = Edges(np.array([0]), np.array([1]), np.zeros(1, np.float32)), np.empty(3)
+    row = np.zeros((1, 5), np.float32), np.zeros(2, np.float32)
+    rim_cost(CAMERA.lens)(np.ones((3, 3, 2), np.float32), rim, Optics.of(CAMERA), *row, 0.5, costs)
     assert costs.tolist() == [0.5 * FARTHEST**2] * 3
 
 
