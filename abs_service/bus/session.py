@@ -143,7 +143,10 @@ def _explain(error: str, mode: SessionMode, connect_timeout_ms: int) -> str:
             "rig file to another port; `abs-service new` writes a file"
         )
     if mode is SessionMode.CLIENT:
-        return f"nothing answers there within {connect_timeout_ms / 1000:g} s; start `abs-service run` or use --listen"
+        return (
+            f"nothing answers there within {connect_timeout_ms / 1000:g} s; start `abs-service run`, or compare host "
+            "and port with its bus.endpoint"
+        )
     # zenoh appends its own source lines, which are of no use here.
     return "cannot listen there: " + re.sub(r"\s+at /\S+\.rs:\d+\.", "", error)
 

@@ -74,8 +74,11 @@ def test_troubleshooting_has_every_reason_of_a_status():
         for fit in (nothing_right, doubtful, out_of_sight, surprised, within)
     ]
     assert [len(reasons) for reasons in found] == [8, 8, 8, 8, 8]
+    found.append(
+        status.judge([nothing_right], (), ShapeQuality(single_frame_deviation_m=1.0), 0.0, status.Settings())[1]
+    )
     reasons = {reason for of in found for reason in of}
-    assert len(reasons) == 13
+    assert len(reasons) == 14
     page = _without_numbers(TROUBLESHOOTING)
     assert [reason for reason in reasons if _without_numbers(reason.partition(" so far")[0]) not in page] == []
 

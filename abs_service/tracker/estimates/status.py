@@ -226,12 +226,12 @@ def _shaped(shape: ShapeQuality, limits: Settings) -> Iterator[str]:
             f"{shape.folded_share:.0%} of the faces are folded: the model cannot follow the shape – "
             "give it more control points, or make priors.stretch smaller"
         )
-    if (
-        shape.deviation_m > limits.degraded_deviation_m
-        or shape.single_frame_deviation_m > limits.degraded_single_frame_deviation_m
-    ):
+    is_loose = shape.deviation_m > limits.degraded_deviation_m
+    if is_loose or shape.single_frame_deviation_m > limits.degraded_single_frame_deviation_m:
+        known = f"vertices are known to {shape.deviation_m * 1e3:.0f} mm so far"
+        alone = f"a single frame shows vertices to {shape.single_frame_deviation_m * 1e3:.0f} mm only"
         yield (
-            f"nothing holds the surface along itself, vertices are known to {shape.deviation_m * 1e3:.0f} mm so far: "
+            f"nothing holds the surface along itself, {known if is_loose else alone}: "
             "it needs a print that a colour camera sees, or free edges in sight"
         )
 

@@ -132,6 +132,7 @@ def test_nothing_answers(endpoint, capsys):
     code, said = status(endpoint, capsys)
     assert code == 3
     assert f'bus.endpoint = "{endpoint}": nothing answers there within 1 s' in said.err
+    assert "--" not in said.err, "an option that `status` does not have"
 
 
 def test_another_rig_answers(rig, endpoint, capsys):
