@@ -177,6 +177,7 @@ def _preload(given: Sequence[str]) -> None:
     """Starts to import what the processes of a command have in common, while this process imports the command."""
     if set(given[:1]) & PRELOADED.keys() and not {"-h", "--help"} & set(given):
         _compute_with_one_thread()
+        signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGHUP,))  # until it is known what it means
         from abs_service.supervision.children import forked  # noqa: PLC0415 - `multiprocessing` is for those that need it
 
         forked.preload(PRELOADED[given[0]])

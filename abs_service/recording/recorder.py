@@ -11,8 +11,8 @@ from abs_service.bus.contract import Bus, Sample
 from abs_service.bus.health import Health, Level
 from abs_service.bus.queues import BoundedQueue
 from abs_service.bus.stamps import WallClock
-from abs_service.recording.disk import folder
 from abs_service.recording.disk.backoff import Backoff
+from abs_service.recording.disk.readiness import Readiness
 from abs_service.recording.disk.space import Space
 from abs_service.recording.disk.stall import DiskStall
 from abs_service.recording.losses import Losses
@@ -84,7 +84,7 @@ class Recorder:
         )
         self._stopping = threading.Event()
         self._failed = ""
-        self._mount = Path("/")  # of the disk that has the recordings
+        self._readiness = Readiness(settings.directory, self._space, health, clock.monotonic)
         self._losses = Losses(health)
         self.stall = DiskStall(health, clock.monotonic, lambda: self._queue.size)
         self._backoff = Backoff(settings.directory, retry_s, self._stopping.wait, self.stall.alive)
@@ -132,6 +132,8 @@ class Recorder:
         while not self._queue.is_drained:
             self.stall.alive()
             if not self._queue.size and not self._pre_roll.is_open:
+                if self._readiness.look(bool(self._failed)):
+                    self._recover("the disk takes recordings again")
                 self._stopping.wait(IDLE_S)
                 continue
             if self._attempt():
@@ -144,9 +146,7 @@ class Recorder:
     def _attempt(self) -> bool:
         """Records one file; False if the disk is to be left alone for a while."""
         try:
-            folder.check_mounted(self._mount)
-            folder.make(self._settings.directory)
-            self._space.check()
+            self._readiness.check()
             self._record_one_file()
         except OSError as error:
             self._fail(str(error))
@@ -170,7 +170,8 @@ class Recorder:
             self._open_file,
         )
         self._backoff.left += 1
-        self._mount, self._finished = folder.mount_point(settings.directory), self.written
+        self._readiness.begun()
+        self._finished = self.written
         self._health.label("file", take.path.name)
         self._health.count("files")
         try:
@@ -181,7 +182,6 @@ class Recorder:
                 self._writer.pause()
                 self._health.label("file", "")
             take.finish({"ended": reason, **self._writer.summary(self._queue.dropped)})
-            self._measure(take)
         except BaseException:
             self._health.label("file", take.abandon().name)
             self._health.count("unsaved", self._writer.unsaved)
@@ -189,6 +189,7 @@ class Recorder:
         if fate:
             self._health.label("file", "")
             raise OSError(f"{fate} while it was written")
+        self._keep(take)
 
     def _fill(self, take: Take, started_ns: int) -> str:
         """Records until a reason to end the file, which is returned."""
@@ -212,7 +213,8 @@ class Recorder:
                 return "gone"
             if now_ns >= next_flush_ns:
                 next_flush_ns = now_ns + flush_ns
-                self._flush(take)
+                take.flush()
+                self._keep(take)
             room = self._space.left()
             if room < 0:
                 return "low space"
@@ -221,19 +223,19 @@ class Recorder:
             if take.size >= settings.rotate_bytes or now_ns - started_ns >= settings.rotate_s * 1e9:
                 return "rotated"
 
-    def _flush(self, take: Take) -> None:
-        take.flush()
+    def _keep(self, take: Take) -> None:
+        """Notes that the disk has what was written so far."""
         self._writer.saved()
         self._backoff.left = 0
-        self._measure(take)
-        if self._failed:
-            _log.warning("recording again, to %s", take.path.name)
-            self._failed = ""
-            self._health.report("record", Level.OK)
-
-    def _measure(self, take: Take) -> None:
         self._health.gauge("file_bytes", take.size)
         self.written = (self._finished[0] + take.size, self._finished[1] + take.estimates_size)
+        if self._failed:
+            self._recover(f"recording again, to {take.path.name}")
+
+    def _recover(self, how: str) -> None:
+        _log.warning("%s", how)
+        self._failed = ""
+        self._health.report("record", Level.OK)
 
     def _fail(self, reason: str) -> None:
         is_new, self._failed = not self._failed, reason

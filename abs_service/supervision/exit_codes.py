@@ -1,6 +1,7 @@
 """Exit codes of the commands, which the supervisor evaluates, and whose fault an error is."""
 
 import errno
+import resource
 from enum import IntEnum
 
 _HOST = {
@@ -43,9 +44,15 @@ def code_for(error: Exception) -> Exit:
 def lack_of_host(error: Exception) -> str:
     """A lack of the host, such as of memory, descriptors or threads, in words; "" for an error of another kind."""
     if isinstance(error, MemoryError):
-        return f"out of memory {error}".rstrip()
+        return f"out of memory {error}".rstrip() + _memory_limit()
     # How Python says that there are too many threads, and the loader that a library has no room.
     words = str(error) == "can't start new thread" or "failed to map segment" in str(error)
-    if words or (isinstance(error, OSError) and error.errno in _HOST):
-        return str(error)
-    return ""
+    if words:
+        return str(error) + _memory_limit()
+    return str(error) if isinstance(error, OSError) and error.errno in _HOST else ""
+
+
+def _memory_limit() -> str:
+    """Says that memory is limited, where it is: a thread needs some, and its error does not tell."""
+    limit, _ = resource.getrlimit(resource.RLIMIT_AS)
+    return "" if limit == resource.RLIM_INFINITY else f"; memory is limited to {limit / 1e6:.0f} MB (ulimit -v)"

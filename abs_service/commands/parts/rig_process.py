@@ -7,7 +7,7 @@ import signal
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, nullcontext, suppress
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from queue import SimpleQueue
 from types import FrameType
@@ -133,11 +133,12 @@ def on_hangup(act: Callable[[], object], stop: threading.Event) -> None:
             act()
             stop.wait(HANGUP_PERIOD_S)
 
-    with suppress(OSError):
+    try:
         os.close(os.open("/dev/tty", os.O_RDONLY))
-        return
-    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
-        signal.signal(signal.SIGHUP, _in_thread(unless_it_ends))
+    except OSError:
+        if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
+            signal.signal(signal.SIGHUP, _in_thread(unless_it_ends))
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, (signal.SIGHUP,))  # one that has come since the start waits for this
 
 
 def _in_thread(act: Callable[[], object]) -> Callable[[int, FrameType | None], None]:

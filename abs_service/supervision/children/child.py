@@ -115,9 +115,11 @@ class Child:
 
 
 def exit_reason(code: int, output_tail: str) -> str:
-    """The end of a process in words: its exit code or signal, and the last line that it wrote."""
+    """The end of a process in words: its exit code or signal, and its error, or the last line that it wrote."""
     if code == -signal.SIGKILL:  # nothing that it wrote is the reason
         return "ended by signal 9: somebody has killed it, or the system for want of memory"
     how = f"ended by signal {-code}" if code < 0 else f"ended with code {code}"
-    last = log_lines.message(output_tail.strip().rpartition("\n")[2])
+    lines = output_tail.strip().split("\n")
+    # The error, also if something was said after it, such as which threads do not end.
+    last = log_lines.message([*lines, *(line for line in lines if log_lines.is_final(line))][-1])
     return f"{how}: {last}" if last else how

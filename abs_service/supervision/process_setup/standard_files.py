@@ -111,7 +111,8 @@ def flush() -> None:
 
 def blamed(error: Exception) -> Exception:
     """The error that ends a command: OutputError if it was of standard output, else the error itself."""
-    if isinstance(error, OSError):
+    # One of standard output has a number and no file; what was printed for others would be in their output.
+    if isinstance(error, OSError) and error.errno is not None and error.filename is None:
         try:
             print(flush=True)  # fails again
         except OSError as same:

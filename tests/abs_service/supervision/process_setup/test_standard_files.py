@@ -8,6 +8,7 @@ import sys
 import pytest
 
 from abs_service.supervision.exit_codes import Exit, lack_of_host
+from abs_service.supervision.process_setup import standard_files
 
 CHECK = f"{sys.executable} -m abs_service check"
 
@@ -48,6 +49,18 @@ def test_an_output_on_a_full_disk_is_one_line():
     code, _, errors = shell(f"{CHECK} > /dev/full")
     assert code == Exit.USER
     assert errors == b"abs-service: error: standard output cannot be written: No space left on device\n"
+
+
+@pytest.mark.parametrize("error", [ConnectionError("nobody answers"), FileNotFoundError(2, "No such file", "rig.toml")])
+def test_an_error_of_something_else_leaves_nothing_in_the_output(error, capsys):
+    assert standard_files.blamed(error) is error
+    assert capsys.readouterr().out == ""
+
+
+def test_a_limit_of_memory_is_told():
+    program = "from abs_service.supervision.exit_codes import lack_of_host as l; print(l(MemoryError()))"
+    code, output, _ = shell(f'ulimit -v 500000; {sys.executable} -c "{program}"')
+    assert (code, output) == (0, b"out of memory; memory is limited to 512 MB (ulimit -v)\n")
 
 
 def test_too_few_open_files_are_refused_before_anything_is_opened():
