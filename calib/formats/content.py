@@ -65,6 +65,8 @@ def rigid(matrix: ArrayLike) -> Pose:
         given = given.reshape(-1, 4)
     if given.shape not in {(3, 4), (4, 4)}:
         raise FormatError(f"a pose has 4 × 4 numbers, not {given.tolist()}")
+    if not np.array_equal(given[3:], np.eye(4)[3:][: len(given) - 3]):
+        raise FormatError(f"the last row of a pose is 0 0 0 1, not {given[3].tolist()}: is the matrix transposed?")
     try:
         return pose.from_rotation(given[:3, :3], given[:3, 3])
     except ValueError as error:

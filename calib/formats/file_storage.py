@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from calib.files import nested
 from calib.formats.content import FormatError
 
-_MATRIX = "opencv-matrix"
+#: Tags of arrays; the second one is that of one axis, or more than two.
+_MATRIX, _ARRAY = "opencv-matrix", "opencv-nd-matrix"
 _XML_ITEMS = re.compile(r'"[^"]*"|\S+')
 
 
@@ -25,7 +26,8 @@ def _construct(loader: _Loader, node: Any) -> dict[Any, Any]:
     return _tagged(loader.construct_mapping(node, deep=True))
 
 
-_Loader.add_constructor(f"tag:yaml.org,2002:{_MATRIX}", _construct)
+for _tag in (_MATRIX, _ARRAY):
+    _Loader.add_constructor(f"tag:yaml.org,2002:{_tag}", _construct)
 
 
 def parse(text: str) -> Any:
@@ -52,14 +54,16 @@ def _tagged(table: Mapping[Any, Any]) -> dict[Any, Any]:
 
 def _plain(value: Any) -> Any:
     if isinstance(value, Mapping):
-        return _matrix(value) if value.get("type_id") == _MATRIX else {key: _plain(one) for key, one in value.items()}
+        is_array = value.get("type_id") in (_MATRIX, _ARRAY)
+        return _matrix(value) if is_array else {key: _plain(one) for key, one in value.items()}
     return [_plain(one) for one in value] if isinstance(value, list) else value
 
 
 def _matrix(table: Mapping[str, Any]) -> NDArray[np.float64]:
     try:
         channels = int(re.match(r"\d*", str(table.get("dt", "d")))[0] or 1)  # pyright: ignore[reportOptionalSubscript]
-        shape = (int(table["rows"]), int(table["cols"]), *((channels,) if channels > 1 else ()))
+        sizes = np.ravel(table["sizes"]) if "sizes" in table else (table["rows"], table["cols"])
+        shape = (*(int(size) for size in sizes), *((channels,) if channels > 1 else ()))
         return np.array(table["data"], np.float64).reshape(shape)
     except (LookupError, OverflowError, TypeError, ValueError) as error:
         raise FormatError("a matrix whose data do not fit its rows and columns") from error
@@ -73,8 +77,9 @@ def _xml(text: str) -> Any:
 
 def _element(element: ElementTree.Element) -> Any:
     children: Sequence[ElementTree.Element] = list(element)
-    if element.get("type_id") == _MATRIX:
-        return _tagged({child.tag: _items(child) if child.tag == "data" else _text(child) for child in children})
+    if element.get("type_id") in (_MATRIX, _ARRAY):
+        lists = ("data", "sizes")
+        return _tagged({child.tag: _items(child) if child.tag in lists else _text(child) for child in children})
     if any(child.tag == "_" for child in children):
         return [_element(child) for child in children]
     if children or element.tag == "opencv_storage":

@@ -27,6 +27,7 @@ from calib.formats.content import (
 )
 from calib.lenses.fisheye import KannalaBrandt
 from calib.lenses.lens import LensModel
+from calib.pose import Pose
 
 _MATRICES = ("camera_matrix", "Camera_Matrix", "cameraMatrix", "CameraMatrix", "K", "M1", "M2")
 _DISTORTIONS = (
@@ -47,6 +48,8 @@ _HEIGHTS = ("image_height", "image_Height", "height")
 _ERRORS = ("avg_reprojection_error", "Avg_Reprojection_Error")
 #: Largest reprojection error of a calibration, as a share of the image's width.
 _LARGEST_ERROR = 0.01
+#: Largest difference of elements of two rotations that are rounded.
+_RECTIFIED = 1e-3
 _KNOWN = (
     *_MATRICES, *_DISTORTIONS, *_SIZES, *_WIDTHS, *_HEIGHTS, "T_rs", "R", "T", "camera_name", "distortion_model",
     "fisheye_model", "xi",
@@ -183,10 +186,24 @@ def _stereo(root: Mapping[str, Any], hints: Hints) -> Content:
     if root.get("R") is None or root.get("T") is None:
         return Content(cameras, (*lost, "nothing is said of where right is: R and T are missing"))
     T_rl = rigid(np.hstack([np.array(root["R"], float), np.array(root["T"], float).reshape(3, 1)]))
+    _check_rectified(root, T_rl)
     one = cameras["right"]
     matrix = (one.fx, one.fy, one.cx, one.cy)
     moved = camera((one.width, one.height), matrix, one.lens, pose.inverse(T_rl))
     return Content(cameras | {"right": moved}, lost)
+
+
+def _check_rectified(root: Mapping[str, Any], T_rl: Pose) -> None:
+    """Rejects R that turns the cameras otherwise than the rectification of the same file, after which both are alike."""
+    rectifications = [np.asarray(root[key], float) for key in ("R1", "R2") if root.get(key) is not None]
+    if len(rectifications) < 2:
+        return
+    first, second = rectifications
+    if first.shape == second.shape == (3, 3) and not np.allclose(second @ T_rl[:3, :3], first, atol=_RECTIFIED):
+        raise FormatError(
+            "R does not fit R1 and R2 of the same file, as R2 R = R1: is R transposed, or of the other direction? "
+            "x_right = R x_left + T"
+        )
 
 
 def _sided(table: Mapping[str, Any]) -> dict[str, Any]:

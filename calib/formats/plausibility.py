@@ -15,6 +15,9 @@ LARGEST_BASELINE_M = 5.0
 #: Least and largest field of view along the width or height of an image [rad], by the focal length alone.
 FIELDS_OF_VIEW = np.deg2rad(1.0), np.deg2rad(170.0)
 
+#: Distance of the principal point from the middle, in parts of the image, beyond which it may be that of another image.
+OFF_MIDDLE = 0.1
+
 #: Cameras that are turned by less look the same way [rad].
 SAME_WAY = np.deg2rad(45.0)
 
@@ -40,7 +43,19 @@ def doubts(cameras: Mapping[str, Camera]) -> tuple[str, ...]:
                 f"{name}: its principal point ({one.cx:g}, {one.cy:g}) is outside of its images of {one.width} × "
                 f"{one.height} pixels. Was it calibrated with others?"
             )
+        elif _is_turned(one):
+            found.append(
+                f"{name}: its principal point ({one.cx:g}, {one.cy:g}) is in the middle of images of {one.height} × "
+                f"{one.width} pixels, not of {one.width} × {one.height}. Are width and height exchanged?"
+            )
     return tuple(found)
+
+
+def _is_turned(one: Camera) -> bool:
+    """True if the principal point is in the middle only of images whose width and height are exchanged."""
+    size, middle = np.array([one.width, one.height]), np.array([one.cx, one.cy])
+    as_said, exchanged = (np.abs(middle / each - 0.5) for each in (size, size[::-1]))
+    return bool(np.all(as_said > OFF_MIDDLE) and np.all(exchanged < OFF_MIDDLE / 2))
 
 
 @dataclass(frozen=True)

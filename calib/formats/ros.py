@@ -1,4 +1,7 @@
-"""ROS CameraInfo as YAML, compatible with `camera_calibration_parsers`: one camera, no pose."""
+"""ROS CameraInfo as YAML: one camera, no pose.
+
+Files of `camera_calibration_parsers` and messages as `ros2 topic echo` and `rostopic echo` print them are read.
+"""
 
 from collections.abc import Mapping
 from typing import Any
@@ -29,6 +32,12 @@ _KNOWN = (
     "rectification_matrix", "projection_matrix",
 )  # fmt: skip
 
+#: Keys of a message, and those of a file.
+_OF_MESSAGES = {
+    "width": "image_width", "height": "image_height", "K": "camera_matrix", "D": "distortion_coefficients",
+    "R": "rectification_matrix", "P": "projection_matrix",
+}  # fmt: skip
+
 #: Names by REP 127 and by OpenCV.
 _FISHEYES = ("equidistant", "fisheye", "kannala_brandt")
 
@@ -40,7 +49,7 @@ def read(text: str, hints: Hints) -> Content:
         FormatError: the text is not a CameraInfo.
     """
     try:
-        info = nested.yaml(text)
+        info = _as_file(nested.yaml(text.partition("\n---")[0]))
     except ValueError as error:
         raise FormatError(str(error)) from error
     try:
@@ -80,6 +89,17 @@ def write(cameras: Mapping[str, Camera]) -> Written:
         "projection_matrix": _table(3, 4, projection),
     }
     return Written(yaml.safe_dump(info, default_flow_style=None, sort_keys=False, width=200), placed(cameras))
+
+
+def _as_file(info: Any) -> Any:
+    """A message with the keys of a file; ROS 2 prints its matrices' names in small letters."""
+    if not isinstance(info, dict) or "camera_matrix" in info:
+        return info
+    header = info.get("header")
+    name = header.get("frame_id", "") if isinstance(header, dict) else ""
+    named = {_OF_MESSAGES.get(key, _OF_MESSAGES.get(str(key).upper(), key)): info[key] for key in info}
+    named = {key: {"data": value} if isinstance(value, list) else value for key, value in named.items()}
+    return {key: value for key, value in named.items() if key != "header"} | {"camera_name": name}
 
 
 def _table(rows: int, columns: int, data: list[float]) -> dict[str, Any]:

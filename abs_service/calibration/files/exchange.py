@@ -43,6 +43,7 @@ _TELLING = (
     ("opencv-matrix", "opencv"),
     ("cam0:", "kalibr"),
     ("camera_matrix:", "ros"),
+    ("distortion_model:", "ros"),
     ("CAMERA_ID, MODEL, WIDTH, HEIGHT", "colmap"),
 )
 

@@ -70,6 +70,8 @@ def run(arguments: argparse.Namespace) -> int:
     for pair, how in plausibility.baselines(content.cameras).items():
         first, second = pair.split(", ")
         print(f"  {pair}: {how}, {second} {how.side} {first}")
+    for doubt in plausibility.exchanged(content.cameras):
+        print(f"abs-service: check: {doubt}", file=sys.stderr)
     return Exit.OK
 
 
