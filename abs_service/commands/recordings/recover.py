@@ -4,7 +4,7 @@
   abs-service recover recordings/x.mcap          a damaged file; the result is recordings/x.recovered.mcap
   abs-service recover *.active --out saved       the results go to saved/ and the originals stay
 
-Nothing is thrown away: unless all of a file was saved, it is kept.
+Nothing is thrown away: unless all of a file was saved, it is kept. Exit code 1 if nothing of a file could be saved.
 """
 
 import argparse
@@ -24,13 +24,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Recovers each file independently and prints numbers of recovered and lost messages."""
+    """Recovers each file independently and prints numbers of recovered and lost messages; FAILED if one has none."""
     exit_code = Exit.OK
     for path in arguments.files:
         try:
             if arguments.out:
                 arguments.out.mkdir(parents=True, exist_ok=True)
-            print(recover(path, arguments.out))
+            report = recover(path, arguments.out)
+            print(report)
+            exit_code = exit_code if report.messages else max(exit_code, Exit.FAILED)
         except (RecoveryError, OSError) as error:
             reason = error
             if isinstance(error, OSError):

@@ -29,6 +29,15 @@ def test_the_command_reports_each_file_and_continues_after_an_error(tmp_path, ca
     assert "80 messages" in output.out
 
 
+def test_a_file_of_which_nothing_can_be_saved_is_no_success(tmp_path, capsys):
+    source, lost = write(tmp_path / "a.mcap.active", finish=False), tmp_path / "b.mcap.active"
+    lost.write_bytes(source.read_bytes()[:100])
+    parser = argparse.ArgumentParser()
+    command.add_arguments(parser)
+    assert command.run(parser.parse_args([str(lost), str(source)])) == 1
+    assert "b.mcap: 0 messages in 0 chunks saved" in capsys.readouterr().out
+
+
 def test_the_command_names_what_a_full_disk_does_not_take(tmp_path, capsys):
     source, saved = write(tmp_path / "a.mcap"), tmp_path / "saved"
     saved.mkdir()

@@ -1,6 +1,7 @@
 """`abs-service replay`: the same estimates each time, in a file that others can read, and clear words otherwise."""
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -163,6 +164,13 @@ def test_a_replay_that_tracks_nothing_fails_and_tells_the_last_reason_in_the_sum
     assert "sheet: nothing was tracked\n" in summary
     assert "20 INITIALIZING\n" in summary
     assert "sheet: INITIALIZING at the end: no connected surface of at least minimum_pixels" in summary
+
+
+def test_amplitudes_that_a_tracker_does_not_ask_for_are_not_reported_as_lost(recording, tmp_path, capsys):
+    rig = tmp_path / "rig.toml"
+    rig.write_text(re.sub(r'type = "gaussian_polynomial"(?s:.*?)\n\n', 'type = "constant"\nsigma = 0.005\n\n', TOML))
+    assert cli.main(["replay", str(recording), "--config", str(rig), "--out", str(tmp_path / "out.mcap")]) == Exit.OK
+    assert "frames in no set" not in capsys.readouterr().out
 
 
 def test_a_reference_that_is_not_in_the_recording_is_named(recording, tmp_path, capsys):
