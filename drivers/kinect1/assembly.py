@@ -26,15 +26,18 @@ LONGEST_GAP = 5
 PLACE, SEQ, TICKS, BEGAN, COMPLETE, MISSING, FIRST_CAUSE = range(7)
 STATE_SIZE = FIRST_CAUSE + len(CAUSES)
 
+#: A number of packets, the place of one, or its flag.
+Count = int | np.integer
+
 
 @kernel
-def fits(place, flag, count):
+def fits(place: Count, flag: Count, count: Count) -> bool | np.bool_:
     """True if a packet at a place of an image of `count` packets has this flag."""
     return 0 <= place < count and (flag == 1) == (place == 0) and (flag == 5) == (place == count - 1)
 
 
 @kernel
-def bridge(place, lost, flag, gone, longest_gap):
+def bridge(place: Count, lost: Count, flag: Count, gone: NDArray[np.uint8], longest_gap: int) -> Count:
     """Place of the packet that follows `lost` lost ones; marks these in `gone`.
 
     Returns:
@@ -55,7 +58,7 @@ def bridge(place, lost, flag, gone, longest_gap):
 
 
 @kernel
-def begin_image(packet, row, state):
+def begin_image(packet: NDArray[np.uint8], row: Count, state: NDArray[np.int64]) -> None:
     """Keeps the time and the row of an image's first packet."""
     ticks = np.int64(0)
     for i in range(4):
@@ -65,7 +68,14 @@ def begin_image(packet, row, state):
 
 
 @kernel
-def cross_gap(packet, row, flag, state, gone, longest_gap):
+def cross_gap(
+    packet: NDArray[np.uint8],
+    row: int,
+    flag: Count,
+    state: NDArray[np.int64],
+    gone: NDArray[np.uint8],
+    longest_gap: int,
+) -> None:
     """Bridges the packets lost before this one, or gives up the image; completes it if it ended with them."""
     place, lost = state[PLACE], (np.int64(packet[5]) - state[SEQ]) & 255
     after, count = bridge(place, lost, flag, gone, longest_gap), gone.size
@@ -84,7 +94,17 @@ def cross_gap(packet, row, flag, state, gone, longest_gap):
 
 
 @kernel
-def assemble(packets, lengths, begin, state, image, gone, base, payload, longest_gap):
+def assemble(
+    packets: NDArray[np.uint8],
+    lengths: NDArray[np.integer],
+    begin: int,
+    state: NDArray[np.int64],
+    image: NDArray[np.uint8],
+    gone: NDArray[np.uint8],
+    base: int,
+    payload: int,
+    longest_gap: int,
+) -> int:
     """Copies payload into `image` until it is complete or all packets are consumed.
 
     Args:

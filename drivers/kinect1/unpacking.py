@@ -7,13 +7,13 @@ from calib.jit import kernel
 
 
 @kernel
-def look_up_11(packed, table, result):
+def look_up_11(packed: NDArray[np.uint8], table: NDArray[np.uint16], result: NDArray[np.uint16]) -> None:
     """Unpacks 11-bit numbers v (eight in eleven bytes, most significant bit first) and writes `table[v]`.
 
     Args:
-        packed: (11 n,) uint8.
-        table: (2048,) uint16.
-        result: (8 n,) uint16.
+        packed: (11 n,).
+        table: (2048,).
+        result: (8 n,).
     """
     for i in range(min(packed.size // 11, result.size // 8)):
         # Eleven bytes as two overlapping words, since 88 bits do not fit into one.
@@ -30,12 +30,12 @@ def look_up_11(packed, table, result):
 
 
 @kernel
-def unpack_10(packed, result):
+def unpack_10(packed: NDArray[np.uint8], result: NDArray[np.uint16]) -> None:
     """Unpacks 10-bit numbers, four in five bytes, most significant bit first.
 
     Args:
-        packed: (5 n,) uint8.
-        result: (4 n,) uint16.
+        packed: (5 n,).
+        result: (4 n,).
     """
     for i in range(min(packed.size // 5, result.size // 4)):
         word = np.uint64(0)

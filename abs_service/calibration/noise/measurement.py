@@ -37,6 +37,7 @@ _SEVERAL = 1.3
 #: Number of distance ranges in the table of error components of sequences without a target.
 _BINS = 8
 
+#: Ranges with fewer pixels have no row in that table.
 _FEW = 100
 
 
@@ -118,21 +119,21 @@ def calibrate(
     say(f"fitting {chosen.candidate.name} to everything")
     of_all = law.candidate.fit(everything)
     return NoiseCalibration(
-        tuple(statics),
-        tuple(references),
-        chosen.candidate.fit(everything),
-        chosen,
-        again,
-        (*trials, *places),
-        _by_sequence(statics),
-        _rows(statics, references, of_all),
-        parts.pattern(statics, references, of_all),
-        _held_out(chosen.candidate, evidence, generator),
-        distances,
-        _amplitudes(everything.samples.amplitude),
-        steps,
-        tuple(one for one in targets if isinstance(one, StaticBoard)),
-        missing.learn(statics, references, targets, region),
+        statics=tuple(statics),
+        references=tuple(references),
+        model=chosen.candidate.fit(everything),
+        chosen=chosen,
+        law=again,
+        trials=(*trials, *places),
+        by_sequence=_by_sequence(statics),
+        rows=_rows(statics, references, of_all),
+        pattern=parts.pattern(statics, references, of_all),
+        z=_held_out(chosen.candidate, evidence, generator),
+        distances=distances,
+        amplitudes=_amplitudes(everything.samples.amplitude),
+        steps=steps,
+        boards=tuple(one for one in targets if isinstance(one, StaticBoard)),
+        missing=missing.learn(statics, references, targets, region),
     )
 
 

@@ -24,6 +24,7 @@ from calib.formats.plausibility import baselines
 from calib.solve.bundle.parameters.lens_parameters import KINDS, LensKind, kind_of
 from calib.solve.bundle.tasks import SensorTask, Task
 from calib.solve.calibrate import calibrate
+from calib.solve.solution import Solution
 from calib.solve.start.start import left_out
 from calib.solve.validation.verdict import assess
 
@@ -144,7 +145,7 @@ def finish(title: str, task: Task, arguments: argparse.Namespace, found: Materia
     if unknown := sorted(arguments.half - {*task.shots}):
         raise OptionError(f"--half {skipping.text(arguments.half)}: no shot {unknown[0]} shows the board")
     solution = calibrate(task, say)
-    distance = arguments.distance or _middle_distance(solution.task.reference, solution)
+    distance = arguments.distance or _middle_distance(solution)
     assessment = with_kept(
         assess(solution, distance, arguments.needed, say, arguments.half), solution, arguments.needed
     )
@@ -169,8 +170,8 @@ def finish(title: str, task: Task, arguments: argparse.Namespace, found: Materia
     return Exit.OK if assessment.trusted else Exit.FAILED
 
 
-def _middle_distance(reference: str, solution) -> float:
-    """Middle of the boards' range of distances from the reference."""
+def _middle_distance(solution: Solution) -> float:
+    """Middle of the boards' range of distances from the reference sensor [m]."""
     from calib.solve.validation.projection_uncertainty import reach  # noqa: PLC0415
 
-    return round(math.fsum(reach(solution, reference)) / 2, 2)
+    return round(math.fsum(reach(solution, solution.task.reference)) / 2, 2)

@@ -1,7 +1,7 @@
 """One frame of a depth sensor: cost, residuals and agreement of deformed meshes."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +44,7 @@ class ObservedDepth:
         fluctuation: of the sensor's distances, for later frames.
         scale: of the noise model's deviations in this frame, from the fluctuation in earlier ones.
         is_surprised: nothing in the image agrees with the prediction.
+        residuals: those known, by what was synthesised: fit, misfit and learning ask for the same.
     """
 
     sensor: str
@@ -58,6 +59,7 @@ class ObservedDepth:
     fluctuation: Fluctuation
     scale: float
     is_surprised: bool
+    residuals: dict[Synthesis, Residuals] = field(default_factory=dict)
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
         """−Σ_v log φ (population,) plus the cost of the outline."""
@@ -149,6 +151,7 @@ class ObservedDepth:
 
     def _residuals(self, seen: Synthesis) -> Residuals:
         """Residuals of the samples of a population of one."""
-        found = Residuals(*np.empty((3, seen.pixel.shape[1])))
-        normalize(seen.pixel[0], seen.distance[0], self.texels.at(seen.pixel), found)
-        return found
+        if seen not in self.residuals:
+            found = self.residuals[seen] = Residuals(*np.empty((3, seen.pixel.shape[1])))
+            normalize(seen.pixel[0], seen.distance[0], self.texels.at(seen.pixel), found)
+        return self.residuals[seen]

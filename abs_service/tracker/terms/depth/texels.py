@@ -140,6 +140,7 @@ class TexelsOnDemand:
         self._distance = self._amplitude = np.zeros((0, 0), np.float32)
         self._done = np.zeros((0, 0), np.bool_)
         self._costs = ConstantCosts(self._done, self._distance, self._distance, image.border, 0.0, 0.0)
+        self._complete: list[NDArray[np.int32]] = []  # pixels of single candidates, which are read again and again
 
     def observe(self, image: DepthImage, window: Window, scale: float) -> NDArray[np.float32]:
         """Corrects the distances in the window, and renders nothing yet."""
@@ -147,7 +148,7 @@ class TexelsOnDemand:
         self._scaled = Scaled(self._noise, scale)
         self._distance, self._amplitude = image.within(window)
         corrected = corrected_distances(self._noise, self._distance, self._amplitude, corner(window))
-        self._done = np.zeros(corrected.shape, np.bool_)
+        self._done, self._complete = np.zeros(corrected.shape, np.bool_), []
         none, outlier = np.zeros(corrected.shape, np.bool_), float(self._image.beyond[6])
         nowhere = np.zeros(corrected.shape, np.float32)
         self._costs = ConstantCosts(none, corrected, nowhere, self._image.border, 0.0, outlier)
@@ -168,6 +169,12 @@ class TexelsOnDemand:
 
     def at(self, pixel: NDArray[np.int32]) -> NDArray[np.float32]:
         """The texture after rendering what is still missing of it."""
+        if not any(pixel is one for one in self._complete):
+            self._render(pixel)
+        return self._texture.reshape(-1, 8)
+
+    def _render(self, pixel: NDArray[np.int32]) -> None:
+        """Renders the pixels of a single candidate (1, m), or the window for a population (population, m)."""
         is_single, place = len(pixel) == 1, corner(self._window)
         wanted = np.empty((2, pixel.size if is_single else self._done.size), np.int64)
         rest = place, self._costs, self._done, self._texture, wanted
@@ -176,7 +183,8 @@ class TexelsOnDemand:
             row, column = wanted[:, :count]
             measured, amplitude = (part[row, column].astype(np.float64) for part in (self._distance, self._amplitude))
             write_pixels(self._scaled, measured, amplitude, (row + place[0], column + place[1]), self._texture)
-        return self._texture.reshape(-1, 8)
+        if is_single:
+            self._complete.append(pixel)
 
     @property
     def shape(self) -> tuple[int, int]:
