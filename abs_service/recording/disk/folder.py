@@ -23,7 +23,9 @@ class FolderError(Exception):
 
 
 def check(directory: Path) -> None:
-    """Makes the folder, and a file in it that is gone at once.
+    """Makes the folder, and looks whether it can be written.
+
+    Nothing is written to it: on a disk that stands still, whoever does cannot even be killed.
 
     Raises:
         FolderError: the configuration or the folder's permissions have to be changed. A disk that is full, broken,
@@ -45,6 +47,8 @@ def make(directory: Path) -> None:
     Raises:
         OSError: it cannot be made; of ENODEV, since a link leads to nothing, as to a disk that is not there.
     """
+    if directory.is_dir():  # else a disk that stands still would be waited for
+        return
     try:
         directory.mkdir(parents=True, exist_ok=True)
     except FileExistsError as error:
@@ -84,11 +88,11 @@ def check_mounted(mount: Path) -> None:
 
 
 def _mistakes(directory: Path) -> Iterator[FolderError]:
-    action = "made"
     try:
         make(directory)
-        action = "written"
-        tempfile.TemporaryFile(dir=directory).close()
+        is_read_only = os.statvfs(directory).f_flag & os.ST_RDONLY
+        if not (is_read_only or os.access(directory, os.W_OK | os.X_OK)):
+            yield FolderError(f'record.directory = "{directory}": cannot be written: {os.strerror(errno.EACCES)}')
     except OSError as error:
         if error.errno not in _OF_THE_DISK:
-            yield FolderError(f'record.directory = "{directory}": cannot be {action}: {error.strerror}')
+            yield FolderError(f'record.directory = "{directory}": cannot be made: {error.strerror}')

@@ -1,6 +1,5 @@
 import errno
-import io
-import tempfile
+import os
 import threading
 
 import pytest
@@ -18,8 +17,20 @@ def test_a_mistake_is_explained(tmp_path):
     (tmp_path / "taken").write_text("a file")
     with pytest.raises(FolderError, match='taken/below": cannot be made: Not a directory'):
         folder.check(tmp_path / "taken" / "below")
-    with pytest.raises(FolderError, match='"/proc": cannot be written: '):
-        folder.check(folder.Path("/proc"))
+
+
+def test_a_folder_of_others_is_a_mistake(tmp_path, monkeypatch):
+    monkeypatch.setattr(os, "access", lambda path, mode: path != tmp_path)  # root may write all
+    with pytest.raises(FolderError, match=f'"{tmp_path}": cannot be written: Permission denied'):
+        folder.check(tmp_path)
+
+
+def test_a_folder_that_is_there_is_not_written(tmp_path, monkeypatch):
+    written = []
+    monkeypatch.setattr(os, "mkdir", lambda *arguments: written.append(arguments))
+    monkeypatch.setattr(os, "open", lambda *arguments, **_: written.append(arguments))
+    folder.check(tmp_path)
+    assert not written
 
 
 def test_a_link_to_a_disk_that_is_not_there_is_said_and_no_mistake(tmp_path):
@@ -39,11 +50,11 @@ def test_a_link_to_a_disk_that_is_not_there_is_said_and_no_mistake(tmp_path):
 def test_a_disk_that_has_a_problem_does_not_keep_a_rig_from_tracking(number, tmp_path, monkeypatch):
     tried = []
 
-    def refuse(dir):  # noqa: A002 - the library's name
-        tried.append(dir)
+    def refuse(directory):
+        tried.append(directory)
         raise OSError(number, "of the disk")
 
-    monkeypatch.setattr(tempfile, "TemporaryFile", refuse)
+    monkeypatch.setattr(os, "statvfs", refuse)
     folder.check(tmp_path)
     assert tried == [tmp_path]
 
@@ -51,7 +62,8 @@ def test_a_disk_that_has_a_problem_does_not_keep_a_rig_from_tracking(number, tmp
 def test_a_disk_that_does_not_answer_does_not_keep_a_rig_from_tracking(tmp_path, monkeypatch):
     answers = threading.Event()
     monkeypatch.setattr(folder, "PATIENCE_S", 0.01)
-    monkeypatch.setattr(tempfile, "TemporaryFile", lambda dir: answers.wait() and io.BytesIO())  # noqa: A006 - the library's name
+    tell = os.statvfs
+    monkeypatch.setattr(os, "statvfs", lambda path: answers.wait() and tell(path))
     folder.check(tmp_path)
     assert not answers.is_set()
     answers.set()

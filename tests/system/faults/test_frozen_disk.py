@@ -1,0 +1,51 @@
+"""A disk that stands still: nothing ends who writes to it, and so waits in the kernel. Needs root and a loop device."""
+
+import signal
+import subprocess
+import time
+
+import pytest
+
+from tests.system.running import abs_service, wait_until, write_rig
+
+pytestmark = [pytest.mark.slow, pytest.mark.realtime]
+
+
+@pytest.fixture
+def freeze(tmp_path):
+    """Lets the disk at `takes` stand still, or go on."""
+    image, takes = tmp_path / "disk.img", tmp_path / "takes"
+    takes.mkdir()
+    with image.open("wb") as file:
+        file.truncate(300 << 20)
+    try:
+        subprocess.run(["mkfs.ext4", "-q", image], check=True)
+        subprocess.run(["mount", "-o", "loop", image, takes], check=True, capture_output=True)
+    except (FileNotFoundError, PermissionError, subprocess.CalledProcessError) as error:
+        pytest.skip(f"no disk in a file can be mounted: {error}")
+
+    def freeze(frozen):
+        subprocess.run(["fsfreeze", "--freeze" if frozen else "--unfreeze", takes], check=True, timeout=60)
+
+    yield freeze
+    subprocess.run(["umount", "--lazy", takes], check=True)
+
+
+@pytest.fixture
+def rig_file(tmp_path, endpoint, freeze):
+    """The demo rig, whose folder of recordings has that disk."""
+    return write_rig(tmp_path / "rig.toml", endpoint)
+
+
+def test_a_rig_reads_its_file_again_goes_on_and_ends_in_time(run, rig_file, freeze):
+    process, listener = run
+    freeze(True)
+    try:
+        said = wait_until(lambda: [one for one in listener.health("record") if one.level > 1], 10, "health of record")
+        assert "the disk has not answered for 2 s" in said[0].message
+        assert abs_service("reload", rig_file).stdout == "nothing has changed\n"
+        wait_until(listener.tracks_since(time.monotonic_ns()), 20, "TRACKING")
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(15) == 1
+    finally:
+        freeze(False)  # here, since what is left behind keeps the output open
