@@ -216,7 +216,7 @@ def _streams(recording: Recording, speed: float) -> tuple[StreamInfo, ...]:
             frame.encoding,
             frame.data.shape[1],
             frame.data.shape[0],
-            speed * max(recording.counts[frame.key] - 1, 1) / max(recording.duration_s, 1e-3),
+            speed * recording.rate_hz(frame),
             ClockInfo(frame.clock_domain, frame.tick_hz),
         )
         for frame in (first[key] for key in recording.counts)

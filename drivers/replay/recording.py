@@ -116,6 +116,11 @@ class Recording:
                 break
         return found
 
+    def rate_hz(self, first: Frame) -> float:
+        """Mean rate of a stream from its first frame on, which may come long after the first message of others."""
+        lasted_s = (self.contents.end_ns - self.wall_offset_ns - first.t_host_ns) * 1e-9
+        return max(self.counts[first.key] - 1, 1) / max(lasted_s, 1e-3)
+
     def _wall_offset(self) -> int:
         for _, message in messages(self.path, self.contents, {codec.INFO_SCHEMA}):
             with suppress(DecodeError):  # counted when frames are read

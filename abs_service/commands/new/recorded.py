@@ -57,7 +57,10 @@ def device(path: Path) -> Device:
     head = min(heads)
     noise, assumed = _noise(recording, head)
     colors = sorted((sensor, stream) for sensor, stream in recording.counts if stream in _COLORS)
-    period_s = recording.duration_s / max(1, recording.counts[head, "depth"] - 1)
+    first = recording.first_frames().get((head, "depth"))
+    if first is None:
+        raise RecordingError(f"{path}: {head}/depth has no frame that can be read")
+    period_s = 1 / recording.rate_hz(first) if recording.counts[first.key] > 1 else 0.0
     shown = printable(shlex.quote(str(path)))
     others = ", ".join(printable(other) for other in sorted(set(heads)) if other != head)
     note = f"Depth images of {printable(head)}; the recording has those of {others} as well." if others else ""

@@ -30,7 +30,9 @@ _MATRIX = np.array([[500.0, 0, 320], [0, 501, 240], [0, 0, 1]])
 _PLACE = np.array([[-0.09], [0.0], [0.02]])
 
 
-@pytest.mark.parametrize("text", [_MESSAGE, _MESSAGE.replace("\nd:", "\nD:").replace("\nk:", "\nK:").replace("\np:", "\nP:")])
+@pytest.mark.parametrize(
+    "text", [_MESSAGE, _MESSAGE.replace("\nd:", "\nD:").replace("\nk:", "\nK:").replace("\np:", "\nP:")]
+)
 def test_a_camera_info_may_be_a_message(text: str) -> None:
     assert exchange.of_content(Path("info.yaml"), text) == "ros"
     content = ros.read(text, Hints())

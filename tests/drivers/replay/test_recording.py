@@ -60,6 +60,14 @@ def test_frames_and_truths_are_read_in_order(tmp_path: Path) -> None:
     assert recording.models["tof"].noise == "gaussian_polynomial"
 
 
+def test_the_rate_of_a_stream_begins_with_its_first_frame(tmp_path: Path) -> None:
+    recording = Recording(write(tmp_path / "x.mcap", recorded(4)))
+    times = [item.t_host_ns for item in recording.frames() if isinstance(item, Frame) and item.sensor == "tof"]
+    period_s = (max(times) - min(times)) * 1e-9 / 3
+    assert recording.duration_s > 6 * period_s, "the calibrations come long before"
+    assert recording.rate_hz(recording.first_frames()["tof", "depth"]) == pytest.approx(1 / period_s, rel=0.05)
+
+
 def test_late_messages_are_sorted(tmp_path: Path) -> None:
     items = recorded(30)
     late = [item for item in items if isinstance(item, Frame) and item.sensor == "color" and item.seq < 10]
