@@ -18,6 +18,7 @@ april_grid          Kalibr's; found in parts; needs some 30 pixels per tag
 import argparse
 import json
 from dataclasses import fields, replace
+from pathlib import Path
 
 from abs_service.calibration.files import board_sheet, target_file
 from abs_service.commands.parts.options import OptionError, ending_in
@@ -82,6 +83,7 @@ def run(arguments: argparse.Namespace) -> int:
     width, height = sorted(arguments.paper, reverse=_is_wide(target))
     page = board_sheet.lay_out(target, width, height, _words(target))
     description = arguments.out.with_suffix(".toml")
+    _keep_others(description, target)
     target_file.write(target, description)
     board_sheet.write(page, arguments.out)
     if arguments.json:
@@ -92,6 +94,18 @@ def run(arguments: argparse.Namespace) -> int:
     print(f"{description}: its description, for the other commands")
     print("Print at 100 %, check the ruler, glue the sheet onto something flat and stiff.")
     return Exit.OK
+
+
+def _keep_others(description: Path, target: Target) -> None:
+    """Raises OptionError if a file describes another board, or this one with lengths as they were measured."""
+    if not description.is_file():
+        return
+    try:
+        is_same = target_file.to_table(target_file.read(description)) == target_file.to_table(target)
+    except target_file.TargetFileError:
+        is_same = False
+    if not is_same:
+        raise OptionError(f"{description}: exists and says something else; remove it, or choose another --out")
 
 
 def _target(arguments: argparse.Namespace) -> Target:

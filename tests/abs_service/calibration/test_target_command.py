@@ -122,8 +122,8 @@ def test_the_paper_is_turned_so_that_the_board_fits_and_may_be_of_any_size(tmp_p
     arguments = ["chessboard", "--columns", "5", "--rows", "8", "--paper", "a3", "--out", str(tmp_path / "t.svg")]
     cli.main(["calibrate", "target", *arguments])
     assert svg_shapes(tmp_path / "t.svg")[0] == (297, 420)
-    cli.main(["calibrate", "target", "--paper", "500x400", "--out", str(tmp_path / "t.svg")])
-    assert svg_shapes(tmp_path / "t.svg")[0] == (500, 400)
+    cli.main(["calibrate", "target", "--paper", "500x400", "--out", str(tmp_path / "big.svg")])
+    assert svg_shapes(tmp_path / "big.svg")[0] == (500, 400)
 
 
 def test_programs_learn_what_was_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -165,3 +165,16 @@ def test_a_page_has_a_format_that_can_be_printed(capsys: pytest.CaptureFixture[s
 def test_the_board_of_the_page_is_where_its_outline_says() -> None:
     corners = outline(target_file.from_table({"kind": "chessboard", "columns": 3, "rows": 4, "square_mm": 10}, "x"))
     assert corners[:, :2].tolist() == [[-0.01, -0.01], [0.03, -0.01], [0.03, 0.04], [-0.01, 0.04]]
+
+
+def test_a_description_with_measured_lengths_is_not_replaced(tmp_path, capsys):
+    command = ["calibrate", "target", "--out", str(tmp_path / "t.svg")]
+    assert cli.main(command) == cli.main(command) == Exit.OK
+    description = tmp_path / "t.toml"
+    measured = description.read_text().replace("square_mm = 28.0", "square_mm = 27.9")
+    description.write_text(measured)
+    assert cli.main(command) == Exit.USER
+    assert (
+        f"{description}: exists and says something else; remove it, or choose another --out" in capsys.readouterr().err
+    )
+    assert description.read_text() == measured
