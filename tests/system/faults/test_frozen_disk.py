@@ -6,7 +6,8 @@ import time
 
 import pytest
 
-from tests.system.running import abs_service, wait_until, write_rig
+from evaluation.service.live.proc import children
+from tests.system.running import START_S, RigListener, abs_service, kill, wait_until, write_rig
 
 pytestmark = [pytest.mark.slow, pytest.mark.realtime]
 
@@ -49,3 +50,19 @@ def test_a_rig_reads_its_file_again_goes_on_and_ends_in_time(run, rig_file, free
         assert process.wait(15) == 1
     finally:
         freeze(False)  # here, since what is left behind keeps the output open
+
+
+def test_a_log_on_it_keeps_nobody_from_working(rig_file, endpoint, launch, freeze, tmp_path):
+    log = ("--log-level", "info", "--log-file", tmp_path / "takes" / "log")
+    process = launch("run", rig_file, "--no-record", "--json", *log, stdout=subprocess.DEVNULL, process_group=0)
+    with RigListener(endpoint) as listener:
+        wait_until(listener.tracks_since(0), START_S, "TRACKING")
+        freeze(True)
+        try:
+            killed_ns = kill(children(process.pid)["track"])  # of which `run` writes a line
+            wait_until(listener.tracks_since(killed_ns), 20, "TRACKING of the next process")
+        finally:
+            freeze(False)
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(15) == 0
+    assert "track/sheet ended by signal 9" in (tmp_path / "takes" / "log").read_text("utf-8")

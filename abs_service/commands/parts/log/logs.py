@@ -104,9 +104,9 @@ def end_with(error: Exception, arguments: argparse.Namespace) -> int:
 def _handler(file: Path | None) -> logging.Handler:
     if file is None:
         return logging.StreamHandler(sys.stderr)
-    from abs_service.commands.parts.log.log_file import LogFile  # noqa: PLC0415 - needed for a file only
+    from abs_service.commands.parts.log.log_file import InBackground, LogFile  # noqa: PLC0415 - needed for a file only
 
     try:
-        return LogFile(file, encoding="utf-8")
+        return InBackground(LogFile(file, encoding="utf-8"))
     except OSError as error:
         raise LogFileError(f"--log-file {file}: cannot be written: {error.strerror}") from None
