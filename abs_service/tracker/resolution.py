@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 import scipy  # its parts are imported when they are first used
 
-#: Approximate number of vertices of a mesh; "auto": the usual number, fewer if the object has fewer pixels.
+#: Approximate number of vertices of a mesh; "auto": the default number, fewer if the object has fewer pixels.
 Vertices = Literal["auto"] | int
 
 #: Usual number of vertices; that of a template's mesh, which is made before the object is seen.

@@ -2,7 +2,7 @@
 
 import math
 
-#: Least and largest length of a board [m], and one that is usual.
+#: Least and largest length of a board [m], and a typical one.
 MIN_M, LARGEST_M, TYPICAL_M = 0.01, 5.0, 0.3
 
 

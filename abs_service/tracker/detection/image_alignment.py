@@ -48,7 +48,7 @@ GAP = 1 / 40
 #: within one are no independent witnesses.
 MAX_JUMPS, CELLS, FEWEST = 800, 10, 8
 
-#: An edge counts by its strength over that usual around it, at most this, and weaker ones than a share of all less.
+#: An edge counts by its strength over the typical one nearby, at most this, and weaker ones than a share of all less.
 STRONGEST, WEAK = 3.0, 0.2
 
 #: Other focal lengths displace the edges of the image by so much at most [px of the reduced image].

@@ -29,7 +29,7 @@ def detect_object(
 ) -> InitialDetection:
     """Segments the reference sensor's depth image by a region, for a mesh of about `vertices` vertices.
 
-    "auto" is the usual number, fewer if the object has fewer pixels.
+    "auto" is the default number, fewer if the object has fewer pixels.
 
     Raises:
         DetectionError: there is no depth image, or no object in it, or its size is impossible.

@@ -35,9 +35,9 @@ class Measurement:
 
     def term(self, sensor: Sensor, mesh: Mesh, synthesizer: Synthesizer, comparison: Comparison) -> ChannelTerm:
         """The channel of a vertex that the pixel's filter passes."""
-        looks, bounds = mesh.appearance_of(sensor.name), comparison.bounds
+        appearance, bounds = mesh.appearance_of(sensor.name), comparison.bounds
         return ChannelTerm(
-            sensor.name, synthesizer, looks, self.noise, Exposed(), bounds, comparison.registration_noise
+            sensor.name, synthesizer, appearance, self.noise, Exposed(), bounds, comparison.registration_noise
         )
 
     def appearance(self, seen: Values, sensor: Sensor, first: FirstImages) -> Values:

@@ -30,8 +30,8 @@ class Measurement:
 
     def term(self, sensor: Sensor, mesh: Mesh, synthesizer: Synthesizer, comparison: Comparison) -> ColorTerm:
         """Three channels of a vertex."""
-        looks, bounds = mesh.appearance_of(sensor.name), comparison.bounds
-        return ColorTerm(sensor.name, synthesizer, looks, self.noise, bounds, comparison.registration_noise)
+        appearance, bounds = mesh.appearance_of(sensor.name), comparison.bounds
+        return ColorTerm(sensor.name, synthesizer, appearance, self.noise, bounds, comparison.registration_noise)
 
     def appearance(self, seen: Values, sensor: Sensor, first: FirstImages) -> Values:
         """The sensor's own values, because no two cameras agree on a colour; else those of other cameras."""

@@ -42,8 +42,10 @@ class Measurement:
     def term(self, sensor: Sensor, mesh: Mesh, synthesizer: Synthesizer, comparison: Comparison) -> ChannelTerm:
         """The reflectivity of a vertex in this light."""
         light = Active(sensor.camera.center) if self.noise.illumination == "active" else Passive()
-        looks, bounds = mesh.appearance_of(sensor.name), comparison.bounds
-        return ChannelTerm(sensor.name, synthesizer, looks, self.noise, light, bounds, comparison.registration_noise)
+        appearance, bounds = mesh.appearance_of(sensor.name), comparison.bounds
+        return ChannelTerm(
+            sensor.name, synthesizer, appearance, self.noise, light, bounds, comparison.registration_noise
+        )
 
     def appearance(self, seen: Values, sensor: Sensor, first: FirstImages) -> Values:
         """The sensor's own values, per unit of its own light if it has one."""

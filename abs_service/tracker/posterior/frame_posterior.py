@@ -14,6 +14,8 @@ from abs_service.tracker.posterior.priors.motion_prediction import MotionPredict
 from abs_service.tracker.posterior.priors.shape_prior import ShapePrior
 from abs_service.tracker.posterior.priors.stretch_prior import StretchPrior
 from abs_service.tracker.posterior.surfaces import FrameSurfaces
+from abs_service.tracker.terms.linearization import PointLinearization
+from abs_service.tracker.terms.patches import Patches
 from abs_service.tracker.terms.sensor_fit import SensorFit
 
 
@@ -75,6 +77,10 @@ class FramePosterior:
     def fits(self, theta: NDArray[np.float64]) -> tuple[SensorFit, ...]:
         """Agreement of every contributing sensor with theta (dim,)."""
         return tuple(self.objective.fits(self.surfaces.deform(theta[None])))
+
+    def match(self, theta: NDArray[np.float64], patches: Patches) -> list[PointLinearization]:
+        """Residuals of the places in the images where the mesh at theta (dim,) is found, see `ObservedTerm`."""
+        return self.objective.match(*self.surfaces.with_jacobian(theta), patches)
 
     def misfit(self, surface: Surface) -> NDArray[np.float64]:
         """Signed distance of each vertex from its measurements, and its deviation by noise (2, n) [m]."""

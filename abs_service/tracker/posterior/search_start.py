@@ -20,7 +20,7 @@ def search_start(frame: FramePosterior, patches: Patches) -> tuple[FramePosterio
         patches: of the vertices, whose appearance is looked for.
     """
     predicted = frame.motion.theta
-    places = frame.objective.match(*frame.surfaces.with_jacobian(predicted), patches)
+    places = frame.match(predicted, patches)
     if not is_beside(places):
         return frame, predicted
     matched, wider = predicted, frame

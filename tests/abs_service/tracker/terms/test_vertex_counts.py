@@ -153,6 +153,14 @@ def test_a_mesh_that_slides_leaves_surface_behind():
     assert left(moved(0.0)).gained == 0.0
 
 
+def test_what_is_left_in_a_frame_does_not_change_with_the_next():
+    lasting = CoarseContinuation(CAMERA, MESH)
+    first = lasting.observe(picture((0.36, 0.2)) < 1.3)
+    share = first(moved()).share
+    assert lasting.observe(picture((0.4, 0.2)) < 1.3)(moved()).share > share
+    assert first(moved()).share == share
+
+
 def test_only_the_window_is_looked_at():
     whole, part = CoarseContinuation(CAMERA, MESH), CoarseContinuation(CAMERA, MESH)
     shown = picture((0.4, 0.2)) < 1.3

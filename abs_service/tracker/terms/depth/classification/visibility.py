@@ -6,6 +6,7 @@ error. A missing return is free space where the background gives no return, else
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -54,6 +55,24 @@ class Visibility:
     free_m: NDArray[np.float32]
 
 
+class Compared(NamedTuple):
+    """Masks (height, width) of the pixels of an image by their distance from the predicted mesh.
+
+    Attributes:
+        shown: on the object.
+        before: before it.
+        solid: of these, on a connected surface.
+        behind: behind it.
+        missing: without return.
+    """
+
+    shown: NDArray[np.bool_]
+    before: NDArray[np.bool_]
+    solid: NDArray[np.bool_]
+    behind: NDArray[np.bool_]
+    missing: NDArray[np.bool_]
+
+
 def surfaces_of(distance: NDArray[np.floating], largest_step: float = LARGEST_STEP_M) -> Surfaces:
     """Surfaces of radial distances (height, width) [m], NaN without return, separated at larger steps [m]."""
     return connected_surfaces(np.ascontiguousarray(distance, np.float32), largest_step)
@@ -88,8 +107,9 @@ def classify(
     if not is_object.any():
         return Visibility(nothing, nothing, nothing, nothing, nothing | beyond, np.zeros(distance.shape, np.float32))
     near = _extended(predicted)
-    shown, before, solid, behind, missing = (np.empty(distance.shape, np.bool_) for _ in range(5))
-    _compare(distance, near, labels, is_object, agreement, shown, before, solid, behind, missing)
+    pixels = Compared(*(np.empty(distance.shape, np.bool_) for _ in Compared._fields))
+    _compare(distance, near, labels, is_object, agreement, pixels)
+    shown, before, solid, behind, missing = pixels
     foreground = before & grown(solid, 1) if solid.any() else nothing
     hole, past, single = nothing, nothing, missing & dropout & ~beyond
     if missing.any():
@@ -126,22 +146,18 @@ def _compare(
     labels: NDArray[np.int32],
     is_object: NDArray[np.bool_],
     agreement: float,
-    shown: NDArray[np.bool_],
-    before: NDArray[np.bool_],
-    solid: NDArray[np.bool_],
-    behind: NDArray[np.bool_],
-    missing: NDArray[np.bool_],
+    pixels: Compared,
 ) -> None:
-    """Masks of the pixels on the object, before it, on a connected surface before it, behind it, and without return."""
+    """Writes the masks, from distances, those of the nearest place on the object, and surfaces that are the object."""
     for row in range(distance.shape[0]):
         for column in range(distance.shape[1]):
             label, beyond = labels[row, column], distance[row, column] - near[row, column]
             is_shown = is_object[label]
             is_before = not is_shown and beyond < -agreement
-            shown[row, column], before[row, column] = is_shown, is_before
-            solid[row, column] = is_before and label > 0
-            behind[row, column] = not is_shown and beyond > agreement
-            missing[row, column] = not np.isfinite(distance[row, column])
+            pixels.shown[row, column], pixels.before[row, column] = is_shown, is_before
+            pixels.solid[row, column] = is_before and label > 0
+            pixels.behind[row, column] = not is_shown and beyond > agreement
+            pixels.missing[row, column] = not np.isfinite(distance[row, column])
 
 
 def where(mask: NDArray[np.bool_], values: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -19,16 +19,16 @@ NEW = 0.1
 #: Edges are compared within so many pixels of the outline; farther ones are off it for other reasons.
 LIMIT_PX = 8.0
 
-#: So ragged are outlines of sensors that resolve edges, at the usual deviation: real ones of structured light 1.0 to
-#: 1.4 px about a mesh that was predicted [px].
+#: So ragged are outlines of sensors that resolve edges: real ones of structured light 1.0 to 1.4 px about a predicted
+#: mesh [px].
 TYPICAL_PX = 1.5
 
-#: Share of the raggedness beyond the usual one that is added to the deviation. The edges of a side wander to either
+#: Share of the raggedness beyond the typical one that is added to the deviation. The edges of a side wander to either
 #: side, and less of it is left in their mean; with half of it, a print in colour let a sheet slide to the wrong place
 #: in single frames of fast motion (docs/explanation/visibility.md).
 SHARE = 1 / 3
 
-#: An edge is off the outline if it is farther from it than so many times what is usual for this outline.
+#: An edge is off the outline if it is farther from it than so many times what is typical of this outline.
 OFF = 2.0
 
 

@@ -56,7 +56,7 @@ class RimOutline:
         self._rim = rim
         self._edges = Edges(rim.outer, rim.inner, np.zeros(len(rim.outer), np.float32))
         self._raggedness = Raggedness(deviation, ragged)
-        self._usually_off_px = max(OFF_PX, FARTHEST * deviation)
+        self._min_off_px = max(OFF_PX, FARTHEST * deviation)
         self._begun, self._is_round = False, False
 
     def observe(
@@ -69,7 +69,7 @@ class RimOutline:
     ) -> ObservedRimOutline:
         """See `Outline`."""
         deviation = self._raggedness.deviation
-        off_px = max(self._usually_off_px, self._raggedness.off_px)
+        off_px = max(self._min_off_px, self._raggedness.off_px)
         part, away = inwards(distance, seen, int(np.ceil(FARTHEST * deviation)) + 1)
         first = np.add(corner(window), corner(part))[::-1].astype(np.float32)
         image = OutlineImage(self._camera, self._projection, away, first)

@@ -6,7 +6,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from abs_service.pairing.images import ColorImage
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.synthesis.rasterization.raster import Raster
@@ -18,13 +17,16 @@ from abs_service.tracker.terms.depth.depth import DepthTerm
 from abs_service.tracker.terms.depth.depth_cost import FREE_SCALE_M
 from abs_service.tracker.terms.depth.observed_depth import ObservedDepth
 from abs_service.tracker.terms.linearization import stack
-from abs_service.tracker.terms.photometric.color import ColorTerm
-from abs_service.tracker.terms.photometric.occlusion import occluded_pixels
-from calib import pose
 from calib.camera import Camera
 from calib.noise.gaussian_polynomial import GaussianPolynomial
-from calib.noise.images.color import GaussianColor
-from tests.abs_service.tracker.scenes import as_surface, depth_image, flat, plane_distance, sheet, sparse
+from tests.abs_service.tracker.scenes import (
+    as_surface,
+    depth_image,
+    flat,
+    plane_distance,
+    sheet,
+    sparse,
+)
 
 
 def board(camera: Camera, background: float = 1.6) -> np.ndarray:
@@ -177,35 +179,6 @@ def test_the_search_is_told_the_way_back_from_free_space(x):
     assert (ahead - behind) / 0.028 * np.sign(x) > abs(slope)  # and more vertices leave the object
     within = as_surface((MESH.vertices * (0.9, 0.9, 1), MESH.normals))
     assert stack(term.linearize(within, sparse_jacobian), 6).residual.size == term.fit(within).samples
-
-
-def test_an_occluder_that_a_depth_sensor_sees_hides_colours_from_another_camera():
-    camera = Camera(160, 120, 300.0, 300.0, 79.5, 59.5, T_rs=pose.from_rotation_vector([0, 0, 0], [0.05, 0, 0]))
-    distance = board(STRAIGHT)
-    distance[20:45, 52:77] = 0.85
-    points = term_before(distance).occluders
-    term = ColorTerm("color", sparse(camera, MESH), MESH.colors, GaussianColor(), Bounds(0.05, 16, 19))
-    black = ColorImage(np.zeros((120, 160, 3), np.uint8))
-    surface = as_surface((MESH.vertices, MESH.normals))
-    uncovered = term.observe(black, surface)
-    before, cost = uncovered.fit(surface), uncovered.cost(surface)[0]
-    covered = term.observe(black, surface, occluders=points)
-    after = covered.fit(surface)
-    assert before.occluded == 0
-    low, high = camera.project(points).min(axis=0), camera.project(points).max(axis=0)
-    place = camera.project(MESH.vertices)
-    inside = np.all((place > low + 0.5) & (place < high - 0.5), axis=1)
-    near = np.all((place > low - 3) & (place < high + 3), axis=1)
-    assert np.count_nonzero(inside) > 5
-    assert np.count_nonzero(inside) <= after.occluded <= np.count_nonzero(near)
-    assert covered.cost(surface)[0] == pytest.approx(
-        cost - after.occluded * (19 - 0.05 - 3 * np.log(15 * np.sqrt(2 * np.pi)) - 1.5)
-    )
-
-
-def test_points_behind_a_camera_occlude_nothing():
-    points = np.array([[0.0, 0, -1], [0, 0, 0], [5, 0, 0.5]])
-    assert not occluded_pixels(STRAIGHT, points).any()
 
 
 def test_missing_returns_of_an_object_that_fills_the_image_are_holes():

@@ -178,6 +178,18 @@ def test_a_mesh_that_ends_inside_the_object_is_continued():
     assert np.argmin(costs) == 2
 
 
+def test_the_outline_of_a_frame_stays_as_it_was_observed():
+    known, model = begun(picture()), Rigid(MESH)
+    first, theta = look(known, picture()), np.array([0, 0, 0, 6e-3, 0, 0])
+    surface, sparse_jacobian = model.deform(theta[None]), model.sparse_jacobian(theta)
+    cost, residual = first.cost(surface), first.linearize(surface, sparse_jacobian).residual
+    fit = first.fit(surface)
+    assert look(known, picture(by=0.01)).cost(surface) < cost
+    assert first.cost(surface) == cost
+    np.testing.assert_array_equal(first.linearize(surface, sparse_jacobian).residual, residual)
+    assert first.fit(surface) == fit
+
+
 def test_what_hides_the_rim_says_nothing_about_it():
     """A hand before one end, or no returns from there: only the other three sides have an outline."""
     hand, hole = picture(), picture()
