@@ -30,7 +30,9 @@ _MATRIX = np.array([[500.0, 0, 320], [0, 501, 240], [0, 0, 1]])
 _PLACE = np.array([[-0.09], [0.0], [0.02]])
 
 
-@pytest.mark.parametrize("text", [_MESSAGE, _MESSAGE.replace("\nd:", "\nD:").replace("\nk:", "\nK:").replace("\np:", "\nP:")])
+@pytest.mark.parametrize(
+    "text", [_MESSAGE, _MESSAGE.replace("\nd:", "\nD:").replace("\nk:", "\nK:").replace("\np:", "\nP:")]
+)
 def test_a_camera_info_may_be_a_message(text: str) -> None:
     assert exchange.of_content(Path("info.yaml"), text) == "ros"
     content = ros.read(text, Hints())
@@ -45,7 +47,7 @@ def test_a_transposed_pose_is_refused() -> None:
     cam = "camera_model: pinhole, distortion_coeffs: [], distortion_model: none, intrinsics: [500, 501, 320, 240]"
     chain = f"cam0: {{{cam}, resolution: [640, 480]}}\ncam1: {{{cam}, resolution: [640, 480], T_cn_cnm1: %s}}"
     assert len(kalibr.read(chain % T_rl.tolist(), Hints()).cameras) == 2
-    with pytest.raises(FormatError, match="cam1: the last row of a pose is 0 0 0 1, not .*transposed"):
+    with pytest.raises(FormatError, match=r"cam1: the last row of a pose is 0 0 0 1, not .*transposed"):
         kalibr.read(chain % T_rl.T.tolist(), Hints())
 
 
@@ -53,7 +55,7 @@ def test_a_rotation_that_the_rectification_contradicts_is_refused() -> None:
     turn, lens = cv2.Rodrigues(np.array([0, 0.3, 0.02]))[0], np.array([-0.2, 0.05, 0, 0, 0])
     first, second = cv2.stereoRectify(_MATRIX, lens, _MATRIX, lens, (640, 480), turn, _PLACE)[:2]
     assert len(opencv.read(_stereo(turn, R1=first, R2=second), Hints(size=(640, 480))).cameras) == 2
-    with pytest.raises(FormatError, match="R does not fit R1 and R2 .* is R transposed"):
+    with pytest.raises(FormatError, match=r"R does not fit R1 and R2 .* is R transposed"):
         opencv.read(_stereo(turn.T, R1=first, R2=second), Hints(size=(640, 480)))
 
 
