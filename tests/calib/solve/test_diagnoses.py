@@ -162,7 +162,7 @@ def test_ambiguous_views_agree_on_the_true_pose_between_two_sensors() -> None:
 def facing(tilt: float) -> Task:
     """Boards that nearly all face a camera whose lens bends."""
     random = np.random.default_rng(3)
-    lens = Lens([-0.28, 0.09, 0.0006, -0.0004, 0])
+    lens = Lens(np.array([-0.28, 0.09, 0.0006, -0.0004, 0]))
     heads = {"color": Head(Camera(640, 480, 536.0, 537.5, 331.0, 236.0, lens), corner_sigma=0.03)}
     seen = board_views.look(heads, board_views.random_boards(16, random, 0.6, 1.0, tilt=(0.0, tilt)), random)
     return Task({"color": SensorTask(640, 480)}, seen.corners, (), "color")
