@@ -6,8 +6,8 @@ which errors that a shot's pixels share do not narrow. What scatters from shot t
 changes allowed. Source: leave-one-out predictive densities, Vehtari, Gelman, Gabry, Statistics and Computing 2017.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -89,6 +89,20 @@ class Comparison:
         return [
             each for each in self._unbeaten if each is not chosen and not each.hypothesis.contains(chosen.hypothesis)
         ]
+
+    def without_focal(self, unseen: Mapping[str, float]) -> "Comparison":
+        """Without the other focal lengths that a sensor's own corners would have shown.
+
+        Args:
+            unseen: largest relative change that they would not show, by sensor.
+        """
+        kept = [
+            each
+            for each in self.explanations
+            if each.hypothesis.kind != Kind.FOCAL
+            or abs(each.values[0]) <= unseen.get(each.hypothesis.sensors[0], np.inf)
+        ]
+        return replace(self, explanations=kept)
 
     @property
     def _unbeaten(self) -> list[Explanation]:

@@ -194,7 +194,7 @@ def _stereo(root: Mapping[str, Any], hints: Hints) -> Content:
 
 
 def _check_rectified(root: Mapping[str, Any], T_rl: Pose) -> None:
-    """Rejects R that turns the cameras otherwise than the rectification of the same file, after which both are alike."""
+    """Rejects R that turns the cameras otherwise than the rectification in the same file does."""
     rectifications = [np.asarray(root[key], float) for key in ("R1", "R2") if root.get(key) is not None]
     if len(rectifications) < 2:
         return

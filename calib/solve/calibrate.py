@@ -8,6 +8,7 @@ from calib.solve.bundle.formulation import formulate, groups_of
 from calib.solve.bundle.parameters.state import State
 from calib.solve.bundle.tasks import Task
 from calib.solve.solution import Solution
+from calib.solve.start.board_poses import untilted
 from calib.solve.start.start import start
 
 
@@ -36,4 +37,5 @@ def _solve(task: Task, start: State, note: Callable[[str], None]) -> Solution:
     try:
         return Solution(task, adjust(formulation, start, len(groups), note))
     except NotSolvedError as error:
-        raise NotSolvedError(f"{error}{diagnoses.unlike_the_rest(task, start)}") from error
+        why = diagnoses.unlike_the_rest(task, start) or untilted(start.boards.values())
+        raise NotSolvedError(f"{error}{why}") from error

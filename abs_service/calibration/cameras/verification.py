@@ -128,15 +128,17 @@ def _found(known: RigCalibration, stored: Stored, seen: BoardObservations, used:
     errors = {name: distance_error(stored, views, name, SPOILT_PX) for name in reaches}
     changes = tuple(pair_changes(stored, views))
     baseline = {name: known.sensors[name].residuals.corners_px for name in observers}
+    optics = {name: change for name in observers if (change := optics_change(stored, views, name)) is not None}
+    unseen = {name: change.unseen for name, change in optics.items() if not change.is_significant}
     return Verification(
         {name: corner_fit(stored, views, name) for name in observers},
-        {name: change for name in observers if (change := optics_change(stored, views, name)) is not None},
+        optics,
         {name: sensors[name].camera.fx for name in observers},
         {name: BASELINE_PX if px is None else px for name, px in baseline.items()},
         {name: bias for name, bias in biases.items() if bias is not None},
         {name: error for name, error in errors.items() if error is not None},
         changes,
-        _compared(stored, views, changes),
+        _compared(stored, views, changes).without_focal(unseen),
         reaches,
         {name: mistakes.likelier(stored, views, name) for name in observers},
         tuple(new_views.verdicts(known, seen, used)),

@@ -6,15 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.board.april_grid import AprilGrid
-from calib.board.corners import description, ellipse, errors, quality, saddle
+from calib.board.corners import description, ellipse, errors, other_discs, quality, saddle
 from calib.board.corners.order import canonical_order
-from calib.board.corners.search import find, is_cut_off
-from calib.board.corners.to_8bit import Grey, Image, grey
+from calib.board.corners.search import MIN_POINTS, Found, find, is_cut_off
+from calib.board.corners.to_8bit import Grey, Image, grey, tones
 from calib.board.target import AsymmetricCircles, Charuco, Circles, Target
 from calib.board.views import CornerView
 
-#: Minimum number of points in a view.
-MIN_POINTS = 6
 #: Minimum distance of neighbouring points [px].
 MIN_SPACING_PX = 5.0
 #: Largest saturated fraction of a board. Saturated white leaves corners in place, saturated black does not …
@@ -73,14 +71,15 @@ def detect(target: Target, image: Image, largest_saturated: float = MAX_SATURATE
     Raises:
         BoardError: unusable image; the subclass is the reason, see `calib.board.corners.errors`.
     """
-    levels = grey(image)
-    ids, pixels = find(target, levels)
+    levels, (ids, pixels) = _found(target, image)
     if len(ids) < MIN_POINTS:
         raise _detection_error(target, image, levels, len(ids))
     pixels = canonical_order(target, pixels, levels)
     points = quality.lattice(target, ids, pixels)
     if isinstance(target, AprilGrid):
         description.require_grid(target, points)
+    if isinstance(target, Circles | AsymmetricCircles):
+        other_discs.require_end(points, levels)
     spacing, (edge, narrow) = quality.spacing_px(points), quality.edges_px(target, points, levels)
     _check_whole(target, pixels, points, levels.shape)
     if spacing < MIN_SPACING_PX:
@@ -98,6 +97,13 @@ def detect(target: Target, image: Image, largest_saturated: float = MAX_SATURATE
         if len(ids) < MIN_POINTS:
             raise _detection_error(target, image, levels, len(ids))
     return Detection(ids, pixels, quality.sigma_px(target, ids, pixels), edge, spacing)
+
+
+def _found(target: Target, image: Image) -> tuple[Grey, Found]:
+    """Points by the tones that show most of them, and these; markers need other tones than distant boards."""
+    all_tones = tones(image) if isinstance(target, Charuco | AprilGrid) else [grey(image)]
+    every = [(levels, find(target, levels)) for levels in all_tones]
+    return max(every, key=lambda each: len(each[1][0]))
 
 
 def _check_whole(

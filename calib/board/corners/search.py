@@ -34,6 +34,9 @@ _FRAME = 0.3
 #: A chessboard, for what depends on the kind of board alone.
 _ANY = Chessboard(4, 3, 0.01)
 
+#: Minimum number of points in a view.
+MIN_POINTS = 6
+
 _NOTHING: Found = (np.zeros(0, np.intp), np.zeros((0, 2)))
 
 
@@ -43,12 +46,15 @@ def find(target: Target, levels: Grey) -> Found:
     All boards but ChArUco and AprilGrid are detected completely or not at all; then n is 0. Hidden corners of a
     chessboard or a ChArUco may be where they are expected.
     """
+    best = _NOTHING
     for image, scale, search in _attempts(target, levels):
         ids, pixels = search(target, _scaled(image, scale))
-        if len(ids):
+        if len(ids) > len(best[0]):
             # Both images cover the same area, and pixel centres are integers in both.
-            return ids, (pixels + 0.5) / scale - 0.5
-    return _NOTHING
+            best = ids, (pixels + 0.5) / scale - 0.5
+        if len(best[0]) >= MIN_POINTS:
+            break
+    return best
 
 
 def _attempts(target: Target, levels: Grey) -> Iterator[tuple[Grey, float, Callable[..., Found]]]:

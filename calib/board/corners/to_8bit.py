@@ -1,5 +1,7 @@
 """Conversion of images of any depth to 8-bit grey levels for OpenCV."""
 
+from collections.abc import Iterator
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +28,13 @@ def grey(image: Image) -> Grey:
     low, high = np.percentile(values, (_BLACK, _WHITE))
     stretched = np.clip((values - low) / max(high - low, 1e-6), 0, 1)
     return np.rint(255 * np.sqrt(stretched)).astype(np.uint8)
+
+
+def tones(image: Image) -> Iterator[Grey]:
+    """Image as 8 bits by all mappings: `grey`, and for other types a linear one, by which markers are found in more."""
+    yield (levels := grey(image))
+    if image.dtype != np.uint8:
+        yield np.rint(np.square(levels / np.float32(255)) * 255).astype(np.uint8)
 
 
 def local_contrast(levels: Grey) -> Grey:

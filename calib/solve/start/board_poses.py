@@ -1,6 +1,6 @@
 """Initial board pose in one camera, with both solutions of a planar target, and an initial focal length."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -16,6 +16,9 @@ from calib.solve.bundle.parameters.lens_parameters import LensKind
 
 #: Candidate focal lengths, relative to the image's width: from a wide fisheye to a telephoto lens.
 FOCAL_LENGTHS = np.geomspace(0.25, 4.0, 13)
+
+#: Boards within this angle of each other are held alike [rad].
+TILTED = np.deg2rad(10.0)
 
 #: Number of views to try focal lengths on.
 TRIED = 6
@@ -60,13 +63,29 @@ def initial_camera(width: int, height: int, kind: LensKind, views: Sequence[Corn
     The accuracy is low but sufficient, since each camera is optimised separately afterwards.
     """
     tried = views[:: max(1, len(views) // TRIED)]
-    cameras = [_plain(width, height, kind, share * width) for share in FOCAL_LENGTHS]
+    cameras = [plain_camera(width, height, kind, share * width) for share in FOCAL_LENGTHS]
     return min(cameras, key=lambda camera: _typical_error(camera, tried))
 
 
-def _plain(width: int, height: int, kind: LensKind, focal: float) -> Camera:
+def plain_camera(width: int, height: int, kind: LensKind, focal: float) -> Camera:
+    """Distortion-free camera with a focal length [px] and the principal point in the middle of the image."""
     lens = kind.make(np.zeros(len(kind.every)))
     return Camera(width, height, focal, focal, (width - 1) / 2, (height - 1) / 2, lens)
+
+
+def untilted(boards: Collection[Pose]) -> str:
+    """End of a sentence on boards that are hardly tilted to each other, so that no focal length follows; or ""."""
+    normals = np.stack([T_rb[:3, 2] for T_rb in boards])
+    mean = normals.mean(axis=0)
+    angle = float(np.arccos(np.clip(normals @ mean / np.linalg.norm(mean), -1, 1)).max())
+    return (
+        ""
+        if angle > TILTED
+        else (
+            f". Or the board is held alike in all views, to about {np.rad2deg(angle):.0f}°, so that nothing tells a "
+            "longer focal length from a larger distance: tilt it by 20° to 40° to all sides"
+        )
+    )
 
 
 def _typical_error(camera: Camera, views: Sequence[CornerView]) -> float:

@@ -15,7 +15,7 @@ from calib.solve.bundle.parameters.lens_parameters import FISHEYE
 from calib.solve.bundle.parameters.state import SensorState, State
 from calib.solve.bundle.tasks import SensorTask, Task
 from calib.solve.start import extrinsics_graph, half_turns, registration
-from calib.solve.start.board_poses import PoseCandidate, initial_camera, pose_candidates
+from calib.solve.start.board_poses import PoseCandidate, initial_camera, plain_camera, pose_candidates
 
 #: Reprojection errors are clipped here [px] when board poses are compared.
 FAR_PX = 20.0
@@ -54,7 +54,13 @@ def _camera(name: str, sensor: SensorTask, views: Sequence[CornerView], note: Ca
         raise NotSolvedError(f"{name}: sees no corners, so its intrinsics have to be given and kept")
     known = sensor.factory or (initial_camera(sensor.width, sensor.height, sensor.lens, views),)
     note(f"{name}: {len(views)} views, focal length about {known[0].fx:.0f} px to begin with")
-    return fit_camera(name, sensor, views, known[0])
+    try:
+        return fit_camera(name, sensor, views, known[0])
+    except NotSolvedError:
+        if sensor.factory:
+            raise
+        # Where boards face the camera, what a lens bends looks like a focal length that is many times too short.
+        return fit_camera(name, sensor, views, plain_camera(sensor.width, sensor.height, sensor.lens, sensor.width))
 
 
 def fit_camera(name: str, sensor: SensorTask, views: Sequence[CornerView], first: Camera) -> Camera:

@@ -81,5 +81,5 @@ def unseen(least: Mapping[str, float]) -> str:
         return ""
     sensor = max(least, key=lambda name: least[name])
     of = f"the focal length of {sensor}" if len(least) > 1 else "its focal length"
-    size = f" of less than {least[sensor]:.1%}" if np.isfinite(least[sensor]) else ""
+    size = f" of less than {max(least[sensor], 0.001):.1%}" if np.isfinite(least[sensor]) else ""
     return f" A change of {of} half way{size} would not have shown."

@@ -188,3 +188,13 @@ def test_a_charuco_whose_markers_begin_with_another_number_has_a_key(columns: in
 def test_a_first_number_beyond_the_dictionary_is_refused() -> None:
     with pytest.raises(ValueError, match="first_id: 90 must be from 0 to 83, as 5x5_100 has 100 markers"):
         Charuco(7, 5, 0.03, 0.022, "5x5_100", first_id=90)
+
+
+@pytest.mark.parametrize(("columns", "rows", "more"), [(7, 6, "columns"), (8, 5, "rows"), (6, 6, "columns")])
+def test_a_part_of_a_grid_of_discs_is_not_taken_for_the_board(columns: int, rows: int, more: str) -> None:
+    """One sensor saw other discs than another: a pair with 30 mm spacing was trusted, or one shot was off by 30 mm."""
+    printed = Circles(8, 6, 0.03, 0.015)
+    image = as_bytes(photograph(printed, VGA, centered(printed, (0.35, -0.4, 0.2), 0.6)))
+    assert len(detect(printed, image).ids) == 48
+    with pytest.raises(OtherBoardError, match=f"has more {more} than the {columns} × {rows} of the description"):
+        detect(Circles(columns, rows, 0.03, 0.015), image)

@@ -47,7 +47,7 @@ def test_a_transposed_pose_is_refused() -> None:
     cam = "camera_model: pinhole, distortion_coeffs: [], distortion_model: none, intrinsics: [500, 501, 320, 240]"
     chain = f"cam0: {{{cam}, resolution: [640, 480]}}\ncam1: {{{cam}, resolution: [640, 480], T_cn_cnm1: %s}}"
     assert len(kalibr.read(chain % T_rl.tolist(), Hints()).cameras) == 2
-    with pytest.raises(FormatError, match="cam1: the last row of a pose is 0 0 0 1, not .*transposed"):
+    with pytest.raises(FormatError, match=r"cam1: the last row of a pose is 0 0 0 1, not .*transposed"):
         kalibr.read(chain % T_rl.T.tolist(), Hints())
 
 
@@ -55,7 +55,7 @@ def test_a_rotation_that_the_rectification_contradicts_is_refused() -> None:
     turn, lens = cv2.Rodrigues(np.array([0, 0.3, 0.02]))[0], np.array([-0.2, 0.05, 0, 0, 0])
     first, second = cv2.stereoRectify(_MATRIX, lens, _MATRIX, lens, (640, 480), turn, _PLACE)[:2]
     assert len(opencv.read(_stereo(turn, R1=first, R2=second), Hints(size=(640, 480))).cameras) == 2
-    with pytest.raises(FormatError, match="R does not fit R1 and R2 .* is R transposed"):
+    with pytest.raises(FormatError, match=r"R does not fit R1 and R2 .* is R transposed"):
         opencv.read(_stereo(turn.T, R1=first, R2=second), Hints(size=(640, 480)))
 
 

@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 
 from calib.board.views import CornerView, PlaneView
+from calib.camera import Camera
+from calib.lenses.lens import Lens
+from calib.solve.bundle.adjustment import NotSolvedError
 from calib.solve.bundle.observability import UndeterminedError, require_determined
 from calib.solve.bundle.tasks import SensorTask, Task, TaskError
 from calib.solve.calibrate import calibrate
@@ -154,3 +157,18 @@ def test_ambiguous_views_agree_on_the_true_pose_between_two_sensors() -> None:
     np.testing.assert_allclose(
         extrinsics_graph.relative_pose({**seen, "tof": flipped}, "tof", "color"), heads["color"].camera.T_rs, atol=0.03
     )
+
+
+def facing(tilt: float) -> Task:
+    """Boards that nearly all face a camera whose lens bends."""
+    random = np.random.default_rng(3)
+    lens = Lens(np.array([-0.28, 0.09, 0.0006, -0.0004, 0]))
+    heads = {"color": Head(Camera(640, 480, 536.0, 537.5, 331.0, 236.0, lens), corner_sigma=0.03)}
+    seen = board_views.look(heads, board_views.random_boards(16, random, 0.6, 1.0, tilt=(0.0, tilt)), random)
+    return Task({"color": SensorTask(640, 480)}, seen.corners, (), "color")
+
+
+def test_boards_that_all_face_the_camera_are_named() -> None:
+    """It was said that the views contradict each other, or that the lens does not fit."""
+    with pytest.raises(NotSolvedError, match=r"no minimum .* held alike in all views, .* tilt it by 20° to 40°"):
+        calibrate(facing(0.02))

@@ -99,6 +99,26 @@ def test_a_camera_that_was_zoomed_is_said_to_have_another_focal_length() -> None
     assert said.advice == "To tell, show the board to all sensors much nearer and much further, and tilted every way."
 
 
+def test_a_focal_length_that_its_own_corners_contradict_is_no_rival() -> None:
+    """Of a left camera that was zoomed by 1 % it was said that the right one might have been, by -1 %."""
+    both = [
+        Explanation(
+            Hypothesis(Kind.FOCAL, (name,), ((0,), (1,)), (920.0, 919.0)),
+            np.array([size]),
+            np.ones(1),
+            np.zeros(3),
+            0.0,
+        )
+        for name, size in (("left", 0.01), ("right", -0.01))
+    ]
+    found = Comparison(both, 0.0, 0.0, 1.0)
+    assert "cannot tell that from this: right" in causes.verdicts(found, Level.BAD, {})[0].text
+    (said,) = causes.verdicts(found.without_focal({"right": 0.001}), Level.BAD, {})
+    assert (said.about, said.text[:28]) == ("left", "has another focal length, by")
+    assert "right" not in said.text
+    assert len(found.without_focal({"right": 0.02}).explanations) == 2
+
+
 def test_what_cannot_be_told_apart_is_said_with_the_shots_that_would() -> None:
     heads = aligned()
     report = verified(heads, {**heads, "depth": replace(heads["depth"], depth_scale=0.01)}, 0, 0.95, 1.05)

@@ -5,7 +5,7 @@ import pytest
 
 from calib.solve.solution import Solution
 from calib.solve.validation import verdict
-from calib.solve.validation.changes import is_confirmed
+from calib.solve.validation.changes import is_confirmed, unseen
 from calib.solve.validation.free_shape import free_shape
 from calib.solve.validation.steadiness import Change, changes_of_optics
 from tests.calib.solve.validation.test_steadiness import solved, views, zoomed
@@ -33,3 +33,9 @@ def test_shots_that_disagree_otherwise_are_named_without_a_size(monkeypatch: pyt
 
 def _unchanged() -> Solution:
     return solved(views())
+
+
+def test_the_least_change_that_shows_is_not_rounded_to_none() -> None:
+    """Of sharp images with 16 poses "a change of less than 0.0%" was said."""
+    assert "half way of less than 0.1% would not have shown" in unseen({"color": 2e-4})
+    assert "of left half way of less than 1.2%" in unseen({"left": 0.012, "right": 2e-4})
