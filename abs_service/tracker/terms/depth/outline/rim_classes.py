@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.terms.depth.classification.beyond_view import BLIND_SHARE, MIN_RETURNS
 from abs_service.tracker.terms.depth.outline.rim import Rim, read
+from abs_service.tracker.terms.depth.outline.round_side import is_round_side
 from abs_service.tracker.terms.sensor_fit import MIN_RIM
 from calib.camera import Camera
 
@@ -86,6 +87,7 @@ def classify_rim(
     hidden, unseen = _unseen(camera, [outer + by * step for by in _HIDING_STEPS], inside_at)
     # Extrapolated to the end of the surface, which lies about as far outside the outer vertex as the inner one inside.
     turns_away = 2 * _cosine(camera, surface, rim.outer) - _cosine(camera, surface, rim.inner) < MIN_COSINE
+    turns_away |= is_round_side(camera, distance, place, inside, gradients)
     unknown = inside > camera.width + camera.height
     at_border = ~_is_within(camera, place, BORDER_PX)
     cut = _ends_at_border(camera.project(ends), distance) & (not rim.is_end)

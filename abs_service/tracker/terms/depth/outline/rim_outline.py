@@ -143,7 +143,7 @@ class RimOutline:
         of_points = sparse_jacobian.group, sparse_jacobian.parameters, sparse_jacobian.local
         chain(rows, outer[use], inner[use], beyond[use], *of_points, jacobian)
         shared = shared_by_side(jacobian, residual[use], gradients[use])
-        return Linearization(residual[use], jacobian, places=points[use], shared=shared)
+        return Linearization(residual[use], jacobian, points[use], rows, shared)
 
     def match(self, surface: Surface, sparse_jacobian: SparseJacobian) -> PointLinearization:
         """Residuals of the places of outermost vertices, if a slide and a turn lay the edges on the outline."""
