@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.models.base import DeformationModel
 from abs_service.tracker.posterior.optimum import Optimum
-from abs_service.tracker.terms.linearization import Part
+from abs_service.tracker.terms.linearization import Part, PointLinearization
 
-#: Error of the directions in which residuals tell of motion [rad], root mean square.
-DIRECTION_ERROR = 0.15
+#: Error of the directions [rad] in which residuals of an outline tell of motion, root mean square, and those of points:
+#: a surface that bends follows another one beneath it that is so much inclined.
+EDGE_ERROR, POINT_ERROR = 0.1, 0.3
 
 #: A model moves rigidly if it leaves no more than this share of such motions, in squares.
 _SMALL_SHARE = 1e-3
@@ -46,8 +47,9 @@ class SlideObservability:
         told, feigned = np.zeros((2, len(optimum.sensed), 6, 6))
         for k, part in enumerate(optimum.sensed):
             told[k], feigned[k] = _information(part, *frame)
+            feigned[k] *= (POINT_ERROR if isinstance(part, PointLinearization) else EDGE_ERROR) ** 2
         slides = _slides(told.sum(axis=0), _motions(vertices, *frame))
-        held = np.maximum(_along(slides, told) - DIRECTION_ERROR**2 * _along(slides, feigned), 0.0).sum(axis=0)
+        held = np.maximum(_along(slides, told - feigned), 0.0).sum(axis=0)
         return float(1 / np.sqrt(_LEAST + held.min()))
 
 

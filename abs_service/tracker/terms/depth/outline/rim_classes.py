@@ -36,6 +36,9 @@ LEAVES_M = 0.015
 _NEIGHBOURS = 7
 _ALMOST = 0.75
 
+#: A body with a smaller share of free edges in its outline is round for the most part; those few belong to it as well.
+LEAST_FREE = 0.25
+
 #: Vertices within so many pixels of the image's border may continue beyond it.
 BORDER_PX = 2.0
 
@@ -99,7 +102,7 @@ def classify_rim(
     free = classes == RimClass.FREE
     if _bulges(camera, surface, rim.outer[free], -gradients[free]):
         classes[free] = RimClass.SILHOUETTE
-    elif np.count_nonzero(free) < MIN_RIM:
+    elif np.count_nonzero(free) < max(MIN_RIM, LEAST_FREE * np.count_nonzero(free | (classes == RimClass.SILHOUETTE))):
         # That fewer lie off the outline the status could not tell, as beside specks of relief and quantised distances.
         classes[free] = RimClass.CONTACT
     gap[(classes != RimClass.FREE) | rim.is_end] = 0.0

@@ -18,8 +18,9 @@ _ALONG_PX = np.array([-6.0, -3.0, 0.0, 3.0, 6.0])
 #: A side is round if its sine grows outwards beyond the first at the outline (58°), and the second in the image.
 _LEAST_SINE, _LEAST_MEASURED = 0.85, 0.65
 
-#: Number of neighbouring edges, of which the median counts.
-_NEIGHBOURS = 7
+#: Number of neighbouring edges, of which the median counts; and of those that a round one among them makes round: where
+#: an end meets a silhouette, its corner wanders as well.
+_NEIGHBOURS, _BESIDE = 7, 5
 
 
 def is_round_side(
@@ -54,13 +55,19 @@ def is_round_side(
     at_near, at_far = (centers[1:] + centers[:-1]) / 2
     extrapolated = near + (near - far) * at_near / (at_far - at_near)
     both = _smoothed(np.stack([near, extrapolated], axis=1), places)
-    return (both[:, 0] > _LEAST_MEASURED) & (both[:, 1] > _LEAST_SINE)
+    is_round = (both[:, 0] > _LEAST_MEASURED) & (both[:, 1] > _LEAST_SINE)
+    return np.asarray(is_round[_nearest(places, _BESIDE)].any(axis=1))
 
 
 def _smoothed(values: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.float64]:
     """Medians of the values (k, m) of the nearest edges at places (k, 2), see `_median`."""
+    return _median(values[_nearest(places, _NEIGHBOURS)].swapaxes(1, 2))
+
+
+def _nearest(places: NDArray[np.float64], count: int) -> NDArray[np.intp]:
+    """Indices (k, count) of the places (k, 2) that are nearest to each of them, itself first."""
     apart = np.linalg.norm(places[:, None] - places, axis=2)
-    return _median(values[np.argsort(apart, axis=1, kind="stable")[:, :_NEIGHBOURS]].swapaxes(1, 2))
+    return np.argsort(apart, axis=1, kind="stable")[:, :count]
 
 
 def _median(values: NDArray[np.float64]) -> NDArray[np.float64]:
