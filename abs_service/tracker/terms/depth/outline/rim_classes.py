@@ -90,7 +90,6 @@ def classify_rim(
     hidden, unseen = _unseen(camera, [outer + by * step for by in _HIDING_STEPS], inside_at)
     # Extrapolated to the end of the surface, which lies about as far outside the outer vertex as the inner one inside.
     turns_away = 2 * _cosine(camera, surface, rim.outer) - _cosine(camera, surface, rim.inner) < MIN_COSINE
-    turns_away |= is_round_side(camera, distance, place, inside, gradients)
     unknown = inside > camera.width + camera.height
     at_border = ~_is_within(camera, place, BORDER_PX)
     cut = _ends_at_border(camera.project(ends), distance) & (not rim.is_end)
@@ -102,7 +101,10 @@ def classify_rim(
     free = classes == RimClass.FREE
     if _bulges(camera, surface, rim.outer[free], -gradients[free]):
         classes[free] = RimClass.SILHOUETTE
-    elif np.count_nonzero(free) < max(MIN_RIM, LEAST_FREE * np.count_nonzero(free | (classes == RimClass.SILHOUETTE))):
+    else:
+        classes[free & is_round_side(camera, distance, place, inside, gradients)] = RimClass.SILHOUETTE
+    free, round_sides = (classes == one for one in (RimClass.FREE, RimClass.SILHOUETTE))
+    if np.count_nonzero(free) < max(MIN_RIM, LEAST_FREE * np.count_nonzero(free | round_sides)):
         # That fewer lie off the outline the status could not tell, as beside specks of relief and quantised distances.
         classes[free] = RimClass.CONTACT
     gap[(classes != RimClass.FREE) | rim.is_end] = 0.0

@@ -15,8 +15,9 @@ _DEPTHS_PX = np.array([[2.0, 2.5, 3.0], [4.5, 5.0, 5.5], [8.0, 9.0, 10.0]])
 #: So far along the outline, the distances beside an edge are averaged [px].
 _ALONG_PX = np.array([-6.0, -3.0, 0.0, 3.0, 6.0])
 
-#: A side is round if its sine grows outwards beyond the first at the outline (58°), and the second in the image.
-_LEAST_SINE, _LEAST_MEASURED = 0.85, 0.65
+#: A side is round where its sine at the outline is beyond the first (72°), and from there on up to the second (58°), if
+#: the sine in the image is beyond the third. A sheet may be bent by as much as the second at its edge.
+_CERTAIN_SINE, _GROWING_SINE, _LEAST_MEASURED = 0.95, 0.85, 0.65
 
 #: Number of neighbouring edges, of which the median counts; and of those that a round one among them makes round: where
 #: an end meets a silhouette, its corner wanders as well.
@@ -55,8 +56,11 @@ def is_round_side(
     at_near, at_far = (centers[1:] + centers[:-1]) / 2
     extrapolated = near + (near - far) * at_near / (at_far - at_near)
     both = _smoothed(np.stack([near, extrapolated], axis=1), places)
-    is_round = (both[:, 0] > _LEAST_MEASURED) & (both[:, 1] > _LEAST_SINE)
-    return np.asarray(is_round[_nearest(places, _BESIDE)].any(axis=1))
+    may_be = (both[:, 0] > _LEAST_MEASURED) & (both[:, 1] > _GROWING_SINE)
+    is_round, beside = may_be & (both[:, 1] > _CERTAIN_SINE), _nearest(places, _BESIDE)
+    for _ in places:
+        is_round |= may_be & is_round[beside].any(axis=1)
+    return np.asarray(is_round[beside].any(axis=1))
 
 
 def _smoothed(values: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.float64]:
