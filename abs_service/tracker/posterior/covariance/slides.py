@@ -72,7 +72,7 @@ def _information(
 
 
 def _slides(told: NDArray[np.float64], motions: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Motions (6, 6), columns, that information (6, 6) tells apart, each with vertices moved by 1 in the mean square."""
+    """Motions (6, 6), columns, that information (6, 6) tells apart; each moves the vertices by 1, root mean square."""
     moved = np.einsum("nij,nik->jk", motions, motions) / len(motions)
     inverse = np.linalg.inv(np.linalg.cholesky(moved + 1e-9 * np.eye(6)))
     return np.asarray(inverse.T @ np.linalg.eigh(inverse @ told @ inverse.T)[1])
