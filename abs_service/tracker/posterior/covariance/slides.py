@@ -17,8 +17,8 @@ from abs_service.tracker.terms.linearization import Part, PointLinearization
 #: a surface that bends follows another one beneath it that is so much inclined.
 EDGE_ERROR, POINT_ERROR = 0.1, 0.3
 
-#: A model moves rigidly if it leaves no more than this share of such motions, in squares.
-_SMALL_SHARE = 1e-3
+#: A model moves rigidly if so many of its vertices lack no more than this share of such motions, in squares.
+_PROBES, _SMALL_SHARE = 60, 1e-3
 
 #: Precision that keeps the deviation finite [1/m²]: nothing slides by more than a metre.
 _LEAST = 1.0
@@ -29,8 +29,9 @@ class SlideObservability:
 
     def __init__(self, model: DeformationModel):
         vertices = model.mesh.vertices.astype(np.float64)
-        jacobian = model.sparse_jacobian(model.rest).dense.reshape(3 * len(vertices), -1)
-        motions = _motions(vertices, *_frame(vertices)).reshape(len(jacobian), -1)
+        some = np.linspace(0, len(vertices) - 1, _PROBES).astype(np.intp)
+        jacobian = model.sparse_jacobian(model.rest).dense[some].reshape(3 * _PROBES, -1)
+        motions = _motions(vertices[some], *_frame(vertices)).reshape(3 * _PROBES, -1)
         left = motions - jacobian @ np.linalg.lstsq(jacobian, motions)[0]
         self._is_free = bool(np.mean(left**2) < _SMALL_SHARE * np.mean(motions**2))
 
@@ -66,14 +67,15 @@ def _information(
     if not len(part.rows):
         return np.zeros((6, 6)), np.zeros((6, 6))
     motions = _motions(part.places, center, size)
-    told = np.einsum("mi,mij->mj", part.rows, motions)
+    told = (part.rows[:, None] @ motions)[:, 0]
     weighted = (motions * np.linalg.norm(part.rows, axis=1)[:, None, None]).reshape(-1, 6)
     return told.T @ told, weighted.T @ weighted
 
 
 def _slides(told: NDArray[np.float64], motions: NDArray[np.float64]) -> NDArray[np.float64]:
     """Motions (6, 6), columns, that information (6, 6) tells apart; each moves the vertices by 1, root mean square."""
-    moved = np.einsum("nij,nik->jk", motions, motions) / len(motions)
+    flat = motions.reshape(-1, 6)
+    moved = flat.T @ flat / len(motions)
     inverse = np.linalg.inv(np.linalg.cholesky(moved + 1e-9 * np.eye(6)))
     return np.asarray(inverse.T @ np.linalg.eigh(inverse @ told @ inverse.T)[1])
 

@@ -15,8 +15,8 @@ _DEPTHS_PX = np.array([[2.0, 2.5, 3.0], [4.5, 5.0, 5.5], [8.0, 9.0, 10.0]])
 #: So far along the outline, the distances beside an edge are averaged [px].
 _ALONG_PX = np.array([-6.0, -3.0, 0.0, 3.0, 6.0])
 
-#: A side is round where its sine at the outline is beyond the first (72°), and from there as far as it is beyond the second (58°), if
-#: the sine in the image is beyond the third. A sheet may be bent by as much as the second at its edge.
+#: A side is round where its sine at the outline is beyond the first (72°), and from there as far as it is beyond the
+#: second (58°), if that in the image is beyond the third. A sheet may be bent by as much as the second at its edge.
 _CERTAIN_SINE, _GROWING_SINE, _LEAST_MEASURED = 0.95, 0.85, 0.65
 
 #: Number of neighbouring edges, of which the median counts; and of those that a round one among them makes round: where
