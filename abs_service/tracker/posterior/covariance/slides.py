@@ -77,12 +77,12 @@ def _slides(told: NDArray[np.float64], motions: NDArray[np.float64]) -> NDArray[
     flat = motions.reshape(-1, 6)
     moved = flat.T @ flat / len(motions)
     inverse = np.linalg.inv(np.linalg.cholesky(moved + 1e-9 * np.eye(6)))
-    return np.asarray(inverse.T @ np.linalg.eigh(inverse @ told @ inverse.T)[1])
+    return np.asarray(inverse.T @ np.linalg.eigh(inverse @ told @ inverse.T)[1], np.float64)
 
 
 def _along(slides: NDArray[np.float64], information: NDArray[np.float64]) -> NDArray[np.float64]:
     """Information (parts, 6, 6) along each of the slides (6, 6), columns: (parts, 6)."""
-    return np.asarray(np.sum(slides * (information @ slides), axis=1))
+    return np.asarray(np.sum(slides * (information @ slides), axis=1), np.float64)
 
 
 def _motions(points: NDArray[np.floating], center: NDArray[np.float64], size: float) -> NDArray[np.float64]:

@@ -30,8 +30,8 @@ def picture(half_angle: float, sigma: float = 0.001) -> tuple[np.ndarray, np.nda
 def test_a_roll_is_round_at_its_sides_and_a_bent_sheet_is_not(half_angle: float, expected: bool):
     distance, on = picture(half_angle)
     rows = np.arange(90, 150, 6)
-    last = np.array([np.flatnonzero(on[row]).max() for row in rows])
-    places = np.stack([last - 3.0, rows], axis=1)
+    last = np.array([np.flatnonzero(on[row]).max() for row in rows], np.float64)
+    places = np.stack([last - 3.0, rows.astype(np.float64)], axis=1)
     inwards = np.tile([-1.0, 0.0], (len(rows), 1))
     radial = (distance * np.linalg.norm(CAMERA.unproject(np.ones(on.shape)), axis=-1)).astype(np.float32)
     found = is_round_side(CAMERA, radial, places, np.full(len(rows), 3.0), inwards)
