@@ -18,6 +18,7 @@ from abs_service.tracker.estimates.estimate import Estimate, SearchReport, Statu
 from abs_service.tracker.estimates.shape_quality import ShapeComparison
 from abs_service.tracker.optimizers.base import Budget, Optimizer, Outcome, Search
 from abs_service.tracker.posterior.covariance.observability import single_frame_deviation
+from abs_service.tracker.posterior.covariance.slides import SlideObservability
 from abs_service.tracker.posterior.covariance.theta_covariance import ThetaCovariance
 from abs_service.tracker.posterior.covariance.vertex_covariance import VertexCovariance
 from abs_service.tracker.posterior.frame_posterior import FramePosterior
@@ -61,6 +62,7 @@ class Tracker:
         self._vertex_covariance = VertexCovariance(model, registration_m, centers)
         self._patches = patches_of(model.mesh)
         self._shape = ShapeComparison(model.mesh)
+        self._slides = SlideObservability(model)
         self._followed = 0
         self._last_tracked = model.rest
 
@@ -109,7 +111,8 @@ class Tracker:
         motion = self._posterior.motion.update(frame.motion, optimum.theta, optimum.inverse_curvature)
         covariance = self._theta_covariance.update(optimum, frame.motion, motion)
         vertex_covariance = self._vertex_covariance.update(optimum, frame, covariance)
-        shape = self._shape.compare(optimum.vertices, vertex_covariance, single_frame_deviation(optimum, frame.motion))
+        unheld = max(single_frame_deviation(optimum, frame.motion), self._slides.deviation(optimum))
+        shape = self._shape.compare(optimum.vertices, vertex_covariance, unheld)
         fits = outcome.compared(frame).fits
         frame.learn(optimum.surface)
         verdict, reasons = status.judge(

@@ -22,12 +22,14 @@ class Linearization:
         residual: (m,).
         jacobian: (m, dim).
         places: of the points that they belong to (m, 3) [m]; empty (0, 3) if they belong to none.
+        rows: derivatives (m, 3) with respect to the positions of these [1/m]; likewise.
         shared: sum of the derivatives (s, dim) of the residuals that share an error, times that error's deviation.
     """
 
     residual: NDArray[np.float64]
     jacobian: NDArray[np.float64]
     places: NDArray[np.floating] = field(default_factory=lambda: np.zeros((0, 3)))
+    rows: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 3)))
     shared: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
 
     def moved(self, by: NDArray[np.float64]) -> "Linearization":

@@ -71,7 +71,7 @@ class ObservedRimOutline:
         jacobian = np.zeros((len(use), sparse_jacobian.dimension))
         chain(rows, self.edges.some(use), sparse_jacobian.blocks, jacobian)
         shared = _shared_by_side(jacobian, residual[use], gradients[use])
-        return Linearization(residual[use], jacobian, places=points[use], shared=shared)
+        return Linearization(residual[use], jacobian, points[use], rows, shared)
 
     def match(self, surface: Surface, sparse_jacobian: SparseJacobian) -> PointLinearization:
         """Residuals of the places of outermost vertices, if a slide and a turn lay the edges on the outline."""

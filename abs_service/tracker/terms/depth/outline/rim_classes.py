@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.terms.depth.classification.beyond_view import BLIND_SHARE, MIN_RETURNS
 from abs_service.tracker.terms.depth.outline.rim import Rim, read
+from abs_service.tracker.terms.depth.outline.round_side import is_round_side
 from abs_service.tracker.terms.sensor_fit import MIN_RIM
 from calib.camera import Camera
 
@@ -34,6 +35,9 @@ _LEANING, _MOST, _MIN_DIRECTION = 0.6, 0.75, 0.25
 LEAVES_M = 0.015
 _NEIGHBOURS = 7
 _ALMOST = 0.75
+
+#: A body with a smaller share of free edges in its outline is round for the most part; those few belong to it as well.
+LEAST_FREE = 0.25
 
 #: Vertices within so many pixels of the image's border may continue beyond it.
 BORDER_PX = 2.0
@@ -97,7 +101,10 @@ def classify_rim(
     free = classes == RimClass.FREE
     if _bulges(camera, surface, rim.outer[free], -gradients[free]):
         classes[free] = RimClass.SILHOUETTE
-    elif np.count_nonzero(free) < MIN_RIM:
+    else:
+        classes[free & is_round_side(camera, distance, place, inside, gradients)] = RimClass.SILHOUETTE
+    free, round_sides = (classes == one for one in (RimClass.FREE, RimClass.SILHOUETTE))
+    if np.count_nonzero(free) < max(MIN_RIM, LEAST_FREE * np.count_nonzero(free | round_sides)):
         # That fewer lie off the outline the status could not tell, as beside specks of relief and quantised distances.
         classes[free] = RimClass.CONTACT
     gap[(classes != RimClass.FREE) | rim.is_end] = 0.0

@@ -1,0 +1,96 @@
+"""Slides: rigid motions of a surface along itself, which leave what is measured as it is.
+
+A cylinder turns about its axis, a board moves between its long edges, and neither a distance nor an edge of its outline
+changes. What their residuals seem to tell of such a motion comes from errors of direction: normals of a coarse mesh are
+some degrees off, and so are those of its edges. That information is taken away; what is left is what holds the surface.
+Gelfand and Guibas, Shape segmentation using local slippage analysis, SGP 2004, find slides by the same eigenvalues.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.tracker.models.base import DeformationModel
+from abs_service.tracker.posterior.optimum import Optimum
+from abs_service.tracker.terms.linearization import Part, PointLinearization
+
+#: Error of the directions [rad] in which residuals of an outline tell of motion, root mean square, and those of points:
+#: a surface that bends follows another one beneath it that is so much inclined.
+EDGE_ERROR, POINT_ERROR = 0.1, 0.3
+
+#: A model moves rigidly if so many of its vertices lack no more than this share of such motions, in squares.
+_PROBES, _SMALL_SHARE = 60, 1e-3
+
+#: Precision that keeps the deviation finite [1/m²]: nothing slides by more than a metre.
+_LEAST = 1.0
+
+
+class SlideObservability:
+    """What the sensors tell of rigid motions of the surface; a model that cannot move so does not slide."""
+
+    def __init__(self, model: DeformationModel):
+        vertices = model.mesh.vertices.astype(np.float64)
+        some = np.linspace(0, len(vertices) - 1, _PROBES).astype(np.intp)
+        jacobian = model.sparse_jacobian(model.rest).dense[some].reshape(3 * _PROBES, -1)
+        motions = _motions(vertices[some], *_frame(vertices)).reshape(3 * _PROBES, -1)
+        left = motions - jacobian @ np.linalg.lstsq(jacobian, motions)[0]
+        self._is_free = bool(np.mean(left**2) < _SMALL_SHARE * np.mean(motions**2))
+
+    def deviation(self, optimum: Optimum) -> float:
+        """Standard deviation [m] of the vertices, root mean square, along the slide that is held least; 0 without any.
+
+        Args:
+            optimum: the estimate of a frame; its priors do not count.
+        """
+        if not self._is_free:
+            return 0.0
+        vertices = optimum.vertices.astype(np.float64)
+        frame = _frame(vertices)
+        told, feigned = np.zeros((2, len(optimum.sensed), 6, 6))
+        for k, part in enumerate(optimum.sensed):
+            told[k], feigned[k] = _information(part, *frame)
+            feigned[k] *= (POINT_ERROR if isinstance(part, PointLinearization) else EDGE_ERROR) ** 2
+        slides = _slides(told.sum(axis=0), _motions(vertices, *frame))
+        held = np.maximum(_along(slides, told - feigned), 0.0).sum(axis=0)
+        return float(1 / np.sqrt(_LEAST + held.min()))
+
+
+def _frame(vertices: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+    """Centre (3,) of vertices (n, 3), and root mean square of their distances from it [m]."""
+    center = vertices.mean(axis=0)
+    return center, float(np.sqrt(np.mean(np.square(vertices - center).sum(axis=1))))
+
+
+def _information(
+    part: Part, center: NDArray[np.float64], size: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Information of residuals on rigid motions, and what it were in the direction of most, each (6, 6)."""
+    if not len(part.rows):
+        return np.zeros((6, 6)), np.zeros((6, 6))
+    motions = _motions(part.places, center, size)
+    told = (part.rows[:, None] @ motions)[:, 0]
+    weighted = (motions * np.linalg.norm(part.rows, axis=1)[:, None, None]).reshape(-1, 6)
+    return told.T @ told, weighted.T @ weighted
+
+
+def _slides(told: NDArray[np.float64], motions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Motions (6, 6), columns, that information (6, 6) tells apart; each moves the vertices by 1, root mean square."""
+    flat = motions.reshape(-1, 6)
+    moved = flat.T @ flat / len(motions)
+    inverse = np.linalg.inv(np.linalg.cholesky(moved + 1e-9 * np.eye(6)))
+    return np.asarray(inverse.T @ np.linalg.eigh(inverse @ told @ inverse.T)[1], np.float64)
+
+
+def _along(slides: NDArray[np.float64], information: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Information (parts, 6, 6) along each of the slides (6, 6), columns: (parts, 6)."""
+    return np.asarray(np.sum(slides * (information @ slides), axis=1), np.float64)
+
+
+def _motions(points: NDArray[np.floating], center: NDArray[np.float64], size: float) -> NDArray[np.float64]:
+    """Displacements (n, 3, 6) of points (n, 3) by three shifts and by three turns about a centre, over a size [m]."""
+    x, y, z = ((points - center) / size).T
+    motions = np.zeros((len(points), 3, 6))
+    motions[:, :, :3] = np.eye(3)
+    motions[:, 1, 3], motions[:, 2, 3] = -z, y
+    motions[:, 0, 4], motions[:, 2, 4] = z, -x
+    motions[:, 0, 5], motions[:, 1, 5] = -y, x
+    return motions

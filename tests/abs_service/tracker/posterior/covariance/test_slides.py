@@ -1,0 +1,42 @@
+"""Boards that move along themselves, and models that cannot."""
+
+import numpy as np
+import pytest
+
+import abs_service as a
+from abs_service.tracker.detection.strip.strip_detection import Strip
+from abs_service.tracker.models.gravity import Gravity
+from abs_service.tracker.posterior.covariance.slides import SlideObservability
+from abs_service.tracker.posterior.curvature import Quadratic
+from abs_service.tracker.posterior.linearized_cost import LinearizedCost
+from abs_service.tracker.posterior.optimum import Optimum
+from calib.camera import Camera
+
+CAMERA = Camera(320, 240, 290.0, 290.0, 159.5, 119.5)
+
+
+@pytest.mark.parametrize(("half_length_m", "expected"), [(1.0, "DEGRADED"), (0.2, "TRACKING")])
+def test_a_board_whose_ends_are_out_of_sight_is_held_by_nothing(half_length_m: float, expected: str):
+    """It is bent a little, 14 cm wide, and lies askew in the image; its long edges hold it across only."""
+    generator, rays = np.random.default_rng(0), CAMERA.unproject(np.ones((CAMERA.height, CAMERA.width)))
+    x, y = 0.7 * rays[..., 0] / rays[..., 2], 0.7 * rays[..., 1] / rays[..., 2]
+    along, across = np.cos(0.35) * x + np.sin(0.35) * y, np.cos(0.35) * y - np.sin(0.35) * x
+    tracker, found = a.Tracker(CAMERA, a.Nurbs()), []
+    for k in range(3):
+        noise, frayed = generator.standard_normal((2, *x.shape))
+        on = (np.abs(along) < half_length_m) & (np.abs(across) < 0.07 + 0.002 * frayed)
+        distance = np.where(on, 0.7 + 0.5 * along**2, 1.2) + 0.001 * noise
+        found.append(tracker.track(distance, time_s=k / 30, mask=on).status)
+    assert found == [expected] * 3
+
+
+@pytest.mark.parametrize(("is_free", "expected_m"), [(True, 1.0), (False, 0.0)])
+def test_a_strip_whose_gripper_is_fixed_does_not_slide(is_free: bool, expected_m: float):
+    """Without any measurement, a free one may be anywhere."""
+    at = np.eye(4)
+    at[2, 3] = 1.0
+    model = Gravity(Strip(at, 0.3, 0.05, np.zeros(65), 0.004), 4, is_free, 100, np.array([0.0, 1.0, 0.0]))
+    theta, size = model.rest, len(model.rest)
+    nothing = LinearizedCost(theta, Quadratic(theta, np.eye(size)), np.eye(size), [], model.sparse_jacobian(theta))
+    optimum = Optimum(theta, model.deform(theta[None]), nothing, [], np.eye(size))
+    assert SlideObservability(model).deviation(optimum) == pytest.approx(expected_m)
