@@ -75,17 +75,16 @@ class MeshWarp:
         points = self.geometry.see(distance)
         nearness = np.zeros(self._ray_length.shape, np.float32)
         face = np.full(self._ray_length.shape, -1, np.int32)
+        buffer = raster.ZBuffer(nearness, face)
         warped = np.empty(self._ray_length.shape, np.float32)
 
-        measured = (points.place, points.inverse_z, points.distance)
-
         def work(rows: tuple[int, int]) -> None:
-            raster.cover(*measured, self.largest_step_m, *rows, nearness, face)
+            raster.cover(points.source, self.largest_step_m, rows, buffer)
             shading.measure(face, nearness, self._ray_length, *rows, warped)
 
         for _ in self._each(work, self._bands):
             pass
-        raster.fray(*measured, self.largest_step_m, self._reach, nearness, face, warped)
+        raster.fray(points.source, self.largest_step_m, self._reach, buffer, warped)
         if not (face >= 0).any():
             raise errors.nothing_seen(distance, points.inverse_z, self.geometry.target)
         return Warped(warped, points, self.geometry, self.largest_step_m, face, nearness)
@@ -115,7 +114,7 @@ class Warped:
         """Pixels (height, width) that the view sees but that are occluded for the source; their distance is unknown."""
         torn = np.zeros(self.face.shape, np.bool_)
         points = self.points
-        raster.tear(points.place, points.inverse_z, points.distance, self.largest_step_m, torn)
+        raster.tear(points.source, self.largest_step_m, torn)
         return torn & (self.face < 0)
 
     def index(self) -> NDArray[np.int32]:

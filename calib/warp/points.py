@@ -3,6 +3,7 @@
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,14 @@ from calib.lenses.forward import projector
 
 #: Minimum z of a visible point [m].
 _NEAREST_M = 1e-3
+
+
+class Source(NamedTuple):
+    """The arrays of `Points`, as kernels take them."""
+
+    place: NDArray[np.float32]
+    inverse_z: NDArray[np.float32]
+    distance: NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,6 +37,11 @@ class Points:
     distance: NDArray[np.float32]
     place: NDArray[np.float32]
     inverse_z: NDArray[np.float32]
+
+    @property
+    def source(self) -> Source:
+        """The arguments of kernels."""
+        return Source(self.place, self.inverse_z, self.distance)
 
 
 class Geometry:

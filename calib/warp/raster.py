@@ -4,37 +4,45 @@ Four neighbours span two triangles, three span one. Corner k of the quadrilatera
 c + k % 2); a triangle is identified by its missing corner m, and its face index is 4 (r columns + c) + m.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 from calib.jit import kernel
+from calib.warp.points import Source
 
 #: Tolerance that closes the seam between two triangles.
 _EDGE = -1e-4
 
 
+class ZBuffer(NamedTuple):
+    """The nearest face at each pixel of a view (height, width).
+
+    Attributes:
+        nearness: its 1/z there [1/m], 0 without one.
+        face: its index, −1 without one.
+    """
+
+    nearness: NDArray[np.float32]
+    face: NDArray[np.int32]
+
+
 @kernel
 def cover(
-    place: NDArray[np.float32],
-    inverse_z: NDArray[np.float32],
-    distance: NDArray[np.float32],
+    source: Source,
     largest_step: float,
-    top: int,
-    bottom: int,
-    nearness: NDArray[np.float32],
-    face: NDArray[np.int32],
+    rows: tuple[int, int],
+    buffer: ZBuffer,
 ) -> None:
-    """Rasterises rows `top` to `bottom` − 1 of `nearness` (1/z) and `face` with the nearest faces.
+    """Rasterises rows `rows[0]` to `rows[1]` − 1 of the buffer with the nearest faces.
 
     Both triangles of a quadrilateral, beside the diagonal from corner 0 to corner 3, are filled in one pass.
     """
-    zero, one, edge, slack, step = (
-        np.float32(0),
-        np.float32(1),
-        np.float32(_EDGE),
-        np.float32(1e-3),
-        np.float32(largest_step),
-    )
+    place, inverse_z, distance = source
+    (nearness, face), (top, bottom) = buffer, rows
+    zero, one, edge = np.float32(0), np.float32(1), np.float32(_EDGE)
+    slack, step = np.float32(1e-3), np.float32(largest_step)
     columns, width, lowest, highest = place.shape[1], nearness.shape[1], np.float32(top), np.float32(bottom - 1)
     rightmost = np.float32(width - 1)
     for r in range(place.shape[0] - 1):
@@ -43,7 +51,7 @@ def cover(
             n1, n2, n3 = inverse_z[r, c + 1] - n0, inverse_z[r + 1, c] - n0, inverse_z[r + 1, c + 1] - n0
             d1, d2, d3 = distance[r, c + 1], distance[r + 1, c], distance[r + 1, c + 1]
             if not max(d0, d1, d2, d3) - min(d0, d1, d2, d3) <= step or np.isnan(n1 + n2 + n3):
-                _fill_rest(place, inverse_z, distance, step, r, c, top, bottom, nearness, face)
+                _fill_rest(source, step, r, c, rows, buffer)
                 continue
             x1, y1 = place[r, c + 1, 0] - x0, place[r, c + 1, 1] - y0
             x2, y2 = place[r + 1, c, 0] - x0, place[r + 1, c, 1] - y0
@@ -56,8 +64,8 @@ def cover(
                 continue
             first, second = x1 * y3 - y1 * x3, x2 * y3 - y2 * x3
             if not first * second < zero:  # folded or degenerate
-                _fill(place, inverse_z, r, c, 1, top, bottom, nearness, face)
-                _fill(place, inverse_z, r, c, 2, top, bottom, nearness, face)
+                _fill(source, r, c, 1, rows, buffer)
+                _fill(source, r, c, 2, rows, buffer)
                 continue
             per_first, per_second = one / first, one / second
             for row in range(first_row, last_row + 1):
@@ -76,21 +84,18 @@ def cover(
 
 @kernel
 def _fill_rest(
-    place: NDArray[np.float32],
-    inverse_z: NDArray[np.float32],
-    distance: NDArray[np.float32],
+    source: Source,
     step: np.float32,
     r: int,
     c: int,
-    top: int,
-    bottom: int,
-    nearness: NDArray[np.float32],
-    face: NDArray[np.int32],
+    rows: tuple[int, int],
+    buffer: ZBuffer,
 ) -> None:
     """Single triangle of a quadrilateral with one missing corner, unless it spans a depth edge."""
+    inverse_z = source.inverse_z
     missing = lone_gap(inverse_z[r, c], inverse_z[r, c + 1], inverse_z[r + 1, c], inverse_z[r + 1, c + 1])
-    if missing >= 0 and height_of_step(distance, r, c) <= step:
-        _fill(place, inverse_z, r, c, missing, top, bottom, nearness, face)
+    if missing >= 0 and height_of_step(source.distance, r, c) <= step:
+        _fill(source, r, c, missing, rows, buffer)
 
 
 @kernel
@@ -117,17 +122,15 @@ def height_of_step(distance: NDArray[np.float32], r: int, c: int) -> np.float32:
 
 @kernel
 def _fill(
-    place: NDArray[np.float32],
-    inverse_z: NDArray[np.float32],
+    source: Source,
     r: int,
     c: int,
     missing: int,
-    top: int,
-    bottom: int,
-    nearness: NDArray[np.float32],
-    face: NDArray[np.int32],
+    rows: tuple[int, int],
+    buffer: ZBuffer,
 ) -> None:
     """Rasterises one triangle into the z-buffer."""
+    place, inverse_z, (nearness, face), (top, bottom) = source.place, source.inverse_z, buffer, rows
     i, j, k = corners(missing)
     ar, ac, br, bc, cr, cc = r + i // 2, c + i % 2, r + j // 2, c + j % 2, r + k // 2, c + k % 2
     ax, ay = place[ar, ac, 0], place[ar, ac, 1]
@@ -158,13 +161,10 @@ def _fill(
 
 @kernel
 def fray(
-    place: NDArray[np.float32],
-    inverse_z: NDArray[np.float32],
-    distance: NDArray[np.float32],
+    source: Source,
     largest_step: float,
     reach: NDArray[np.float32],
-    nearness: NDArray[np.float32],
-    face: NDArray[np.int32],
+    buffer: ZBuffer,
     warped: NDArray[np.float32],
 ) -> None:
     """Invalidates the background within one source pixel of a depth edge.
@@ -172,6 +172,8 @@ def fray(
     The foreground ends anywhere between its last pixel centre and the next, so either surface may be visible there.
     `reach` (h, w) is that width in the view for a distance of 1 and a 1/z of 1 [px].
     """
+    place, inverse_z, distance = source
+    nearness, face = buffer
     height, width = face.shape
     step, one = np.float32(largest_step), np.float32(1)
     for r in range(place.shape[0] - 1):
@@ -205,13 +207,12 @@ def largest(distance: NDArray[np.float32], r: int, c: int) -> np.float32:
 
 @kernel
 def tear(
-    place: NDArray[np.float32],
-    inverse_z: NDArray[np.float32],
-    distance: NDArray[np.float32],
+    source: Source,
     largest_step: float,
     torn: NDArray[np.bool_],
 ) -> None:
     """Marks pixels behind depth edges: the region between foreground and background is unobserved."""
+    place, inverse_z, distance = source
     height, width = torn.shape
     for r in range(place.shape[0] - 1):
         for c in range(place.shape[1] - 1):
