@@ -54,12 +54,20 @@ def _camera(name: str, sensor: SensorTask, views: Sequence[CornerView], note: Ca
         raise NotSolvedError(f"{name}: sees no corners, so its intrinsics have to be given and kept")
     known = sensor.factory or (initial_camera(sensor.width, sensor.height, sensor.lens, views),)
     note(f"{name}: {len(views)} views, focal length about {known[0].fx:.0f} px to begin with")
+    return fit_camera(name, sensor, views, known[0]) if sensor.factory else fit_unknown(name, sensor, views, known[0])
+
+
+def fit_unknown(name: str, sensor: SensorTask, views: Sequence[CornerView], first: Camera) -> Camera:
+    """Camera fitted as by `fit_camera`, of which nothing is known, from `first` or else from an ordinary focal length.
+
+    Where boards face the camera, what a lens bends looks like a focal length that is many times too short.
+
+    Raises:
+        NotSolvedError: neither leads to a minimum.
+    """
     try:
-        return fit_camera(name, sensor, views, known[0])
+        return fit_camera(name, sensor, views, first)
     except NotSolvedError:
-        if sensor.factory:
-            raise
-        # Where boards face the camera, what a lens bends looks like a focal length that is many times too short.
         return fit_camera(name, sensor, views, plain_camera(sensor.width, sensor.height, sensor.lens, sensor.width))
 
 

@@ -9,7 +9,7 @@ from calib.solve.bundle.parameters.lens_parameters import FISHEYE, RATIONAL
 from calib.solve.bundle.tasks import SensorTask
 from calib.solve.solution import Solution
 from calib.solve.start.board_poses import initial_camera, pose_candidates
-from calib.solve.start.start import fit_camera
+from calib.solve.start.start import fit_unknown
 
 #: Kinds that describe wide lenses.
 _WIDE = (RATIONAL, FISHEYE)
@@ -48,7 +48,7 @@ def _miss(solution: Solution, name: str, sensor: SensorTask) -> float:
         return np.inf
     try:
         first = initial_camera(sensor.width, sensor.height, sensor.lens, views)
-        camera = fit_camera(name, replace(sensor, factory=()), views, first)
+        camera = fit_unknown(name, replace(sensor, factory=()), views, first)
     except ValueError:
         return np.inf
     misses = [found[0].rms_px for view in views if (found := pose_candidates(camera, view))]

@@ -15,6 +15,7 @@ from calib.solve.calibrate import calibrate
 from calib.solve.diagnoses import MixedUpError, SquareSizeError, ViewsError
 from calib.solve.start import extrinsics_graph
 from calib.solve.start.extrinsics_graph import ContradictionError, NotConnectedError
+from calib.solve.validation.other_lens import other_lenses
 from tests.calib.solve import board_views
 from tests.calib.solve.board_views import Head
 
@@ -166,6 +167,15 @@ def facing(tilt: float) -> Task:
     heads = {"color": Head(Camera(640, 480, 536.0, 537.5, 331.0, 236.0, lens), corner_sigma=0.03)}
     seen = board_views.look(heads, board_views.random_boards(16, random, 0.6, 1.0, tilt=(0.0, tilt)), random)
     return Task({"color": SensorTask(640, 480)}, seen.corners, (), "color")
+
+
+def test_a_focal_length_is_not_begun_with_many_times_too_short() -> None:
+    """There was no minimum, as the start was 160 of 536 px, and a fisheye was advised."""
+    solution = calibrate(facing(0.03))
+    fx = solution.parameters[0]
+    assert (fx.name, fx.value) == ("color.fx", pytest.approx(536, abs=3 * fx.sigma))
+    assert fx.sigma > 0.02 * fx.value  # which is not trusted
+    assert other_lenses(solution) == []
 
 
 def test_boards_that_all_face_the_camera_are_named() -> None:
