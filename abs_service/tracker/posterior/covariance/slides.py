@@ -25,7 +25,7 @@ _LEAST = 1.0
 
 
 class SlideObservability:
-    """What the sensors tell of rigid motions of the surface; a model that cannot move so does not slide."""
+    """Information of the sensors on rigid motions of the surface; a model that cannot move so does not slide."""
 
     def __init__(self, model: DeformationModel):
         vertices = model.mesh.vertices.astype(np.float64)
@@ -45,12 +45,12 @@ class SlideObservability:
             return 0.0
         vertices = optimum.vertices.astype(np.float64)
         frame = _frame(vertices)
-        told, feigned = np.zeros((2, len(optimum.sensed), 6, 6))
+        known, feigned = np.zeros((2, len(optimum.sensed), 6, 6))
         for k, part in enumerate(optimum.sensed):
-            told[k], feigned[k] = _information(part, *frame)
+            known[k], feigned[k] = _information(part, *frame)
             feigned[k] *= (POINT_ERROR if isinstance(part, PointLinearization) else EDGE_ERROR) ** 2
-        slides = _slides(told.sum(axis=0), _motions(vertices, *frame))
-        held = np.maximum(_along(slides, told - feigned), 0.0).sum(axis=0)
+        slides = _slides(known.sum(axis=0), _motions(vertices, *frame))
+        held = np.maximum(_along(slides, known - feigned), 0.0).sum(axis=0)
         return float(1 / np.sqrt(_LEAST + held.min()))
 
 
@@ -67,17 +67,17 @@ def _information(
     if not len(part.rows):
         return np.zeros((6, 6)), np.zeros((6, 6))
     motions = _motions(part.places, center, size)
-    told = (part.rows[:, None] @ motions)[:, 0]
+    known = (part.rows[:, None] @ motions)[:, 0]
     weighted = (motions * np.linalg.norm(part.rows, axis=1)[:, None, None]).reshape(-1, 6)
-    return told.T @ told, weighted.T @ weighted
+    return known.T @ known, weighted.T @ weighted
 
 
-def _slides(told: NDArray[np.float64], motions: NDArray[np.float64]) -> NDArray[np.float64]:
+def _slides(known: NDArray[np.float64], motions: NDArray[np.float64]) -> NDArray[np.float64]:
     """Motions (6, 6), columns, that information (6, 6) tells apart; each moves the vertices by 1, root mean square."""
     flat = motions.reshape(-1, 6)
     moved = flat.T @ flat / len(motions)
     inverse = np.linalg.inv(np.linalg.cholesky(moved + 1e-9 * np.eye(6)))
-    return np.asarray(inverse.T @ np.linalg.eigh(inverse @ told @ inverse.T)[1], np.float64)
+    return np.asarray(inverse.T @ np.linalg.eigh(inverse @ known @ inverse.T)[1], np.float64)
 
 
 def _along(slides: NDArray[np.float64], information: NDArray[np.float64]) -> NDArray[np.float64]:

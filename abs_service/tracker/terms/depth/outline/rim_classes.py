@@ -99,16 +99,21 @@ def classify_rim(
         RimClass.FREE,
     ).astype(np.uint8)
     free = classes == RimClass.FREE
-    if _bulges(camera, surface, rim.outer[free], -gradients[free]):
-        classes[free] = RimClass.SILHOUETTE
-    else:
-        classes[free & is_round_side(camera, distance, place, inside, gradients)] = RimClass.SILHOUETTE
-    free, round_sides = (classes == one for one in (RimClass.FREE, RimClass.SILHOUETTE))
-    if np.count_nonzero(free) < max(MIN_RIM, LEAST_FREE * np.count_nonzero(free | round_sides)):
-        # That fewer lie off the outline the status could not tell, as beside specks of relief and quantised distances.
-        classes[free] = RimClass.CONTACT
+    round_sides = is_round_side(camera, distance, place, inside, gradients)
+    round_sides |= _bulges(camera, surface, rim.outer[free], -gradients[free])
+    classes[free & round_sides] = RimClass.SILHOUETTE
+    classes[(classes == RimClass.FREE) & _are_few(classes)] = RimClass.CONTACT
     gap[(classes != RimClass.FREE) | rim.is_end] = 0.0
     return classes, gap.astype(np.float32)
+
+
+def _are_few(classes: NDArray[np.uint8]) -> bool:
+    """True if so few are free edges that the status could not tell that they lie off the outline.
+
+    So it is beside specks of relief and quantised distances, and at the ends of a round body.
+    """
+    free, silhouettes = (np.count_nonzero(classes == one) for one in (RimClass.FREE, RimClass.SILHOUETTE))
+    return bool(free < max(MIN_RIM, LEAST_FREE * (free + silhouettes)))
 
 
 def _steps_to_outline(
