@@ -11,9 +11,9 @@ from abs_service.pairing.images import DepthImage, Parts, Window
 from abs_service.tracker.measurements.base import Comparison, Decoder
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.synthesis.base import Synthesizer
+from abs_service.tracker.terms.depth.continuation import CoarseContinuation
 from abs_service.tracker.terms.depth.depth import DepthTerm
 from abs_service.tracker.terms.depth.outline.base import NoOutline, Outline
-from abs_service.tracker.terms.depth.outline.continuation import CoarseContinuation
 from abs_service.tracker.terms.depth.outline.rim import Rim
 from abs_service.tracker.terms.depth.outline.rim_outline import RimOutline
 from calib.camera import Camera

@@ -12,11 +12,11 @@ from abs_service.tracker.synthesis.window import corner
 from abs_service.tracker.terms.base import NO_OCCLUDERS, Bounds
 from abs_service.tracker.terms.depth.classification.classifier import Classifier
 from abs_service.tracker.terms.depth.classification.visibility import where
+from abs_service.tracker.terms.depth.continuation import Continuation, NoContinuation
 from abs_service.tracker.terms.depth.depth_cost import missing_cost
 from abs_service.tracker.terms.depth.fluctuation import Fluctuation
 from abs_service.tracker.terms.depth.observed_depth import ObservedDepth
 from abs_service.tracker.terms.depth.outline.base import NoOutline, Outline
-from abs_service.tracker.terms.depth.outline.continuation import Continuation, NoContinuation
 from abs_service.tracker.terms.depth.pixel_classes import ClassImages
 from abs_service.tracker.terms.depth.texels import Unusable, texels
 from calib import pose

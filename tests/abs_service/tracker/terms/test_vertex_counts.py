@@ -10,8 +10,8 @@ from abs_service.pairing.images import ColorImage
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.terms.base import Bounds
+from abs_service.tracker.terms.depth.continuation import CoarseContinuation
 from abs_service.tracker.terms.depth.depth import DepthTerm
-from abs_service.tracker.terms.depth.outline.continuation import CoarseContinuation
 from abs_service.tracker.terms.photometric.color import ColorTerm
 from abs_service.tracker.terms.sensor_fit import Remainder, SensorFit
 from abs_service.tracker.terms.vertex_counts import VertexCounts
