@@ -238,10 +238,11 @@ class Recorder:
         self._health.report("record", Level.OK)
 
     def _fail(self, reason: str) -> None:
-        is_new, self._failed = not self._failed, reason
+        is_new = not self._failed
         if is_new:
-            self.failures += 1  # last, so that who sees it also finds the reason
             _log.error("RECORD_FAILED %s", reason)
-        self._health.count_up_to({"failures": self.failures})
+        self._health.count_up_to({"failures": self.failures + is_new})
         self._health.label("last_failure", reason)
         self._health.report("record", Level.ERROR, f"RECORD_FAILED {reason}")
+        self._failed = reason
+        self.failures += is_new  # last, so that who sees it also finds the reason

@@ -90,8 +90,10 @@ def check_mounted(mount: Path) -> None:
 def _mistakes(directory: Path) -> Iterator[FolderError]:
     try:
         make(directory)
-        is_read_only = os.statvfs(directory).f_flag & os.ST_RDONLY
-        if not (is_read_only or os.access(directory, os.W_OK | os.X_OK)):
+        disk = os.statvfs(directory)
+        if not disk.f_blocks:
+            yield FolderError(f'record.directory = "{directory}": cannot be written: its file system keeps no files')
+        elif not (disk.f_flag & os.ST_RDONLY or os.access(directory, os.W_OK | os.X_OK)):
             yield FolderError(f'record.directory = "{directory}": cannot be written: {os.strerror(errno.EACCES)}')
     except OSError as error:
         if error.errno not in _OF_THE_DISK:

@@ -102,7 +102,7 @@ def test_a_curtain_keeps_its_lengths_and_its_material_is_found_again():
 def test_a_curtain_is_not_said_to_be_tracked_while_the_mesh_goes_with_its_wrinkles():
     scene = SheetScene("curtain", Curtain(5.0), sigma=2e-3)  # begins elsewhere than those of the experiment
     found = follow(render_frames(scene, range(22), np.random.default_rng(7)), scene.sigma)
-    assert found.error_m.max() > 0.01
+    assert found.error_m.max() > 0.008
     assert not found.wrong.any()
 
 

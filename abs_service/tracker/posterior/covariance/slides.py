@@ -20,12 +20,18 @@ EDGE_ERROR, POINT_ERROR = 0.1, 0.3
 #: A model moves rigidly if so many of its vertices lack no more than this share of such motions, in squares.
 _PROBES, _SMALL_SHARE = 60, 1e-3
 
+#: Number of parameters of a model that moves rigidly only.
+_RIGID = 6
+
 #: Precision that keeps the deviation finite [1/m²]: nothing slides by more than a metre.
 _LEAST = 1.0
 
 
 class SlideObservability:
-    """Information of the sensors on rigid motions of the surface; a model that cannot move so does not slide."""
+    """Information of the sensors on rigid motions of the surface.
+
+    A model that cannot move so does not slide; a rigid template is held by whatever its known shape shows.
+    """
 
     def __init__(self, model: DeformationModel):
         vertices = model.mesh.vertices.astype(np.float64)
@@ -33,7 +39,9 @@ class SlideObservability:
         jacobian = model.sparse_jacobian(model.rest).dense[some].reshape(3 * _PROBES, -1)
         motions = _motions(vertices[some], *_frame(vertices)).reshape(3 * _PROBES, -1)
         left = motions - jacobian @ np.linalg.lstsq(jacobian, motions)[0]
-        self._is_free = bool(np.mean(left**2) < _SMALL_SHARE * np.mean(motions**2))
+        # A template that does not bend has the directions of its file.
+        is_exact = model.mesh.is_complete and len(model.rest) == _RIGID
+        self._is_free = bool(np.mean(left**2) < _SMALL_SHARE * np.mean(motions**2)) and not is_exact
 
     def deviation(self, optimum: Optimum) -> float:
         """Standard deviation [m] of the vertices, root mean square, along the slide that is held least; 0 without any.

@@ -43,6 +43,8 @@ def is_round_side(
         inside: their distances inside the outline (k,) [px].
         gradients: image gradients of these (k, 2).
     """
+    if not len(places):
+        return np.zeros(0, np.bool_)
     inwards = gradients / np.maximum(np.linalg.norm(gradients, axis=1), np.finfo(float).tiny)[:, None]
     along = inwards @ np.array([[0.0, 1.0], [-1.0, 0.0]])
     ends = (places - inside[:, None] * inwards)[:, None] + _ALONG_PX[:, None] * along[:, None]
