@@ -156,18 +156,24 @@ def test_a_bending_sheet_is_tracked_through_a_lens(kind):
 
 @pytest.mark.slow
 def test_a_sheet_before_a_fisheye_is_tracked_as_well_as_before_a_pinhole(monkeypatch):
-    """Heads with a half field of view of 55°, at the same footprint per pixel on the sheet as the default heads."""
+    """Heads with a half field of view of 55°, at the same footprint per pixel on the sheet as the default heads.
 
-    def vertex_mm(uri: str) -> float:
-        simulation = simulate(uri)
-        tracking = TrackingSession(rig_of(simulation), default_plan())
-        steps = list(drive(tracking, simulation, range(0, 64, 4)))
-        assert {step.estimate.status for step in steps} == {Status.TRACKING}
-        return mean_errors(steps)[0]
+    Means of three seeds: the ratio of single ones has a mean of 1.02 and a deviation of 0.14 (seeds 4 to 9).
+    """
 
-    pinhole = vertex_mm("simulated://sheet?seed=4")
+    def vertex_mm(options: str) -> float:
+        errors = []
+        for seed in (4, 5, 6):
+            simulation = simulate(f"simulated://sheet?seed={seed}{options}")
+            tracking = TrackingSession(rig_of(simulation), default_plan())
+            steps = list(drive(tracking, simulation, range(0, 64, 4)))
+            assert {step.estimate.status for step in steps} == {Status.TRACKING}
+            errors.append(mean_errors(steps)[0])
+        return float(np.mean(errors))
+
+    pinhole = vertex_mm("")
     for head in ("tof", "color"):
         wide = dataclasses.replace(OPTICS[head], focal_ratio=OPTICS[head].focal_ratio / 1.9)
         monkeypatch.setitem(OPTICS, head, wide)
     lens = "lens_model=fisheye&lens=0.02,-0.01,0.004,-0.001"
-    assert vertex_mm(f"simulated://sheet?seed=4&{lens}&tof=334x274&color=608x456") < 1.15 * pinhole
+    assert vertex_mm(f"&{lens}&tof=334x274&color=608x456") < 1.15 * pinhole
