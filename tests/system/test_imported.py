@@ -39,8 +39,10 @@ BY_AMPLITUDE = """{ type = "gaussian_polynomial", amplitudes = [400.0, 10000.0],
   sigma = [[1.0425e-2, -2.8187e-6, 3.5261e-10, -1.5195e-14], [5.0e-4, 0.0, 0.0, 0.0]] }"""
 
 
-def tracked(folder: Path, recording: Path, layout: str, head: str = "depth", noise: str = CONSTANT) -> list[np.ndarray]:
-    """Control points (n, 3) of every exposure after import and replay."""
+def tracked(
+    folder: Path, recording: Path, layout: str, head: str = "depth", noise: str = CONSTANT, reason: str = ""
+) -> list[np.ndarray]:
+    """Control points (n, 3) of every exposure after import and replay; with a reason, all of them are DEGRADED."""
     (folder / "rig.toml").write_text(RIG.format(head=head, noise=noise.replace("\n", " ")))
     options = ("--rig", folder / "rig.toml", "--out", folder / "in.mcap")
     imported = abs_service("import", recording, "--layout", layout, *options)
@@ -48,7 +50,8 @@ def tracked(folder: Path, recording: Path, layout: str, head: str = "depth", noi
     replayed = abs_service("replay", folder / "in.mcap", "--json", "--out", folder / "out.mcap")
     assert replayed.returncode == Exit.OK, replayed.stderr
     estimates = [json.loads(line) for line in replayed.stdout.splitlines()]
-    assert {estimate["status"] for estimate in estimates} == {"TRACKING"}
+    assert {estimate["status"] for estimate in estimates} == {"DEGRADED" if reason else "TRACKING"}
+    assert all(reason in "".join(estimate["reasons"]) for estimate in estimates)
     return [np.reshape(estimate["theta"], (-1, 3)) for estimate in estimates]
 
 
@@ -64,11 +67,18 @@ def test_a_recording_of_depthai_shows_what_the_simulator_did(tmp_path: Path) -> 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("layout", "file", "exposures", "distances"),
+    ("layout", "file", "exposures", "distances", "reason"),
     [
-        ("o3r", "tof_ifm_o3r/O3RBuffer.data", 1, (0.19, 0.6)),
-        ("azure", "tof_azure_kinect_pyk4a/recording.mkv", 1, (0.2, 0.6)),
-        ("realsense", "realsense_bag/single_depth_color_640x480.bag", 2, (0.3, 0.6)),
+        ("o3r", "tof_ifm_o3r/O3RBuffer.data", 1, (0.19, 0.6), ""),
+        ("azure", "tof_azure_kinect_pyk4a/recording.mkv", 1, (0.2, 0.6), ""),
+        # The border cuts it, and there are no colours.
+        (
+            "realsense",
+            "realsense_bag/single_depth_color_640x480.bag",
+            2,
+            (0.3, 0.6),
+            "nothing holds the surface along itself",
+        ),
     ],
 )
 def test_real_recordings_are_tracked(
@@ -78,9 +88,10 @@ def test_real_recordings_are_tracked(
     file: str,
     exposures: int,
     distances: tuple[float, float],
+    reason: str,
 ) -> None:
     pytest.importorskip({"azure": "av", "realsense": "rosbags"}.get(layout, "numpy"), reason="make all")
-    estimates = tracked(tmp_path, data_set(file), layout)
+    estimates = tracked(tmp_path, data_set(file), layout, reason=reason)
     assert len(estimates) == exposures
     for theta in estimates:
         near, far = distances
