@@ -49,7 +49,7 @@ def read(text: str, hints: Hints) -> Content:
         FormatError: the text is not a CameraInfo.
     """
     try:
-        info = _as_file(nested.yaml(text.partition("\n---")[0]))
+        info = _as_file(_first_document(text))
     except ValueError as error:
         raise FormatError(str(error)) from error
     try:
@@ -89,6 +89,14 @@ def write(cameras: Mapping[str, Camera]) -> Written:
         "projection_matrix": _table(3, 4, projection),
     }
     return Written(yaml.safe_dump(info, default_flow_style=None, sort_keys=False, width=200), placed(cameras))
+
+
+def _first_document(text: str) -> Any:
+    """A file, which may begin with a line `---`, or the first of messages, each of which ends with one."""
+    try:
+        return nested.yaml(text)
+    except ValueError:
+        return nested.yaml(text.partition("\n---")[0])
 
 
 def _as_file(info: Any) -> Any:

@@ -42,6 +42,17 @@ def test_a_camera_info_may_be_a_message(text: str) -> None:
     assert content.lost == ()
 
 
+@pytest.mark.parametrize("before", ["---", "# by camera_calibration\n---\n", "%YAML 1.1\n---\n"])
+def test_a_camera_info_may_begin_with_a_marker(before: str) -> None:
+    (camera,) = ros.read(before + _MESSAGE.replace("---\n", ""), Hints()).cameras.values()
+    assert camera.width == 640
+
+
+def test_the_first_of_several_messages_is_read() -> None:
+    (camera,) = ros.read(_MESSAGE + _MESSAGE.replace("width: 640", "width: 320"), Hints()).cameras.values()
+    assert camera.width == 640
+
+
 def test_a_transposed_pose_is_refused() -> None:
     T_rl = pose.from_rotation_vector((0, 0.3, 0), _PLACE.ravel())
     cam = "camera_model: pinhole, distortion_coeffs: [], distortion_model: none, intrinsics: [500, 501, 320, 240]"
