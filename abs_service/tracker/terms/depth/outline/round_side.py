@@ -53,21 +53,22 @@ def is_round_side(
     logarithm = np.log(np.where(np.isfinite(measured), measured, np.nan))
     logarithm = _median(logarithm.reshape(len(places), len(_DEPTHS_PX), -1))
     centers = _DEPTHS_PX.mean(axis=1)
-    slopes = _smoothed(-np.diff(logarithm, axis=1) * camera.fx / np.diff(centers), places)
+    near_by = _nearest(places, _NEIGHBOURS)
+    slopes = _smoothed(-np.diff(logarithm, axis=1) * camera.fx / np.diff(centers), near_by)
     near, far = (slopes / np.hypot(1.0, slopes)).T
     at_near, at_far = (centers[1:] + centers[:-1]) / 2
     extrapolated = near + (near - far) * at_near / (at_far - at_near)
-    both = _smoothed(np.stack([near, extrapolated], axis=1), places)
+    both = _smoothed(np.stack([near, extrapolated], axis=1), near_by)
     may_be = (both[:, 0] > _LEAST_MEASURED) & (both[:, 1] > _GROWING_SINE)
-    is_round, beside = may_be & (both[:, 1] > _CERTAIN_SINE), _nearest(places, _BESIDE)
+    is_round, beside = may_be & (both[:, 1] > _CERTAIN_SINE), near_by[:, :_BESIDE]
     for _ in places:
         is_round |= may_be & is_round[beside].any(axis=1)
     return np.asarray(is_round[beside].any(axis=1))
 
 
-def _smoothed(values: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Medians of the values (k, m) of the nearest edges at places (k, 2), see `_median`."""
-    return _median(values[_nearest(places, _NEIGHBOURS)].swapaxes(1, 2))
+def _smoothed(values: NDArray[np.float64], near_by: NDArray[np.intp]) -> NDArray[np.float64]:
+    """Medians of the values (k, m) of the edges near each (k, count), see `_median`."""
+    return _median(values[near_by].swapaxes(1, 2))
 
 
 def _nearest(places: NDArray[np.float64], count: int) -> NDArray[np.intp]:

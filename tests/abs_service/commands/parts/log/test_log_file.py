@@ -4,6 +4,8 @@ import logging
 import threading
 import time
 
+import pytest
+
 from abs_service.commands.parts.log import log_file
 from abs_service.commands.parts.log.log_file import InBackground, LogFile
 from tests.waiting import eventually
@@ -25,14 +27,25 @@ def log(handler, number):
         handler.handle(logging.LogRecord("abs", logging.INFO, __file__, 1, "%d", (index,), None))
 
 
-def test_nobody_waits_and_what_memory_does_not_hold_is_told(tmp_path, capsys, monkeypatch):
+@pytest.fixture
+def stuck(tmp_path, monkeypatch):
+    """Makes a file whose disk stands still, and what writes to it; one record has been begun."""
+
+    def make():
+        monkeypatch.setattr(Stuck, "answers", threading.Event())
+        monkeypatch.setattr(Stuck, "begun", threading.Event())
+        file = Stuck(tmp_path / "log", encoding="utf-8")
+        handler = InBackground(file)
+        log(handler, 1)
+        assert file.begun.wait(5)
+        return file, handler
+
+    return make
+
+
+def test_nobody_waits_and_what_memory_does_not_hold_is_told(tmp_path, capsys, monkeypatch, stuck):
     monkeypatch.setattr(log_file, "WAITING", 10)
-    monkeypatch.setattr(Stuck, "answers", threading.Event())
-    monkeypatch.setattr(Stuck, "begun", threading.Event())
-    file = Stuck(tmp_path / "log", encoding="utf-8")
-    handler = InBackground(file)
-    log(handler, 1)
-    assert file.begun.wait(5)
+    file, handler = stuck()
     log(handler, 12)
     assert capsys.readouterr().err == f"abs-service: --log-file {tmp_path}/log cannot be written: it stands still\n"
     Stuck.answers.set()
@@ -42,14 +55,9 @@ def test_nobody_waits_and_what_memory_does_not_hold_is_told(tmp_path, capsys, mo
     file.close()
 
 
-def test_a_process_that_ends_does_not_wait_for_long(tmp_path, capsys, monkeypatch):
+def test_a_process_that_ends_does_not_wait_for_long(tmp_path, capsys, monkeypatch, stuck):
     monkeypatch.setattr(log_file, "END_S", 0.05)
-    monkeypatch.setattr(Stuck, "answers", threading.Event())
-    monkeypatch.setattr(Stuck, "begun", threading.Event())
-    file = Stuck(tmp_path / "log", encoding="utf-8")
-    handler = InBackground(file)
-    log(handler, 1)
-    assert file.begun.wait(5)
+    file, handler = stuck()
     log(handler, 2)
     begin_s = time.monotonic()
     handler.close()
