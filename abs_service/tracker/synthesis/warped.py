@@ -1,6 +1,7 @@
 """Sparse synthesis on warped input (section 3.2): all images in one common projection without distortion (eq. 12)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +10,7 @@ from abs_service.pairing.images import DepthImage, Window
 from abs_service.pairing.observation import Observation
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import ModelError, Surface
-from abs_service.tracker.synthesis.base import Synthesis, View
+from abs_service.tracker.synthesis.base import ObservedView, Synthesis, View
 from abs_service.tracker.synthesis.sparse import SparseView
 from abs_service.tracker.synthesis.window import WHOLE
 from calib.camera import Camera
@@ -57,7 +58,7 @@ class Warped:
         self._rig = rig
         self._reference = reference
         self._camera = pinhole_of(rig.sensors[reference].camera)
-        self._projection = _Projection(self._camera, mesh)
+        self._common = _CommonView(self._camera, mesh)
         self._warps = {
             name: MeshWarp(sensor.camera, self._camera)
             for name, sensor in rig.sensors.items()
@@ -78,7 +79,7 @@ class Warped:
 
     def view(self, sensor: str, attributes: NDArray[np.float32]) -> View:
         """View of the vertices with attributes (n, channels) in the common camera."""
-        return _SharedView(self._projection, attributes)
+        return _SharedView(self._common, attributes)
 
     def window(self, sensor: str, predicted: Surface, reach_m: float) -> Window:
         """The whole image: images are resampled completely."""
@@ -113,43 +114,52 @@ class Warped:
             return None
 
 
-class _Projection:
-    """Cached synthesis of the last population in the common view, shared by all sensors."""
-
-    def __init__(self, camera: Camera, mesh: Mesh):
-        self.view = SparseView(camera, mesh.faces, np.zeros((len(mesh.vertices), 0), np.float32))
-        self._asked: tuple[Surface | None, Synthesis | None] = (None, None)
-
-    def look(self, predicted: Surface) -> None:
-        """Determines the occluded vertices of this frame."""
-        self.view.look(predicted)
-        self._asked = (None, None)
-
-    def synthesize(self, surface: Surface) -> Synthesis:
-        """Pixels and distances of a population, computed once."""
-        last, synthesis = self._asked
-        if last is not surface or synthesis is None:
-            synthesis = self.view.synthesize(surface)
-            self._asked = (surface, synthesis)
-        return synthesis
-
-
 class _SharedView:
     """One sensor's attributes in the common view, which is that of the vertices for all else."""
 
-    def __init__(self, projection: _Projection, attributes: NDArray[np.float32]):
-        view = projection.view
-        self.camera, self.look, self.render = view.camera, projection.look, view.render
-        self.spread, self.follow, self.carry, self.balance = view.spread, view.follow, view.carry, view.balance
-        self.gradient_noise_gains = view.gradient_noise_gains
-        self._projection = projection
+    def __init__(self, common: "_CommonView", attributes: NDArray[np.float32]):
+        self.camera, self.render = common.camera, common.render
+        self._common = common
         self._attributes = np.ascontiguousarray(attributes.T, np.float32)[None]
+
+    def observe(self, predicted: Surface) -> "_ObservedSharedView":
+        """The view in one frame."""
+        return _ObservedSharedView(self.camera, self._common.observe(predicted), self._attributes)
+
+
+class _CommonView:
+    """The vertices in the common camera, observed once in a frame for all sensors."""
+
+    def __init__(self, camera: Camera, mesh: Mesh):
+        view = SparseView(camera, mesh.faces, np.zeros((len(mesh.vertices), 0), np.float32))
+        self.camera, self.render = camera, view.render
+        self.observe = lru_cache(maxsize=1)(lambda predicted: _ObservedCommonView(view.observe(predicted)))
+
+
+class _ObservedCommonView:
+    """The same in one frame; what all sensors ask for one after the other is synthesised once."""
+
+    def __init__(self, view: ObservedView):
+        self.synthesize = lru_cache(maxsize=1)(view.synthesize)
+        self.gradient_noise_gains = view.gradient_noise_gains
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _ObservedSharedView:
+    """One sensor's attributes (1, channels, n) in the common view of a frame."""
+
+    camera: Camera
+    common: _ObservedCommonView
+    attributes: NDArray[np.float32]
 
     def synthesize(self, surface: Surface) -> Synthesis:
         """The common synthesis with this sensor's attributes."""
-        common = self._projection.synthesize(surface)
-        return Synthesis(common.pixel, common.distance, self._attributes)
+        return replace(self.common.synthesize(surface), attributes=self.attributes)
 
-    def attribute_gradients(self, surface: Surface) -> NDArray[np.float32]:
+    def attribute_gradients(self, seen: Synthesis) -> NDArray[np.float32]:
         """NaN: only the vertices' own attributes are known."""
-        return np.full((*self._attributes[0].T.shape, 2), np.nan, np.float32)
+        return np.full((*self.attributes[0].T.shape, 2), np.nan, np.float32)
+
+    def gradient_noise_gains(self, seen: Synthesis) -> NDArray[np.float64]:
+        """Zeros: no gradients are known."""
+        return self.common.gradient_noise_gains(seen)

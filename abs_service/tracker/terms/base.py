@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from abs_service.pairing.images import Image
 from abs_service.tracker.models.base import SparseJacobian, Surface
-from abs_service.tracker.synthesis.base import View
+from abs_service.tracker.synthesis.base import Synthesis
 from abs_service.tracker.terms.linearization import Part, PointLinearization
 from abs_service.tracker.terms.patches import Patches
 from abs_service.tracker.terms.sensor_fit import SensorFit
@@ -40,12 +40,12 @@ class Bounds:
         return self.inlier + self.uniform
 
 
-def facing(view: View, surface: Surface) -> NDArray[np.bool_]:
-    """True for the samples (m,) of a population of one that are turned towards a view's camera."""
+def facing(seen: Synthesis, surface: Surface, center: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """True for the samples (m,) of a population of one that are turned towards a camera with a center (3,) [m]."""
     vertices, normals = (
-        view.spread(surface, part[0].T.astype(np.float64)) for part in (surface.vertices, surface.normals)
+        seen.interpolation.spread(part[0].T.astype(np.float64)) for part in (surface.vertices, surface.normals)
     )
-    return np.asarray(np.einsum("ni,ni->n", normals, vertices - view.camera.center) < 0)
+    return np.asarray(np.einsum("ni,ni->n", normals, vertices - center) < 0)
 
 
 class ObservedTerm(Protocol):

@@ -70,14 +70,13 @@ class DepthTerm:
         scale = self._fluctuation.scale
         distance = self._texels.observe(image, window, scale)
         expected = np.ascontiguousarray(self._view.render(predicted)[window])
-        self._view.look(predicted)
         seen = self._classifier.classify(distance, expected, window, self._texels.shape)
         outline = self._outline.observe(distance, seen, expected, predicted, window)
         free_m = where(~outline.doubtful, seen.free_m)
         masked = seen.foreground | seen.hole | outline.doubtful
         return ObservedDepth(
             sensor=self.sensor,
-            view=self._view,
+            view=self._view.observe(predicted),
             bounds=self._bounds,
             texels=self._texels,
             missing=self._explain(Unusable(masked, free_m, seen.object), predicted),

@@ -48,7 +48,7 @@ class ChannelTerm:
         self._synthesizer = synthesizer
         self._view = synthesizer.view(sensor, appearance)
         self._illumination = illumination
-        self._bias = RegistrationBias(self._view)
+        self._bias = RegistrationBias(self._view.camera)
         self._noise = noise
         self._bounds = bounds
         self._registration_noise = registration_noise
@@ -74,12 +74,13 @@ class ChannelTerm:
         picture = self._synthesizer.image(self.sensor, self._texels)
         texture = self._bordered.move(picture.shape[:2], window)
         copy(picture, *limits(window, picture.shape), texture)
-        self._view.look(predicted)
+        view = self._view.observe(predicted)
+        seen = view.synthesize(predicted)
         if not is_mosaic:
-            self._bias.observe(picture[..., VALUE, None], predicted)
+            self._bias.observe(picture[..., VALUE, None], seen.interpolation.spread(predicted.vertices[0].T))
         observed = ObservedChannel(
             sensor=self.sensor,
-            view=self._view,
+            view=view,
             bounds=self._bounds,
             illumination=self._illumination,
             widening=NO_WIDENING,
@@ -88,7 +89,7 @@ class ChannelTerm:
             texture=texture.reshape(-1, 4),
             is_mosaic=is_mosaic,
         ).exposed(predicted)
-        widening = self._registration_noise.widening(self._view, predicted, observed.deviation(predicted))
+        widening = self._registration_noise.widening(view.attribute_gradients(seen), observed.deviation(predicted))
         if len(occluders):
             self._bordered.inside[occluded_pixels(self._view.camera, occluders)[window], VALUE] = np.inf
         return replace(observed, widening=widening)

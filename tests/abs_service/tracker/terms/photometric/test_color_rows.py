@@ -88,7 +88,7 @@ def test_mosaic_rows_are_exact_within_a_pixel_whatever_the_picture(seed, order):
     looks = generator.uniform(100, 150, (len(synthesizer.canvas.vertices), 3)).astype(np.float32)
     noise = GaussianBayer(50.0)
     term = ChannelTerm("bayer", synthesizer, looks, noise, Passive(), LIKELIHOOD.bounds(seen_by(noise)))
-    view = synthesizer.view("bayer", looks)
+    view = synthesizer.view("bayer", looks).observe(model.deform(model.rest[None]))
     level, right, down = generator.uniform((100, -0.1, -0.1), (150, 0.1, 0.1))
     picture = level + right * np.arange(COLOR.width) + down * np.arange(COLOR.height)[:, None]
     term = term.observe(ChannelImage(picture.astype(np.float32), BAYER_ORDERS[order]), model.deform(model.rest[None]))

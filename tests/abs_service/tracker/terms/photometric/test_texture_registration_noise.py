@@ -9,10 +9,8 @@ from hypothesis import strategies as st
 
 from abs_service.pairing.images import BAYER_ORDERS, ChannelImage, ColorImage
 from abs_service.tracker.models import rigid
-from abs_service.tracker.models.base import Surface
 from abs_service.tracker.objectives import likelihood
 from abs_service.tracker.synthesis import dense
-from abs_service.tracker.synthesis.base import View
 from abs_service.tracker.terms.photometric.channel import ChannelTerm
 from abs_service.tracker.terms.photometric.color import ColorTerm
 from abs_service.tracker.terms.photometric.illumination import Passive
@@ -41,7 +39,7 @@ class Given(TextureRegistrationNoise):
 
     factor: np.ndarray
 
-    def widening(self, view: View, predicted: Surface, deviation: np.ndarray) -> Widening:
+    def widening(self, gradients: np.ndarray, deviation: np.ndarray) -> Widening:
         return Widening(self.factor, np.log(self.factor))
 
 
@@ -102,8 +100,9 @@ def test_the_variance_grows_by_the_change_of_the_print_over_its_sigma():
     )
     view = synthesizer.view("color", np.ascontiguousarray(print_.T, np.float32))
     predicted = as_surface((mesh.vertices, mesh.normals))
-    view.look(predicted)
-    widening = TextureRegistrationNoise(0.3).widening(view, predicted, np.array([[SIGMA]]))
+    seen = view.observe(predicted)
+    gradients = seen.attribute_gradients(seen.synthesize(predicted))
+    widening = TextureRegistrationNoise(0.3).widening(gradients, np.array([[SIGMA]]))
     here, ahead, aside = (
         np.stack([reference.project(CAMERA, vertex.astype(float) + step) for vertex in mesh.vertices])
         for step in 1e-4 * np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]])
@@ -123,8 +122,9 @@ def test_where_every_candidate_has_samples_of_its_own_the_noise_is_the_sensor_s(
     synthesizer = dense.Settings().build(rig, mesh)
     view = synthesizer.view("color", np.ones((len(synthesizer.canvas.vertices), 3), np.float32))
     predicted = as_surface((mesh.vertices, mesh.normals))
-    view.look(predicted)
-    assert TextureRegistrationNoise(0.3).widening(view, predicted, np.ones((1, 1))) is NO_WIDENING
+    seen = view.observe(predicted)
+    gradients = seen.attribute_gradients(seen.synthesize(predicted))
+    assert TextureRegistrationNoise(0.3).widening(gradients, np.ones((1, 1))) is NO_WIDENING
 
 
 @pytest.mark.slow
