@@ -106,6 +106,33 @@ class View(Protocol):
         ...
 
 
+class Resampling(Protocol):
+    """The images of one frame in the geometry of the views."""
+
+    def texture(self, sensor: str, texture: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The noise texture (height + 2, width + 2, 8) of a depth sensor's frame, in its view's camera."""
+        ...
+
+    def image(self, sensor: str, image: NDArray[np.float32]) -> NDArray[np.float32]:
+        """An image (height, width, channels) of a sensor, in its view's camera; NaN where unknown."""
+        ...
+
+
+class AsMeasured:
+    """The views have the geometry of the sensors' own images, which are not resampled."""
+
+    def texture(self, sensor: str, texture: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The texture itself."""
+        return texture
+
+    def image(self, sensor: str, image: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The image itself."""
+        return image
+
+
+AS_MEASURED = AsMeasured()
+
+
 class Synthesizer(Protocol):
     """Views of all sensors of a rig, and their images in the geometry of these views.
 
@@ -117,8 +144,8 @@ class Synthesizer(Protocol):
     canvas: Mesh
     resamples: bool
 
-    def observe(self, observation: Observation) -> None:
-        """Sets the images to which the following calls refer."""
+    def observe(self, observation: Observation) -> Resampling:
+        """How the images of an observation get into the geometry of the views."""
         ...
 
     def view(self, sensor: str, attributes: NDArray[np.float32]) -> View:
@@ -133,12 +160,4 @@ class Synthesizer(Protocol):
             predicted: predicted surface, a population of one.
             reach_m: largest distance of the surface from the prediction [m].
         """
-        ...
-
-    def texture(self, sensor: str, texture: NDArray[np.float32]) -> NDArray[np.float32]:
-        """The noise texture (height + 2, width + 2, 8) of a depth sensor's frame, in its view's camera."""
-        ...
-
-    def image(self, sensor: str, image: NDArray[np.float32]) -> NDArray[np.float32]:
-        """An image (height, width, channels) of a sensor, in its view's camera; NaN where unknown."""
         ...

@@ -12,7 +12,7 @@ from abs_service.pairing.images import Window
 from abs_service.pairing.observation import Observation
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import SparseJacobian, Surface
-from abs_service.tracker.synthesis.base import Synthesis, View
+from abs_service.tracker.synthesis.base import AS_MEASURED, Resampling, Synthesis, View
 from abs_service.tracker.synthesis.projection import Projection, in_sight
 from abs_service.tracker.synthesis.rasterization.raster import Raster
 from abs_service.tracker.synthesis.rasterization.texturing import lattice, paint
@@ -61,8 +61,9 @@ class Dense:
         self._step = step
         self._detail = detail
 
-    def observe(self, observation: Observation) -> None:
-        """No effect: the views do not depend on the images."""
+    def observe(self, observation: Observation) -> Resampling:
+        """The images are compared as they were measured."""
+        return AS_MEASURED
 
     def view(self, sensor: str, attributes: NDArray[np.float32]) -> View:
         """View of the mesh with attributes of the lattice (k, channels) in one sensor's camera."""
@@ -72,14 +73,6 @@ class Dense:
     def window(self, sensor: str, predicted: Surface, reach_m: float) -> Window:
         """The window around the surface, see `window.around`."""
         return around(self._rig.sensors[sensor].camera, self._projections[sensor], predicted, reach_m)
-
-    def texture(self, sensor: str, texture: NDArray[np.float32]) -> NDArray[np.float32]:
-        """The texture itself."""
-        return texture
-
-    def image(self, sensor: str, image: NDArray[np.float32]) -> NDArray[np.float32]:
-        """The image itself."""
-        return image
 
 
 class DenseView:

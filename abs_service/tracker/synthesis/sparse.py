@@ -19,7 +19,7 @@ from abs_service.tracker.synthesis.attribute_gradients import (
     half_pixel,
     surroundings,
 )
-from abs_service.tracker.synthesis.base import Synthesis, View
+from abs_service.tracker.synthesis.base import AS_MEASURED, Resampling, Synthesis, View
 from abs_service.tracker.synthesis.projection import Optics, Projection
 from abs_service.tracker.synthesis.rasterization.raster import Raster
 from abs_service.tracker.synthesis.window import around
@@ -56,8 +56,9 @@ class Sparse:
         self._projections = {name: Projection(one.camera) for name, one in rig.sensors.items()}
         self._mesh = mesh
 
-    def observe(self, observation: Observation) -> None:
-        """No effect: the views do not depend on the images."""
+    def observe(self, observation: Observation) -> Resampling:
+        """The images are compared as they were measured."""
+        return AS_MEASURED
 
     def view(self, sensor: str, attributes: NDArray[np.float32]) -> View:
         """View of the vertices with attributes of the canvas in one sensor's camera.
@@ -74,14 +75,6 @@ class Sparse:
     def window(self, sensor: str, predicted: Surface, reach_m: float) -> Window:
         """The window around the surface, see `window.around`."""
         return around(self._rig.sensors[sensor].camera, self._projections[sensor], predicted, reach_m)
-
-    def texture(self, sensor: str, texture: NDArray[np.float32]) -> NDArray[np.float32]:
-        """The texture itself."""
-        return texture
-
-    def image(self, sensor: str, image: NDArray[np.float32]) -> NDArray[np.float32]:
-        """The image itself."""
-        return image
 
 
 class SparseView:

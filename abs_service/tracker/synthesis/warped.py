@@ -65,17 +65,10 @@ class Warped:
             if isinstance(sensor.noise, DepthNoise)
         }
         self._pictures = {name: PictureLookup(self._camera, rig.sensors[name].camera) for name in rig.sensors}
-        self._distance = np.full((self._camera.height, self._camera.width), np.nan, np.float32)
 
-    def observe(self, observation: Observation) -> None:
-        """Warps the distances of the reference sensor into the common view."""
-        image, sensor = observation.images.get(self._reference), self._rig.sensors[self._reference]
-        self._distance = np.full_like(self._distance, np.nan)
-        if isinstance(image, DepthImage) and isinstance(sensor.noise, DepthNoise):
-            measured = subtract_mean_offset(sensor.noise, image.distance, image.amplitude)
-            warped = self._warp(self._reference, measured)
-            if warped is not None:
-                self._distance = warped.distance
+    def observe(self, observation: Observation) -> "WarpedImages":
+        """The images, warped by the distances of the reference sensor."""
+        return WarpedImages(self._camera, self._warps, self._pictures, self._distance(observation))
 
     def view(self, sensor: str, attributes: NDArray[np.float32]) -> View:
         """View of the vertices with attributes (n, channels) in the common camera."""
@@ -85,6 +78,33 @@ class Warped:
         """The whole image: images are resampled completely."""
         return WHOLE
 
+    def _distance(self, observation: Observation) -> NDArray[np.float32]:
+        """Distances (height, width) [m] of the reference sensor in the common view; NaN where unknown."""
+        image, sensor = observation.images.get(self._reference), self._rig.sensors[self._reference]
+        if isinstance(image, DepthImage) and isinstance(sensor.noise, DepthNoise):
+            measured = subtract_mean_offset(sensor.noise, image.distance, image.amplitude)
+            warped = _warp(self._warps[self._reference], measured)
+            if warped is not None:
+                return warped.distance
+        return np.full((self._camera.height, self._camera.width), np.nan, np.float32)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WarpedImages:
+    """The images of one frame in the common view.
+
+    Attributes:
+        camera: of the common view.
+        warps: of the depth sensors.
+        pictures: of all sensors' images.
+        distance: of the reference sensor in the common view (height, width) [m]; NaN where unknown.
+    """
+
+    camera: Camera
+    warps: dict[str, MeshWarp]
+    pictures: dict[str, PictureLookup]
+    distance: NDArray[np.float32]
+
     def texture(self, sensor: str, texture: NDArray[np.float32]) -> NDArray[np.float32]:
         """The noise texture (height + 2, width + 2, 8) in the common view.
 
@@ -92,8 +112,8 @@ class Warped:
         is exact up to the cosine of the angle between them.
         """
         inner = texture[1:-1, 1:-1]
-        result = np.zeros((self._camera.height + 2, self._camera.width + 2, texture.shape[2]), np.float32)
-        warped = self._warp(sensor, np.where(inner[..., 3] > 0, inner[..., 0], np.float32(np.nan)))
+        result = np.zeros((self.camera.height + 2, self.camera.width + 2, texture.shape[2]), np.float32)
+        warped = _warp(self.warps[sensor], np.where(inner[..., 3] > 0, inner[..., 0], np.float32(np.nan)))
         if warped is not None:
             result[1:-1, 1:-1] = warped.nearest(inner, missing=0)
             result[1:-1, 1:-1, 0] = np.nan_to_num(warped.distance)
@@ -102,16 +122,17 @@ class Warped:
     def image(self, sensor: str, image: NDArray[np.float32]) -> NDArray[np.float32]:
         """An image (height, width, channels) in the common view; NaN where the distance is unknown."""
         try:
-            return self._pictures[sensor].look(self._distance).nearest(image)
+            return self.pictures[sensor].look(self.distance).nearest(image)
         except WarpError:  # the image is unknown: the cost is that of an unseen object
-            return np.full((*self._distance.shape, image.shape[2]), np.nan, np.float32)
+            return np.full((*self.distance.shape, image.shape[2]), np.nan, np.float32)
 
-    def _warp(self, sensor: str, distance: NDArray[np.floating]) -> WarpedDepth | None:
-        """A depth sensor's distances in the common view; None if all lie outside it, for example without an object."""
-        try:
-            return self._warps[sensor].warp(distance)
-        except WarpError:
-            return None
+
+def _warp(warp: MeshWarp, distance: NDArray[np.floating]) -> WarpedDepth | None:
+    """A depth sensor's distances in the common view; None if all lie outside it, for example without an object."""
+    try:
+        return warp.warp(distance)
+    except WarpError:
+        return None
 
 
 class _SharedView:

@@ -6,10 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.pairing.images import ChannelImage, Image, limits
-from abs_service.tracker.models.base import Surface
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.synthesis.window import NOTHING_HAS, Bordered, corner
-from abs_service.tracker.terms.base import NO_OCCLUDERS, Bounds
+from abs_service.tracker.terms.base import Bounds, Prediction
 from abs_service.tracker.terms.photometric.channel_cost import VALUE, copy, fill
 from abs_service.tracker.terms.photometric.illumination import Illumination
 from abs_service.tracker.terms.photometric.observed_channel import ObservedChannel
@@ -55,23 +54,18 @@ class ChannelTerm:
         self._texels = np.zeros((0, 0, 4), np.float32)
         self._bordered = Bordered(UNKNOWN, np.array([NOTHING_HAS, 0, 1, 0], np.float32))
 
-    def observe(
-        self,
-        image: Image,
-        predicted: Surface,
-        reach_m: float = np.inf,
-        occluders: NDArray[np.float64] = NO_OCCLUDERS,
-    ) -> ObservedChannel:
+    def observe(self, image: Image, prediction: Prediction) -> ObservedChannel:
         """Sets the image; NaN, also in the border, means no measurement, and infinity an occluder."""
         if not isinstance(image, ChannelImage):
             raise TypeError(f"sensor {self.sensor} has noise of one channel but delivered {type(image).__name__}")
-        window = self._synthesizer.window(self.sensor, predicted, reach_m)
+        predicted, occluders = prediction.surface, prediction.occluders
+        window = self._synthesizer.window(self.sensor, predicted, prediction.reach_m)
         if self._texels.shape[:2] != image.values.shape:  # new memory takes as long as filling it
             self._texels = np.full((*image.values.shape, 4), UNKNOWN, np.float32)
         is_mosaic = len(image.channels) > 1
         values, constant = np.ascontiguousarray(image.values[window]), LOG_SQRT_2PI + self._bounds.inlier
         fill(values, image.channels, self._noise.deviation(values), constant, *corner(window), self._texels)
-        picture = self._synthesizer.image(self.sensor, self._texels)
+        picture = prediction.resampling.image(self.sensor, self._texels)
         texture = self._bordered.move(picture.shape[:2], window)
         copy(picture, *limits(window, picture.shape), texture)
         view = self._view.observe(predicted)

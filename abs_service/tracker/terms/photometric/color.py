@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from abs_service.pairing.images import ColorImage, Image, Window
 from abs_service.tracker.models.base import SparseJacobian, Surface
-from abs_service.tracker.synthesis.base import ObservedView, Synthesis, Synthesizer
+from abs_service.tracker.synthesis.base import ObservedView, Resampling, Synthesis, Synthesizer
 from abs_service.tracker.synthesis.window import NOTHING_HAS, Bordered
-from abs_service.tracker.terms.base import NO_OCCLUDERS, Bounds, facing
+from abs_service.tracker.terms.base import NO_OCCLUDERS, Bounds, Prediction, facing
 from abs_service.tracker.terms.gradients import noiseless_color_rows
 from abs_service.tracker.terms.linearization import Part, PointLinearization
 from abs_service.tracker.terms.patches import Patches
@@ -53,18 +53,13 @@ class ColorTerm:
         self._levels = np.zeros((0, 0, 3), np.uint8)
         self._bordered = Bordered(np.full(3, np.nan, np.float32), np.full(3, NOTHING_HAS, np.float32))
 
-    def observe(
-        self,
-        image: Image,
-        predicted: Surface,
-        reach_m: float = np.inf,
-        occluders: NDArray[np.float64] = NO_OCCLUDERS,
-    ) -> "ObservedColor":
+    def observe(self, image: Image, prediction: Prediction) -> "ObservedColor":
         """Sets the colour image; NaN, as in the border, means no measurement, and infinity an occluder."""
         if not isinstance(image, ColorImage):
             raise TypeError(f"sensor {self.sensor} has a colour noise model but delivered {type(image).__name__}")
-        window = self._synthesizer.window(self.sensor, predicted, reach_m)
-        picture = self._resampled(image.rgb) if self._synthesizer.resamples else self._ordered(image.rgb, window)
+        predicted, occluders = prediction.surface, prediction.occluders
+        window = self._synthesizer.window(self.sensor, predicted, prediction.reach_m)
+        picture = self._picture(image.rgb, window, prediction.resampling)
         texture = self._bordered.move(picture.shape[:2], window).reshape(-1, 3)
         self._bordered.inside[:] = picture[window]
         view = self._view.observe(predicted)
@@ -87,9 +82,13 @@ class ColorTerm:
             normalizer=(self._constant + 3 * widening.log.mean(axis=1)).astype(np.float32),
         )
 
-    def _resampled(self, rgb: NDArray[np.uint8]) -> NDArray[np.float32]:
-        """The image in the view's camera, NaN where unknown."""
-        return self._synthesizer.image(self.sensor, rgb.astype(np.float32))
+    def _picture(
+        self, rgb: NDArray[np.uint8], window: Window, resampling: Resampling
+    ) -> NDArray[np.float32] | NDArray[np.uint8]:
+        """The image in the view's camera, complete in the window; NaN where a resampled one is unknown."""
+        if self._synthesizer.resamples:
+            return resampling.image(self.sensor, rgb.astype(np.float32))
+        return self._ordered(rgb, window)
 
     def _ordered(self, rgb: NDArray[np.uint8], window: Window) -> NDArray[np.uint8]:
         """The image, of which a view with reversed channels is copied in the window: one layout for the kernels."""

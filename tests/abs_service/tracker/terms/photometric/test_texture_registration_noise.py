@@ -11,6 +11,7 @@ from abs_service.pairing.images import BAYER_ORDERS, ChannelImage, ColorImage
 from abs_service.tracker.models import rigid
 from abs_service.tracker.objectives import likelihood
 from abs_service.tracker.synthesis import dense
+from abs_service.tracker.terms.base import Prediction
 from abs_service.tracker.terms.photometric.channel import ChannelTerm
 from abs_service.tracker.terms.photometric.color import ColorTerm
 from abs_service.tracker.terms.photometric.illumination import Passive
@@ -62,7 +63,7 @@ def test_the_color_cost_is_the_likelihood_of_widened_noise(seed):
     factor, misplaced = given_widening(generator, len(vertices))
     bounds = likelihood.Settings(SHARE).bounds(Sensor("color", CAMERA, GaussianColor(SIGMA)))
     term = ColorTerm("color", sparse(CAMERA), colors, GaussianColor(SIGMA), bounds, misplaced)
-    term = term.observe(ColorImage(image), in_sight(CAMERA, len(vertices)))
+    term = term.observe(ColorImage(image), Prediction(in_sight(CAMERA, len(vertices))))
     points = vertices.astype(float), normals.astype(float)
     expected = reference.color_cost(CAMERA, SIGMA * factor, image, colors.astype(float), *points, SHARE)
     assert term.cost(as_surface((vertices, normals)))[0] == pytest.approx(expected, rel=1e-5)
@@ -83,7 +84,7 @@ def test_the_channel_cost_is_the_likelihood_of_widened_noise(seed, order):
     noise = GaussianBayer(SIGMA)
     bounds = likelihood.Settings(SHARE).bounds(Sensor("color", CAMERA, noise))
     term = ChannelTerm("color", sparse(CAMERA), looks, noise, Passive(), bounds, misplaced)
-    term = term.observe(image, in_sight(CAMERA, len(vertices)))
+    term = term.observe(image, Prediction(in_sight(CAMERA, len(vertices))))
     expected = reference.channel_cost(
         *(CAMERA, noise, image.values, image.channel, np.zeros(SHAPE, bool)),
         *(looks, vertices.astype(float), normals.astype(float), SHARE, factor),
