@@ -145,7 +145,7 @@ class Synthesizer(Protocol):
     resamples: bool
 
     def observe(self, observation: Observation) -> Resampling:
-        """How the images of an observation get into the geometry of the views."""
+        """The resampling of an observation's images into the geometry of the views."""
         ...
 
     def view(self, sensor: str, attributes: NDArray[np.float32]) -> View:

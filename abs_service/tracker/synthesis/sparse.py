@@ -117,7 +117,7 @@ class SparseView:
 
 
 class Sampling(NamedTuple):
-    """How vertices become samples.
+    """The projection of vertices to samples.
 
     Attributes:
         kernel: of `AttributeGradients.sampler`.
@@ -134,7 +134,7 @@ class ObservedSparseView:
 
     Attributes:
         camera: the camera.
-        sampling: how vertices become samples.
+        sampling: the projection of the vertices.
         attributes: of the vertices (channels, n).
         gradients: of the attributes in the image.
         hidden: vertices (n,) that are no samples.

@@ -50,7 +50,7 @@ def facing(seen: Synthesis, surface: Surface, center: NDArray[np.float64]) -> ND
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Prediction:
-    """What is known of a frame before a sensor's image is compared.
+    """The surface that is expected in a frame, with which a sensor's image is compared.
 
     Attributes:
         surface: predicted mesh, a population of one.

@@ -164,9 +164,8 @@ def test_what_lies_behind_the_mesh_itself_is_no_sample():
     vertices = np.concatenate([MESH.vertices, MESH.vertices + np.array([0, 0, 0.2])])
     normals = np.tile((0.0, 0.0, -1.0), (len(vertices), 1))
     faces = np.concatenate([MESH.faces, MESH.faces + len(MESH.vertices)])
-    both = DenseView(CAMERA, faces, np.zeros((2 * len(LATTICE.vertices), 0), np.float32), 1, 4)
-    surface = as_surface((vertices, normals))
-    both = both.observe(surface).synthesize(surface)
+    both, surface = np.zeros((2 * len(LATTICE.vertices), 0), np.float32), as_surface((vertices, normals))
+    both = DenseView(CAMERA, faces, both, 1, 4).observe(surface).synthesize(surface)
     near = view(CAMERA).synthesize(as_surface((MESH.vertices, normals[: len(MESH.vertices)])))
     shared = np.isin(both.pixel[0], near.pixel[0])
     assert np.count_nonzero(shared) == near.pixel.shape[1]
@@ -200,9 +199,8 @@ def test_the_appearance_is_that_of_the_material_point():
     """The colours are the coordinates of a point on the sheet at rest, for any pose of the sheet."""
     theta = [0.2, -0.3, 0.1, 0.01, 0, 0.02]
     seen = view(CAMERA).synthesize(moved(theta))
-    colors = seen.attributes[0].T / 100
     rest = np.ascontiguousarray(MESH.vertices)
-    np.testing.assert_allclose(colors, seen.interpolation.spread(rest), atol=1e-4)
+    np.testing.assert_allclose(seen.attributes[0].T / 100, seen.interpolation.spread(rest), atol=1e-4)
 
 
 @settings(max_examples=25)
@@ -248,5 +246,5 @@ def test_neither_covering_more_nor_less_is_worth_anything():
     nominal = costs[0] / 2
     half = dense.synthesize(moved([0, 0, 0, 0.21, 0, 0]))  # its right half is outside the image
     assert nominal * 3 < half.interpolation.balance(np.array([2.0 * half.pixel.shape[1]]), 7.0)[0] < nominal * 6
-    away = dense.synthesize(moved([0, 0, 0, 2, 0, 0]))
-    assert away.interpolation.balance(np.zeros(1), 7.0)[0] == pytest.approx(7 * nominal)
+    away = dense.synthesize(moved([0, 0, 0, 2, 0, 0])).interpolation
+    assert away.balance(np.zeros(1), 7.0)[0] == pytest.approx(7 * nominal)

@@ -69,10 +69,9 @@ def slope(term, model: Rigid, theta: np.ndarray, parameter: int, step: float) ->
 @ALL
 def test_the_depth_gradient_is_that_of_the_cost(kind):
     mesh = sheet(21, 31, flat, size=(0.2, 0.14))
-    term = DepthTerm("tof", built(kind, mesh), len(mesh.vertices), GaussianPolynomial(((SIGMA,),)), BOUNDS)
-    term = term.observe(
-        depth_image(plane_distance(TOF, WALL, 1.0)), Prediction(as_surface((mesh.vertices, mesh.normals)))
-    )
+    synthesizer, surface = built(kind, mesh), as_surface((mesh.vertices, mesh.normals))
+    term = DepthTerm("tof", synthesizer, len(mesh.vertices), GaussianPolynomial(((SIGMA,),)), BOUNDS)
+    term = term.observe(depth_image(plane_distance(TOF, WALL, 1.0)), predicted(synthesizer, surface))
     for theta in ([0, 0, 0, 0, 0, 0.006], [0.02, -0.02, 0, 0, 0, -0.004]):
         numerical, linear = slope(term, Rigid(mesh), np.array(theta), 5, 5e-4)
         assert linear == pytest.approx(numerical, rel=0.1)
@@ -91,9 +90,8 @@ def test_the_colour_gradient_is_that_of_the_cost(kind):
     synthesizer = built(kind, mesh)
     term = ColorTerm("color", synthesizer, gradient_colors(synthesizer.canvas.vertices), GaussianColor(LEVELS), BOUNDS)
     wall = gradient_colors(COLOR.unproject(plane_distance(COLOR, WALL, 1.0)))
-    term = term.observe(
-        ColorImage(np.rint(wall).astype(np.uint8)), Prediction(as_surface((mesh.vertices, mesh.normals)))
-    )
+    surface = as_surface((mesh.vertices, mesh.normals))
+    term = term.observe(ColorImage(np.rint(wall).astype(np.uint8)), predicted(synthesizer, surface))
     for parameter in (3, 4):
         theta = 0.01 * np.eye(6)[parameter]
         numerical, linear = slope(term, Rigid(mesh), theta, parameter, 0.01)
