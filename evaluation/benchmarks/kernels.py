@@ -132,7 +132,7 @@ def cases() -> list[Case]:
     thetas = population(surface)
     deformed, work = surface.deform(thetas), POPULATION * VERTICES
     camera, bare = simulate("simulated://sheet").heads["tof"].camera, np.zeros((VERTICES, 0), np.float32)
-    view = sparse.SparseView(camera, surface.mesh.faces, bare)
+    view = sparse.SparseView(camera, surface.mesh.faces, bare).unoccluded(deformed)
     return [
         *(whole(f"{name}, ToF", model) for name, model in made.items()),
         Case("NURBS 4×4: deform alone", work, lambda: surface.deform(thetas)),

@@ -1,6 +1,7 @@
 """Interface of an objective, and the sum of all terms."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import reduce
 from typing import Protocol
 
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 from abs_service.pairing.observation import Observation
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import Synthesizer
-from abs_service.tracker.terms.base import NO_OCCLUDERS, ObservedTerm, Term
+from abs_service.tracker.terms.base import ObservedTerm, Prediction, Term
 from abs_service.tracker.terms.linearization import Part, PointLinearization
 from abs_service.tracker.terms.patches import Patches
 from abs_service.tracker.terms.sensor_fit import SensorFit
@@ -68,13 +69,12 @@ class TermSum:
 
     def observe(self, observation: Observation, predicted: Surface, reach_m: float = np.inf) -> "ObservedTerms":
         """Passes every sensor's image to its term; occluders that some of them find hide the mesh from the others."""
-        self._synthesizer.observe(observation)
+        prediction = Prediction(predicted, reach_m, resampling=self._synthesizer.observe(observation))
         terms = [term for term in self._terms if term.sensor in observation.images]
         observed: dict[str, ObservedTerm] = {}
-        occluders = NO_OCCLUDERS
         for term in sorted(terms, key=lambda term: not term.finds_occluders):
-            found = term.observe(observation.images[term.sensor], predicted, reach_m, occluders)
-            observed[term.sensor], occluders = found, np.concatenate([occluders, found.occluders])
+            found = observed[term.sensor] = term.observe(observation.images[term.sensor], prediction)
+            prediction = replace(prediction, occluders=np.concatenate([prediction.occluders, found.occluders]))
         self._frames = frame = self._frames + 1
         return ObservedTerms([observed[term.sensor] for term in terms], lambda: self._frames == frame)
 

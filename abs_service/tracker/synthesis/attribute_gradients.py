@@ -1,6 +1,7 @@
 """First-order expansion of the attributes around the vertices, evaluated at pixel centres."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -49,15 +50,11 @@ def half_pixel(rig: Rig, mesh: Mesh) -> float:
     return float(0.5 * min((size for size in sizes if size > 0), default=2e-3))
 
 
-class AttributeGradients(Protocol):
-    """Gradients of the attributes at the vertices in one camera's image."""
-
-    def sampler(self, lens: LensModel) -> Callable[..., None]:
-        """Kernel that synthesises the inputs of `at_centers`, see `sampling`."""
-        ...
+class ImageGradients(Protocol):
+    """Gradients of the attributes at the vertices in one camera's image, for the predicted surface of a frame."""
 
     def steps(self, population: int, vertices: int) -> NDArray[np.float32]:
-        """Memory for the steps that this kernel writes."""
+        """Memory for the steps that the kernel writes, see `AttributeGradients.sampler`."""
         ...
 
     def per_pixel(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -66,10 +63,6 @@ class AttributeGradients(Protocol):
 
     def noise_gains(self, vertices: int) -> NDArray[np.float64]:
         """Variances of these derivatives (n, 2) [1/px²] by independent noise of variance 1 of the pixels."""
-        ...
-
-    def look(self, predicted: Surface) -> None:
-        """Updates the gradients for the predicted surface, a population of one, of this frame."""
         ...
 
     def at_centers(self, values: NDArray[np.float32], steps: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -82,12 +75,28 @@ class AttributeGradients(Protocol):
         ...
 
 
+class AttributeGradients(Protocol):
+    """Gradients of the attributes along the surface."""
+
+    def sampler(self, lens: LensModel) -> Callable[..., None]:
+        """Kernel that synthesises the inputs of `ImageGradients.at_centers`, see `sampling`."""
+        ...
+
+    def observe(self, predicted: Surface) -> ImageGradients:
+        """The gradients in the image, for the predicted surface of a frame, a population of one."""
+        ...
+
+
 class Constant:
-    """Attributes that are constant around a vertex, where the gradients are unknown."""
+    """Attributes that are constant around a vertex, where the gradients are unknown, in every frame alike."""
 
     def sampler(self, lens: LensModel) -> Callable[..., None]:
         """The kernel without steps."""
         return sampler(lens)
+
+    def observe(self, predicted: Surface) -> "Constant":
+        """Itself: the values do not depend on the pose of the surface."""
+        return self
 
     def steps(self, population: int, vertices: int) -> NDArray[np.float32]:
         """No memory: the kernel writes no steps."""
@@ -100,9 +109,6 @@ class Constant:
     def noise_gains(self, vertices: int) -> NDArray[np.float64]:
         """Zeros: what is unknown has no noise."""
         return np.zeros((vertices, 2))
-
-    def look(self, predicted: Surface) -> None:
-        """No effect: the values do not depend on the pose of the surface."""
 
     def at_centers(self, values: NDArray[np.float32], steps: NDArray[np.float32]) -> NDArray[np.float32]:
         """The values themselves (1, channels, n)."""
@@ -125,9 +131,6 @@ class FirstOrder:
         change = np.stack([steps[0] - steps[1], steps[2] - steps[3]], axis=-1)
         self._per_metre = np.nan_to_num(change / (2 * step_m))
         self._noise = _noise_per_metre(camera, mesh, step_m)
-        self._gains = np.zeros((len(mesh.vertices), 2))
-        self._per_pixel = np.zeros(change.shape, np.float32)
-        self._planes = np.zeros((*change.shape[1:], len(change)), np.float32)
         self._camera = camera
         self._edges = mesh.edges
         self._lengths = _along(mesh, self._edges)
@@ -136,32 +139,47 @@ class FirstOrder:
         """The kernel with steps."""
         return stepping_sampler(lens)
 
+    def observe(self, predicted: Surface) -> "FirstOrderInImage":
+        """The gradients in the image for the predicted surface, a population of one.
+
+        Tangents deform with the surface, so their directions in the image follow from the edges around a vertex.
+        """
+        flat = metres_per_pixel(self._camera, predicted.vertices[0].T, self._edges, self._lengths)
+        gradients = np.ascontiguousarray(self._per_metre @ flat, np.float32)
+        gains = self._noise * (flat[:, 0] ** 2 + flat[:, 1] ** 2)  # faster than a sum over so short an axis
+        return FirstOrderInImage(gradients, gains, np.ascontiguousarray(gradients.transpose(1, 2, 0)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FirstOrderInImage:
+    """The first-order expansion in the image of one frame, see `ImageGradients`.
+
+    Attributes:
+        gradients: of the attributes (n, channels, 2) [1/px]; 0 at vertices whose surroundings were not visible.
+        gains: variances of the gradients (n, 2) [1/px²] by noise of variance 1.
+        planes: the gradients as the kernel reads them (channels, 2, n).
+    """
+
+    gradients: NDArray[np.float32]
+    gains: NDArray[np.float64]
+    planes: NDArray[np.float32]
+
     def steps(self, population: int, vertices: int) -> NDArray[np.float32]:
         """Memory (2, population, n)."""
         return np.empty((2, population, vertices), np.float32)
 
     def per_pixel(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Gradients of the last call of `look`; 0 at vertices whose surroundings were not visible."""
-        return self._per_pixel
+        """The gradients."""
+        return self.gradients
 
     def noise_gains(self, vertices: int) -> NDArray[np.float64]:
-        """Variances of the last call of `look`."""
-        return self._gains
-
-    def look(self, predicted: Surface) -> None:
-        """Computes the gradients in the image for the predicted surface, a population of one.
-
-        Tangents deform with the surface, so their directions in the image follow from the edges around a vertex.
-        """
-        flat = metres_per_pixel(self._camera, predicted.vertices[0].T, self._edges, self._lengths)
-        self._per_pixel = np.ascontiguousarray(self._per_metre @ flat, np.float32)
-        self._gains = self._noise * (flat[:, 0] ** 2 + flat[:, 1] ** 2)  # faster than a sum over so short an axis
-        self._planes = np.ascontiguousarray(self._per_pixel.transpose(1, 2, 0))
+        """The gains."""
+        return self.gains
 
     def at_centers(self, values: NDArray[np.float32], steps: NDArray[np.float32]) -> NDArray[np.float32]:
         """Value + gradient · (centre of the pixel − projection of the vertex) (population, channels, n)."""
         result = np.empty((steps.shape[1], *values.shape), np.float32)
-        at_centers(steps, values, self._planes, result)
+        at_centers(steps, values, self.planes, result)
         return result
 
 

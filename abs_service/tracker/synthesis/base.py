@@ -13,6 +13,31 @@ from abs_service.tracker.models.base import SparseJacobian, Surface
 from calib.camera import Camera
 
 
+class Interpolation(Protocol):
+    """Values at the samples of a population from those at the n vertices of its meshes."""
+
+    def spread(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Interpolates values (n, …) of the vertices at the samples (m, …) of a population of one."""
+        ...
+
+    def follow(self, sparse_jacobian: SparseJacobian) -> SparseJacobian:
+        """Jacobian of the samples of a population of one with respect to theta, from that of its vertices."""
+        ...
+
+    def carry(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Interpolates values (population, n) of the vertices at the samples (population, m)."""
+        ...
+
+    def balance(self, costs: NDArray[np.float64], unseen: float) -> NDArray[np.float64]:
+        """Costs (population,), normalised so that candidates with different numbers of samples are comparable.
+
+        Args:
+            costs: sums over the samples (population,).
+            unseen: cost of a sample that the sensor does not see.
+        """
+        ...
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Synthesis:
     """Synthetic measurements of a population in one sensor: m samples per candidate.
@@ -24,11 +49,37 @@ class Synthesis:
         distance: radial distance from the camera centre (population, m) [m], eq. 11, to the intersection of the line of
             sight through the pixel's centre (which was measured) with the tangent plane; in the border, to the sample.
         attributes: attributes of the surface there, such as colour, (population or 1, channels, m).
+        interpolation: from the vertices to the samples.
     """
 
     pixel: NDArray[np.int32]
     distance: NDArray[np.float32]
     attributes: NDArray[np.float32]
+    interpolation: Interpolation
+
+
+class ObservedView(Protocol):
+    """Projection of a mesh into one camera in one frame; what it answers does not depend on the order of the calls."""
+
+    @property
+    def camera(self) -> Camera:
+        """The camera into whose image the mesh is synthesised."""
+        ...
+
+    def synthesize(self, surface: Surface) -> Synthesis:
+        """Synthesises a population of deformed meshes."""
+        ...
+
+    def attribute_gradients(self, seen: Synthesis) -> NDArray[np.float32]:
+        """Gradients of the attributes at the samples of a population of one (m, channels, 2) [1/px], right and down.
+
+        NaN where only the samples' own attributes are known.
+        """
+        ...
+
+    def gradient_noise_gains(self, seen: Synthesis) -> NDArray[np.float64]:
+        """Variances of these gradients (m, 2) [1/px²] by noise of variance 1 of the pixels, see `noise_deviation`."""
+        ...
 
 
 class View(Protocol):
@@ -40,53 +91,46 @@ class View(Protocol):
 
     camera: Camera
 
-    def look(self, predicted: Surface) -> None:
-        """Determines from the predicted mesh, a population of one, which parts are occluded in this frame.
+    def observe(self, predicted: Surface) -> ObservedView:
+        """The view in one frame; the predicted mesh, a population of one, tells which parts are occluded in it.
 
         The occlusion is the same for every candidate, so it favours none.
         """
         ...
 
-    def synthesize(self, surface: Surface) -> Synthesis:
-        """Synthesises a population of deformed meshes."""
-        ...
-
-    def attribute_gradients(self, surface: Surface) -> NDArray[np.float32]:
-        """Gradients of the attributes at the samples of a population of one (m, channels, 2) [1/px], right and down.
-
-        NaN where only the samples' own attributes are known.
-        """
-        ...
-
-    def gradient_noise_gains(self, surface: Surface) -> NDArray[np.float64]:
-        """Variances of these gradients (m, 2) [1/px²] by noise of variance 1 of the pixels, see `noise_deviation`."""
-        ...
-
-    def spread(self, surface: Surface, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Interpolates values (n, …) of the vertices at the samples (m, …) of a population of one."""
-        ...
-
-    def follow(self, surface: Surface, sparse_jacobian: SparseJacobian) -> SparseJacobian:
-        """Jacobian of the samples of a population of one with respect to theta, from that of its vertices."""
-        ...
-
-    def carry(self, surface: Surface, values: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Interpolates values (population, n) of the vertices at the samples (population, m)."""
-        ...
-
-    def balance(self, costs: NDArray[np.float64], surface: Surface, unseen: float) -> NDArray[np.float64]:
-        """Costs (population,), normalised so that candidates with different numbers of samples are comparable.
-
-        Args:
-            costs: sums over the samples (population,).
-            surface: the population.
-            unseen: cost of a sample that the sensor does not see.
-        """
-        ...
-
     def render(self, surface: Surface) -> NDArray[np.float32]:
-        """Radial distances (height, width) [m] of a population of one in the camera's image; infinite off the mesh."""
+        """Radial distances (height, width) [m] of a population of one in the camera's image; infinite off the mesh.
+
+        The image is valid until the next one is rendered.
+        """
         ...
+
+
+class Resampling(Protocol):
+    """The images of one frame in the geometry of the views."""
+
+    def texture(self, sensor: str, texture: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The noise texture (height + 2, width + 2, 8) of a depth sensor's frame, in its view's camera."""
+        ...
+
+    def image(self, sensor: str, image: NDArray[np.float32]) -> NDArray[np.float32]:
+        """An image (height, width, channels) of a sensor, in its view's camera; NaN where unknown."""
+        ...
+
+
+class AsMeasured:
+    """The views have the geometry of the sensors' own images, which are not resampled."""
+
+    def texture(self, sensor: str, texture: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The texture itself."""
+        return texture
+
+    def image(self, sensor: str, image: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The image itself."""
+        return image
+
+
+AS_MEASURED = AsMeasured()
 
 
 class Synthesizer(Protocol):
@@ -100,8 +144,8 @@ class Synthesizer(Protocol):
     canvas: Mesh
     resamples: bool
 
-    def observe(self, observation: Observation) -> None:
-        """Sets the images to which the following calls refer."""
+    def observe(self, observation: Observation) -> Resampling:
+        """The resampling of an observation's images into the geometry of the views."""
         ...
 
     def view(self, sensor: str, attributes: NDArray[np.float32]) -> View:
@@ -116,12 +160,4 @@ class Synthesizer(Protocol):
             predicted: predicted surface, a population of one.
             reach_m: largest distance of the surface from the prediction [m].
         """
-        ...
-
-    def texture(self, sensor: str, texture: NDArray[np.float32]) -> NDArray[np.float32]:
-        """The noise texture (height + 2, width + 2, 8) of a depth sensor's frame, in its view's camera."""
-        ...
-
-    def image(self, sensor: str, image: NDArray[np.float32]) -> NDArray[np.float32]:
-        """An image (height, width, channels) of a sensor, in its view's camera; NaN where unknown."""
         ...

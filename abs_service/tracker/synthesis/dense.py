@@ -1,5 +1,6 @@
 """Dense synthesis: the mesh is rendered into every image, forward distortion included, and compared per pixel."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -11,7 +12,7 @@ from abs_service.pairing.images import Window
 from abs_service.pairing.observation import Observation
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import SparseJacobian, Surface
-from abs_service.tracker.synthesis.base import Synthesis, View
+from abs_service.tracker.synthesis.base import AS_MEASURED, Resampling, Synthesis, View
 from abs_service.tracker.synthesis.projection import Projection, in_sight
 from abs_service.tracker.synthesis.rasterization.raster import Raster
 from abs_service.tracker.synthesis.rasterization.texturing import lattice, paint
@@ -41,15 +42,6 @@ class Settings:
 #: Lower bound of the share of the predicted mesh in the image by which its number of pixels is divided.
 MIN_SHARE = 0.1
 
-#: Samples of an empty population.
-_NONE = Samples(
-    np.zeros((0, 0), np.int32),
-    np.zeros((0, 0), np.float32),
-    np.zeros((0, 0), np.int32),
-    np.zeros((0, 0, 3), np.float32),
-    np.zeros(0, np.int64),
-)
-
 
 class Dense:
     """Renders into the sensors' own images, which are not resampled.
@@ -69,8 +61,9 @@ class Dense:
         self._step = step
         self._detail = detail
 
-    def observe(self, observation: Observation) -> None:
-        """No effect: the views do not depend on the images."""
+    def observe(self, observation: Observation) -> Resampling:
+        """The images are compared as they were measured."""
+        return AS_MEASURED
 
     def view(self, sensor: str, attributes: NDArray[np.float32]) -> View:
         """View of the mesh with attributes of the lattice (k, channels) in one sensor's camera."""
@@ -80,14 +73,6 @@ class Dense:
     def window(self, sensor: str, predicted: Surface, reach_m: float) -> Window:
         """The window around the surface, see `window.around`."""
         return around(self._rig.sensors[sensor].camera, self._projections[sensor], predicted, reach_m)
-
-    def texture(self, sensor: str, texture: NDArray[np.float32]) -> NDArray[np.float32]:
-        """The texture itself."""
-        return texture
-
-    def image(self, sensor: str, image: NDArray[np.float32]) -> NDArray[np.float32]:
-        """The image itself."""
-        return image
 
 
 class DenseView:
@@ -104,65 +89,99 @@ class DenseView:
         self._detail = detail
         self._projection = Projection(camera)
         self._ray_length = camera.lookup.ray_length.astype(np.float32)
-        self._expected = 0.0
-        self._last: tuple[Surface | None, Samples, NDArray[np.float64]] = (None, _NONE, np.zeros(0))
 
-    def look(self, predicted: Surface) -> None:
+    def observe(self, predicted: Surface) -> "ObservedDenseView":
         """Counts the pixels of the predicted mesh; the z-buffer resolves self-occlusion per candidate."""
-        samples, share = self._render(predicted)
-        self._expected = float(samples.covered[0]) / max(float(share[0]), MIN_SHARE)
+        samples, share = self._rasterize(predicted)
+        expected = float(samples.covered[0]) / max(float(share[0]), MIN_SHARE)
+        return ObservedDenseView(self.camera, lambda surface: self._synthesize(surface, expected))
+
+    def render(self, surface: Surface) -> NDArray[np.float32]:
+        """Radial distances (height, width) [m] of a population of one in the camera's image; infinite off the mesh."""
+        return self._raster.render(surface.vertices[0])
+
+    def _synthesize(self, surface: Surface, expected: float) -> Synthesis:
+        """Synthesises a population; `expected` is the number of pixels of the predicted mesh."""
+        samples, share = self._rasterize(surface)
+        attributes = paint(self._attributes, self._detail, samples)
+        return Synthesis(samples.pixel, samples.distance, attributes, InFaces(self._faces, samples, share, expected))
+
+    def _rasterize(self, surface: Surface) -> tuple[Samples, NDArray[np.float64]]:
+        """The covered pixels of a population, and the share (population,) of its vertices that lie in the image."""
+        projected = self._projection.project(surface.vertices)
+        samples = render(projected, self._faces, self._ray_length, self._step)
+        return samples, in_sight(projected, self._ray_length.shape)
+
+
+class ObservedDenseView:
+    """The pixels that a mesh covers in one camera's image, in one frame.
+
+    Args:
+        camera: the camera.
+        synthesize: synthesises a population.
+    """
+
+    def __init__(self, camera: Camera, synthesize: Callable[[Surface], Synthesis]):
+        self.camera = camera
+        self._synthesize = synthesize
+        self._single: dict[Surface, Synthesis] = {}
 
     def synthesize(self, surface: Surface) -> Synthesis:
-        """Synthesises a population; samples beyond a candidate's number of covered pixels have pixel −1."""
-        samples, _ = self._render(surface)
-        return Synthesis(samples.pixel, samples.distance, paint(self._attributes, self._detail, samples))
+        """Synthesises a population, a surface by itself once.
 
-    def attribute_gradients(self, surface: Surface) -> NDArray[np.float32]:
+        Samples beyond a candidate's number of covered pixels have pixel −1.
+        """
+        if len(surface.vertices) > 1:
+            return self._synthesize(surface)
+        if surface not in self._single:
+            self._single[surface] = self._synthesize(surface)
+        return self._single[surface]
+
+    def attribute_gradients(self, seen: Synthesis) -> NDArray[np.float32]:
         """NaN: gradients of the image are more accurate than those of the lattice."""
-        samples, _ = self._render(surface)
-        return np.full((samples.pixel.shape[1], self._attributes.shape[1], 2), np.nan, np.float32)
+        return np.full((*seen.attributes[0].T.shape, 2), np.nan, np.float32)
 
-    def gradient_noise_gains(self, surface: Surface) -> NDArray[np.float64]:
+    def gradient_noise_gains(self, seen: Synthesis) -> NDArray[np.float64]:
         """Zeros: no gradients are known."""
-        return np.zeros((self._render(surface)[0].pixel.shape[1], 2))
+        return np.zeros((seen.pixel.shape[1], 2))
 
-    def spread(self, surface: Surface, values: NDArray[np.float64]) -> NDArray[np.float64]:
+
+@dataclass(frozen=True, slots=True, eq=False)
+class InFaces:
+    """The samples lie in faces, see `Interpolation`.
+
+    Attributes:
+        faces: of the mesh (k, 3).
+        samples: of a population.
+        share: of the vertices of each candidate that lie in the image (population,).
+        expected: number of pixels of the predicted mesh.
+    """
+
+    faces: NDArray[np.int32]
+    samples: Samples
+    share: NDArray[np.float64]
+    expected: float
+
+    def spread(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Values (n, …) of the vertices, interpolated at the samples (m, …) of a population of one."""
-        samples, _ = self._render(surface)
-        return np.einsum("mi,mi...->m...", samples.weights[0], values[self._faces[samples.face[0]]])
+        weights, corners = self.samples.weights[0], self.faces[self.samples.face[0]]
+        return np.einsum("mi,mi...->m...", weights, values[corners])
 
-    def follow(self, surface: Surface, sparse_jacobian: SparseJacobian) -> SparseJacobian:
+    def follow(self, sparse_jacobian: SparseJacobian) -> SparseJacobian:
         """Jacobian of the samples, interpolated from that of the vertices."""
-        return SparseJacobian.from_dense(self.spread(surface, sparse_jacobian.dense))
+        return SparseJacobian.from_dense(self.spread(sparse_jacobian.dense))
 
-    def carry(self, surface: Surface, values: NDArray[np.float32]) -> NDArray[np.float32]:
+    def carry(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
         """Values (population, n) of the vertices, interpolated at the samples (population, m)."""
-        return interpolate(values[..., None], self._faces, self._render(surface)[0])[..., 0]
+        return interpolate(values[..., None], self.faces, self.samples)[..., 0]
 
-    def balance(self, costs: NDArray[np.float64], surface: Surface, unseen: float) -> NDArray[np.float64]:
+    def balance(self, costs: NDArray[np.float64], unseen: float) -> NDArray[np.float64]:
         """Mean cost of a candidate's pixels times the predicted number of pixels, for the share of it in the image.
 
         The rim of the mesh comes from the initial detection and need not be the rim of the object, so a candidate that
         covers more pixels is not a better fit. The covered area does not change the cost; leaving the image increases
         it.
         """
-        samples, share = self._render(surface)
-        mean = np.where(samples.covered > 0, costs / np.maximum(samples.covered, 1), unseen)
-        return self._expected * (share * mean + (1 - share) * unseen)
-
-    def render(self, surface: Surface) -> NDArray[np.float32]:
-        """Radial distances (height, width) [m] of a population of one in the camera's image; infinite off the mesh."""
-        return self._raster.render(surface.vertices[0])
-
-    def _render(self, surface: Surface) -> tuple[Samples, NDArray[np.float64]]:
-        """The covered pixels of a population, and the share (population,) of its vertices that lie in the image.
-
-        The result for the last population is cached.
-        """
-        last, samples, share = self._last
-        if last is not surface:
-            projected = self._projection.project(surface.vertices)
-            share = in_sight(projected, self._ray_length.shape)
-            samples = render(projected, self._faces, self._ray_length, self._step)
-            self._last = (surface, samples, share)
-        return samples, share
+        covered, share = self.samples.covered, self.share
+        mean = np.where(covered > 0, costs / np.maximum(covered, 1), unseen)
+        return self.expected * (share * mean + (1 - share) * unseen)

@@ -1,6 +1,8 @@
 """Sparse direct synthesis: one value per vertex (section 3.1), forward distortion, compared in the input domain."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,10 +15,11 @@ from abs_service.tracker.synthesis.attribute_gradients import (
     CONSTANT,
     AttributeGradients,
     FirstOrder,
+    ImageGradients,
     half_pixel,
     surroundings,
 )
-from abs_service.tracker.synthesis.base import Synthesis, View
+from abs_service.tracker.synthesis.base import AS_MEASURED, Resampling, Synthesis, View
 from abs_service.tracker.synthesis.projection import Optics, Projection
 from abs_service.tracker.synthesis.rasterization.raster import Raster
 from abs_service.tracker.synthesis.window import around
@@ -53,8 +56,9 @@ class Sparse:
         self._projections = {name: Projection(one.camera) for name, one in rig.sensors.items()}
         self._mesh = mesh
 
-    def observe(self, observation: Observation) -> None:
-        """No effect: the views do not depend on the images."""
+    def observe(self, observation: Observation) -> Resampling:
+        """The images are compared as they were measured."""
+        return AS_MEASURED
 
     def view(self, sensor: str, attributes: NDArray[np.float32]) -> View:
         """View of the vertices with attributes of the canvas in one sensor's camera.
@@ -72,14 +76,6 @@ class Sparse:
         """The window around the surface, see `window.around`."""
         return around(self._rig.sensors[sensor].camera, self._projections[sensor], predicted, reach_m)
 
-    def texture(self, sensor: str, texture: NDArray[np.float32]) -> NDArray[np.float32]:
-        """The texture itself."""
-        return texture
-
-    def image(self, sensor: str, image: NDArray[np.float32]) -> NDArray[np.float32]:
-        """The image itself."""
-        return image
-
 
 class SparseView:
     """Projection of the vertices of a mesh into one camera."""
@@ -95,83 +91,107 @@ class SparseView:
         self._raster = Raster(camera, faces)
         self._attributes = np.ascontiguousarray(attributes.T, np.float32)
         self._gradients = gradients
-        self._hidden = np.zeros(len(attributes), np.bool_)
-        self._rendered: tuple[Surface | None, NDArray[np.float32]] = (None, np.zeros((0, 0), np.float32))
-        self._seen: dict[Surface, Synthesis] = {}  # in this frame, without populations
-        self._optics = Optics.of(camera)
-        self._sample = gradients.sampler(camera.lens)
+        self._sampling = Sampling(gradients.sampler(camera.lens), Optics.of(camera))
 
-    def look(self, predicted: Surface) -> None:
-        """Marks the vertices that face away or are self-occluded in the predicted mesh."""
-        self._hidden, self._seen = np.zeros(predicted.vertices.shape[2], np.bool_), {}
-        self._gradients.look(predicted)
-        seen = self._synthesize(predicted)
-        stride = self.camera.width + 2
-        row, column = np.divmod(seen.pixel[0], stride)
+    def observe(self, predicted: Surface) -> "ObservedSparseView":
+        """The view without the vertices that face away or are self-occluded in the predicted mesh."""
+        view = self.unoccluded(predicted)
+        seen = view.synthesize(predicted)
+        row, column = np.divmod(seen.pixel[0], self.camera.width + 2)
         inside = seen.pixel[0] > 0
-        front = np.where(inside, self._front(predicted, (row - 1) * inside, (column - 1) * inside), np.float32(np.inf))
-        facing = np.einsum("in,in->n", predicted.normals[0], self._sight(predicted)) < 0
-        self._hidden = ~facing | (front < seen.distance[0] - HIDING_M)
+        front = self._raster.render_at(predicted.vertices[0], (row - 1) * inside, (column - 1) * inside)
+        sight = predicted.vertices[0] - self.camera.center[:, None]
+        facing = np.einsum("in,in->n", predicted.normals[0], sight) < 0
+        return replace(view, hidden=~facing | (inside & (front < seen.distance[0] - HIDING_M)), single={})
+
+    def unoccluded(self, predicted: Surface) -> "ObservedSparseView":
+        """The view of all vertices, whatever may be before them."""
+        hidden = np.zeros(predicted.vertices.shape[2], np.bool_)
+        return ObservedSparseView(
+            self.camera, self._sampling, self._attributes, self._gradients.observe(predicted), hidden
+        )
+
+    def render(self, surface: Surface) -> NDArray[np.float32]:
+        """Radial distances (height, width) [m] of a population of one in the camera's image; infinite off the mesh."""
+        return self._raster.render(surface.vertices[0])
+
+
+class Sampling(NamedTuple):
+    """The projection of vertices to samples.
+
+    Attributes:
+        kernel: of `AttributeGradients.sampler`.
+        optics: of the camera.
+    """
+
+    kernel: Callable[..., None]
+    optics: Optics
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ObservedSparseView:
+    """The vertices of a mesh in one camera, in one frame.
+
+    Attributes:
+        camera: the camera.
+        sampling: the projection of the vertices.
+        attributes: of the vertices (channels, n).
+        gradients: of the attributes in the image.
+        hidden: vertices (n,) that are no samples.
+        single: what was synthesised of populations of one: costs, fits and derivatives ask for the same.
+    """
+
+    camera: Camera
+    sampling: Sampling
+    attributes: NDArray[np.float32]
+    gradients: ImageGradients
+    hidden: NDArray[np.bool_]
+    single: dict[Surface, Synthesis] = field(default_factory=dict)
 
     def synthesize(self, surface: Surface) -> Synthesis:
-        """Synthesises a population of deformed meshes; occluded vertices are ignored.
-
-        A surface by itself is synthesised once in a frame.
-        """
+        """Synthesises a population of deformed meshes; a surface by itself once."""
         if len(surface.vertices) > 1:
             return self._synthesize(surface)
-        if surface not in self._seen:
-            self._seen[surface] = self._synthesize(surface)
-        return self._seen[surface]
+        if surface not in self.single:
+            self.single[surface] = self._synthesize(surface)
+        return self.single[surface]
 
     def _synthesize(self, surface: Surface) -> Synthesis:
         population, _, n = surface.vertices.shape
         pixel = np.empty((population, n), np.int32)
         distance = np.empty((population, n), np.float32)
-        steps = self._gradients.steps(population, n)
-        self._sample(surface.vertices, surface.normals, self._hidden, self._optics, pixel, distance, steps)
-        return Synthesis(pixel, distance, self._gradients.at_centers(self._attributes, steps))
+        steps = self.gradients.steps(population, n)
+        kernel, optics = self.sampling
+        kernel(surface.vertices, surface.normals, self.hidden, optics, pixel, distance, steps)
+        return Synthesis(pixel, distance, self.gradients.at_centers(self.attributes, steps), AT_VERTICES)
 
-    def attribute_gradients(self, surface: Surface) -> NDArray[np.float32]:
-        """Gradients for the predicted surface, see `look`."""
-        return self._gradients.per_pixel(self._attributes)
+    def attribute_gradients(self, seen: Synthesis) -> NDArray[np.float32]:
+        """Gradients for the predicted surface."""
+        return self.gradients.per_pixel(self.attributes)
 
-    def gradient_noise_gains(self, surface: Surface) -> NDArray[np.float64]:
-        """Their noise gains for the predicted surface, see `look`."""
-        return self._gradients.noise_gains(surface.vertices.shape[2])
+    def gradient_noise_gains(self, seen: Synthesis) -> NDArray[np.float64]:
+        """Their noise gains for the predicted surface."""
+        return self.gradients.noise_gains(len(self.hidden))
 
-    def spread(self, surface: Surface, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The values themselves: the samples are the vertices."""
+
+class AtVertices:
+    """The samples are the vertices: every value is its own."""
+
+    def spread(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The values themselves."""
         return values
 
-    def follow(self, surface: Surface, sparse_jacobian: SparseJacobian) -> SparseJacobian:
-        """The Jacobian itself: the samples are the vertices."""
+    def follow(self, sparse_jacobian: SparseJacobian) -> SparseJacobian:
+        """The Jacobian itself."""
         return sparse_jacobian
 
-    def carry(self, surface: Surface, values: NDArray[np.float32]) -> NDArray[np.float32]:
-        """The values themselves: the samples are the vertices."""
+    def carry(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The values themselves."""
         return values
 
-    def balance(self, costs: NDArray[np.float64], surface: Surface, unseen: float) -> NDArray[np.float64]:
+    def balance(self, costs: NDArray[np.float64], unseen: float) -> NDArray[np.float64]:
         """The costs themselves: every candidate has one sample per vertex."""
         return costs
 
-    def render(self, surface: Surface) -> NDArray[np.float32]:
-        """Radial distances (height, width) [m] of a population of one in the camera's image; infinite off the mesh.
 
-        The result for the last surface is cached.
-        """
-        last, image = self._rendered
-        if last is not surface:
-            image = self._raster.render(surface.vertices[0])
-            self._rendered = (surface, image)
-        return image
-
-    def _front(self, surface: Surface, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> NDArray[np.float32]:
-        """Radial distances (k,) [m] of `render` at single pixels; renders only those unless the image is cached."""
-        last, image = self._rendered
-        return image[rows, columns] if last is surface else self._raster.render_at(surface.vertices[0], rows, columns)
-
-    def _sight(self, surface: Surface) -> NDArray[np.float64]:
-        """Lines of sight (3, n) from the camera to the vertices of a population of one [m]."""
-        return surface.vertices[0] - self.camera.center[:, None]
+AT_VERTICES = AtVertices()

@@ -36,8 +36,9 @@ class Undistorted:
         self._pinholes: dict[str, Camera] = {name: pinhole_of(sensor.camera) for name, sensor in rig.sensors.items()}
         self._tables = {name: resampling(self._pinholes[name], sensor.camera) for name, sensor in rig.sensors.items()}
 
-    def observe(self, observation: Observation) -> None:
-        """No effect: the tables depend on the lenses only."""
+    def observe(self, observation: Observation) -> "Undistorted":
+        """Itself: the tables depend on the lenses only."""
+        return self
 
     def view(self, sensor: str, attributes: NDArray[np.float32]) -> View:
         """View of the vertices with attributes (n, channels) in one sensor's camera without distortion."""

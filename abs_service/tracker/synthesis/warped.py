@@ -1,6 +1,7 @@
 """Sparse synthesis on warped input (section 3.2): all images in one common projection without distortion (eq. 12)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +10,7 @@ from abs_service.pairing.images import DepthImage, Window
 from abs_service.pairing.observation import Observation
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import ModelError, Surface
-from abs_service.tracker.synthesis.base import Synthesis, View
+from abs_service.tracker.synthesis.base import ObservedView, Synthesis, View
 from abs_service.tracker.synthesis.sparse import SparseView
 from abs_service.tracker.synthesis.window import WHOLE
 from calib.camera import Camera
@@ -57,32 +58,52 @@ class Warped:
         self._rig = rig
         self._reference = reference
         self._camera = pinhole_of(rig.sensors[reference].camera)
-        self._projection = _Projection(self._camera, mesh)
+        self._common = _CommonView(self._camera, mesh)
         self._warps = {
             name: MeshWarp(sensor.camera, self._camera)
             for name, sensor in rig.sensors.items()
             if isinstance(sensor.noise, DepthNoise)
         }
         self._pictures = {name: PictureLookup(self._camera, rig.sensors[name].camera) for name in rig.sensors}
-        self._distance = np.full((self._camera.height, self._camera.width), np.nan, np.float32)
 
-    def observe(self, observation: Observation) -> None:
-        """Warps the distances of the reference sensor into the common view."""
-        image, sensor = observation.images.get(self._reference), self._rig.sensors[self._reference]
-        self._distance = np.full_like(self._distance, np.nan)
-        if isinstance(image, DepthImage) and isinstance(sensor.noise, DepthNoise):
-            measured = subtract_mean_offset(sensor.noise, image.distance, image.amplitude)
-            warped = self._warp(self._reference, measured)
-            if warped is not None:
-                self._distance = warped.distance
+    def observe(self, observation: Observation) -> "WarpedImages":
+        """The images, warped by the distances of the reference sensor."""
+        return WarpedImages(self._camera, self._warps, self._pictures, self._distance(observation))
 
     def view(self, sensor: str, attributes: NDArray[np.float32]) -> View:
         """View of the vertices with attributes (n, channels) in the common camera."""
-        return _SharedView(self._projection, attributes)
+        return _SharedView(self._common, attributes)
 
     def window(self, sensor: str, predicted: Surface, reach_m: float) -> Window:
         """The whole image: images are resampled completely."""
         return WHOLE
+
+    def _distance(self, observation: Observation) -> NDArray[np.float32]:
+        """Distances (height, width) [m] of the reference sensor in the common view; NaN where unknown."""
+        image, sensor = observation.images.get(self._reference), self._rig.sensors[self._reference]
+        if isinstance(image, DepthImage) and isinstance(sensor.noise, DepthNoise):
+            measured = subtract_mean_offset(sensor.noise, image.distance, image.amplitude)
+            warped = _warp(self._warps[self._reference], measured)
+            if warped is not None:
+                return warped.distance
+        return np.full((self._camera.height, self._camera.width), np.nan, np.float32)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WarpedImages:
+    """The images of one frame in the common view.
+
+    Attributes:
+        camera: of the common view.
+        warps: of the depth sensors.
+        pictures: of all sensors' images.
+        distance: of the reference sensor in the common view (height, width) [m]; NaN where unknown.
+    """
+
+    camera: Camera
+    warps: dict[str, MeshWarp]
+    pictures: dict[str, PictureLookup]
+    distance: NDArray[np.float32]
 
     def texture(self, sensor: str, texture: NDArray[np.float32]) -> NDArray[np.float32]:
         """The noise texture (height + 2, width + 2, 8) in the common view.
@@ -91,8 +112,8 @@ class Warped:
         is exact up to the cosine of the angle between them.
         """
         inner = texture[1:-1, 1:-1]
-        result = np.zeros((self._camera.height + 2, self._camera.width + 2, texture.shape[2]), np.float32)
-        warped = self._warp(sensor, np.where(inner[..., 3] > 0, inner[..., 0], np.float32(np.nan)))
+        result = np.zeros((self.camera.height + 2, self.camera.width + 2, texture.shape[2]), np.float32)
+        warped = _warp(self.warps[sensor], np.where(inner[..., 3] > 0, inner[..., 0], np.float32(np.nan)))
         if warped is not None:
             result[1:-1, 1:-1] = warped.nearest(inner, missing=0)
             result[1:-1, 1:-1, 0] = np.nan_to_num(warped.distance)
@@ -101,55 +122,65 @@ class Warped:
     def image(self, sensor: str, image: NDArray[np.float32]) -> NDArray[np.float32]:
         """An image (height, width, channels) in the common view; NaN where the distance is unknown."""
         try:
-            return self._pictures[sensor].look(self._distance).nearest(image)
+            return self.pictures[sensor].look(self.distance).nearest(image)
         except WarpError:  # the image is unknown: the cost is that of an unseen object
-            return np.full((*self._distance.shape, image.shape[2]), np.nan, np.float32)
-
-    def _warp(self, sensor: str, distance: NDArray[np.floating]) -> WarpedDepth | None:
-        """A depth sensor's distances in the common view; None if all lie outside it, for example without an object."""
-        try:
-            return self._warps[sensor].warp(distance)
-        except WarpError:
-            return None
+            return np.full((*self.distance.shape, image.shape[2]), np.nan, np.float32)
 
 
-class _Projection:
-    """Cached synthesis of the last population in the common view, shared by all sensors."""
-
-    def __init__(self, camera: Camera, mesh: Mesh):
-        self.view = SparseView(camera, mesh.faces, np.zeros((len(mesh.vertices), 0), np.float32))
-        self._asked: tuple[Surface | None, Synthesis | None] = (None, None)
-
-    def look(self, predicted: Surface) -> None:
-        """Determines the occluded vertices of this frame."""
-        self.view.look(predicted)
-        self._asked = (None, None)
-
-    def synthesize(self, surface: Surface) -> Synthesis:
-        """Pixels and distances of a population, computed once."""
-        last, synthesis = self._asked
-        if last is not surface or synthesis is None:
-            synthesis = self.view.synthesize(surface)
-            self._asked = (surface, synthesis)
-        return synthesis
+def _warp(warp: MeshWarp, distance: NDArray[np.floating]) -> WarpedDepth | None:
+    """A depth sensor's distances in the common view; None if all lie outside it, for example without an object."""
+    try:
+        return warp.warp(distance)
+    except WarpError:
+        return None
 
 
 class _SharedView:
     """One sensor's attributes in the common view, which is that of the vertices for all else."""
 
-    def __init__(self, projection: _Projection, attributes: NDArray[np.float32]):
-        view = projection.view
-        self.camera, self.look, self.render = view.camera, projection.look, view.render
-        self.spread, self.follow, self.carry, self.balance = view.spread, view.follow, view.carry, view.balance
-        self.gradient_noise_gains = view.gradient_noise_gains
-        self._projection = projection
+    def __init__(self, common: "_CommonView", attributes: NDArray[np.float32]):
+        self.camera, self.render = common.camera, common.render
+        self._common = common
         self._attributes = np.ascontiguousarray(attributes.T, np.float32)[None]
+
+    def observe(self, predicted: Surface) -> "_ObservedSharedView":
+        """The view in one frame."""
+        return _ObservedSharedView(self.camera, self._common.observe(predicted), self._attributes)
+
+
+class _CommonView:
+    """The vertices in the common camera, observed once in a frame for all sensors."""
+
+    def __init__(self, camera: Camera, mesh: Mesh):
+        view = SparseView(camera, mesh.faces, np.zeros((len(mesh.vertices), 0), np.float32))
+        self.camera, self.render = camera, view.render
+        self.observe = lru_cache(maxsize=1)(lambda predicted: _ObservedCommonView(view.observe(predicted)))
+
+
+class _ObservedCommonView:
+    """The same in one frame; what all sensors ask for one after the other is synthesised once."""
+
+    def __init__(self, view: ObservedView):
+        self.synthesize = lru_cache(maxsize=1)(view.synthesize)
+        self.gradient_noise_gains = view.gradient_noise_gains
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _ObservedSharedView:
+    """One sensor's attributes (1, channels, n) in the common view of a frame."""
+
+    camera: Camera
+    common: _ObservedCommonView
+    attributes: NDArray[np.float32]
 
     def synthesize(self, surface: Surface) -> Synthesis:
         """The common synthesis with this sensor's attributes."""
-        common = self._projection.synthesize(surface)
-        return Synthesis(common.pixel, common.distance, self._attributes)
+        return replace(self.common.synthesize(surface), attributes=self.attributes)
 
-    def attribute_gradients(self, surface: Surface) -> NDArray[np.float32]:
+    def attribute_gradients(self, seen: Synthesis) -> NDArray[np.float32]:
         """NaN: only the vertices' own attributes are known."""
-        return np.full((*self._attributes[0].T.shape, 2), np.nan, np.float32)
+        return np.full((*self.attributes[0].T.shape, 2), np.nan, np.float32)
+
+    def gradient_noise_gains(self, seen: Synthesis) -> NDArray[np.float64]:
+        """Zeros: no gradients are known."""
+        return self.common.gradient_noise_gains(seen)

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from abs_service.pairing.images import BeamReading, Image
 from abs_service.tracker.models.base import SparseJacobian, Surface
-from abs_service.tracker.terms.base import NO_OCCLUDERS, Bounds
+from abs_service.tracker.terms.base import NO_OCCLUDERS, Bounds, Prediction
 from abs_service.tracker.terms.linearization import Part, PointLinearization
 from abs_service.tracker.terms.patches import Patches
 from abs_service.tracker.terms.sensor_fit import SensorFit
@@ -29,13 +29,7 @@ class BarrierTerm:
         self._noise = noise
         self._bounds = bounds
 
-    def observe(
-        self,
-        image: Image,
-        predicted: Surface,
-        reach_m: float = np.inf,
-        occluders: NDArray[np.float64] = NO_OCCLUDERS,
-    ) -> "ObservedBarrier":
+    def observe(self, image: Image, prediction: Prediction) -> "ObservedBarrier":
         """Takes a reading; an occluder in the beam counts as the object: the noise model holds the error rate."""
         if not isinstance(image, BeamReading):
             raise TypeError(f"sensor {self.sensor} has noise of a light barrier but delivered {type(image).__name__}")

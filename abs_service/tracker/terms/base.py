@@ -1,6 +1,6 @@
 """Interface of a term over time and in one frame, and the bounds of its costs."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from abs_service.pairing.images import Image
 from abs_service.tracker.models.base import SparseJacobian, Surface
-from abs_service.tracker.synthesis.base import View
+from abs_service.tracker.synthesis.base import AS_MEASURED, Resampling, Synthesis
 from abs_service.tracker.terms.linearization import Part, PointLinearization
 from abs_service.tracker.terms.patches import Patches
 from abs_service.tracker.terms.sensor_fit import SensorFit
@@ -40,12 +40,29 @@ class Bounds:
         return self.inlier + self.uniform
 
 
-def facing(view: View, surface: Surface) -> NDArray[np.bool_]:
-    """True for the samples (m,) of a population of one that are turned towards a view's camera."""
+def facing(seen: Synthesis, surface: Surface, center: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """True for the samples (m,) of a population of one that are turned towards a camera with a center (3,) [m]."""
     vertices, normals = (
-        view.spread(surface, part[0].T.astype(np.float64)) for part in (surface.vertices, surface.normals)
+        seen.interpolation.spread(part[0].T.astype(np.float64)) for part in (surface.vertices, surface.normals)
     )
-    return np.asarray(np.einsum("ni,ni->n", normals, vertices - view.camera.center) < 0)
+    return np.asarray(np.einsum("ni,ni->n", normals, vertices - center) < 0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Prediction:
+    """The surface that is expected in a frame, with which a sensor's image is compared.
+
+    Attributes:
+        surface: predicted mesh, a population of one.
+        reach_m: radius around it outside which costs need not be exact, only high [m].
+        occluders: points (k, 3) [m] that other sensors measured between themselves and the mesh.
+        resampling: of the images for the views.
+    """
+
+    surface: Surface
+    reach_m: float = np.inf
+    occluders: NDArray[np.float64] = field(default_factory=lambda: NO_OCCLUDERS)
+    resampling: Resampling = AS_MEASURED
 
 
 class ObservedTerm(Protocol):
@@ -101,19 +118,6 @@ class Term(Protocol):
     sensor: str
     finds_occluders: bool
 
-    def observe(
-        self,
-        image: Image,
-        predicted: Surface,
-        reach_m: float = np.inf,
-        occluders: NDArray[np.float64] = NO_OCCLUDERS,
-    ) -> ObservedTerm:
-        """The cost of deformed meshes given an image; it uses the memory of the image before.
-
-        Args:
-            image: measurement of the sensor.
-            predicted: predicted mesh, a population of one.
-            reach_m: radius around the prediction outside which costs need not be exact, only high [m].
-            occluders: points (k, 3) [m] that other sensors measured between themselves and the mesh.
-        """
+    def observe(self, image: Image, prediction: Prediction) -> ObservedTerm:
+        """The cost of deformed meshes given an image of the sensor; it uses the memory of the image before."""
         ...

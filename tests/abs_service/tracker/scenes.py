@@ -76,7 +76,8 @@ def sparse(camera: Camera, mesh: Mesh | None = None) -> Sparse:
 def seen(camera: Camera, surface: Surface) -> Synthesis:
     """Synthesis of single points in a camera."""
     points = surface.vertices.shape[2]
-    return SparseView(camera, np.zeros((0, 3), np.int32), np.zeros((points, 0), np.float32)).synthesize(surface)
+    view = SparseView(camera, np.zeros((0, 3), np.int32), np.zeros((points, 0), np.float32))
+    return view.unoccluded(surface).synthesize(surface)
 
 
 def in_sight(camera: Camera, count: int) -> Surface:

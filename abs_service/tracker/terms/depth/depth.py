@@ -9,7 +9,7 @@ from abs_service.pairing.images import DepthImage, Image, Window
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.synthesis.window import corner
-from abs_service.tracker.terms.base import NO_OCCLUDERS, Bounds
+from abs_service.tracker.terms.base import NO_OCCLUDERS, Bounds, Prediction
 from abs_service.tracker.terms.depth.classification.classifier import Classifier
 from abs_service.tracker.terms.depth.classification.visibility import where
 from abs_service.tracker.terms.depth.continuation import Continuation, NoContinuation
@@ -54,30 +54,24 @@ class DepthTerm:
         self._classes = ClassImages()
         self._begun = False
 
-    def observe(
-        self,
-        image: Image,
-        predicted: Surface,
-        reach_m: float = np.inf,
-        occluders: NDArray[np.float64] = NO_OCCLUDERS,
-    ) -> ObservedDepth:
+    def observe(self, image: Image, prediction: Prediction) -> ObservedDepth:
         """Renders the noise model over a depth image; pixels that show an occluder are masked, and no others."""
         if not isinstance(image, DepthImage):
             raise TypeError(f"sensor {self.sensor} has a depth noise model but delivered {type(image).__name__}")
         # What the background is, and where the field of view ends, is learnt from a whole image.
-        window = self._synthesizer.window(self.sensor, predicted, reach_m if self._begun else np.inf)
+        predicted, reach_m = prediction.surface, prediction.reach_m if self._begun else np.inf
+        window = self._synthesizer.window(self.sensor, predicted, reach_m)
         self._begun = True
         scale = self._fluctuation.scale
-        distance = self._texels.observe(image, window, scale)
+        distance = self._texels.observe(image, window, scale, prediction.resampling)
         expected = np.ascontiguousarray(self._view.render(predicted)[window])
-        self._view.look(predicted)
         seen = self._classifier.classify(distance, expected, window, self._texels.shape)
         outline = self._outline.observe(distance, seen, expected, predicted, window)
         free_m = where(~outline.doubtful, seen.free_m)
         masked = seen.foreground | seen.hole | outline.doubtful
         return ObservedDepth(
             sensor=self.sensor,
-            view=self._view,
+            view=self._view.observe(predicted),
             bounds=self._bounds,
             texels=self._texels,
             missing=self._explain(Unusable(masked, free_m, seen.object), predicted),

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.models.base import SparseJacobian, Surface
-from abs_service.tracker.synthesis.base import Synthesis, View
+from abs_service.tracker.synthesis.base import ObservedView, Synthesis
 from abs_service.tracker.terms.base import Bounds, facing
 from abs_service.tracker.terms.depth.depth_cost import FREE_SCALE_M, Residuals, depth_cost, normalize
 from abs_service.tracker.terms.depth.fluctuation import Fluctuation
@@ -48,7 +48,7 @@ class ObservedDepth:
     """
 
     sensor: str
-    view: View
+    view: ObservedView
     bounds: Bounds
     texels: Texels
     missing: NDArray[np.float32]
@@ -63,19 +63,20 @@ class ObservedDepth:
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
         """−Σ_v log φ (population,) plus the cost of the outline."""
-        return self._measured_cost(surface, self.view.synthesize(surface)) + self.outline.cost(surface)
+        return self._measured_cost(self.view.synthesize(surface)) + self.outline.cost(surface)
 
-    def _measured_cost(self, surface: Surface, seen: Synthesis) -> NDArray[np.float64]:
+    def _measured_cost(self, seen: Synthesis) -> NDArray[np.float64]:
         """Cost (population,) of the distances; the density is the larger of inlier and outlier density."""
         out = np.empty(len(seen.pixel))
-        missing = self.view.carry(surface, self.missing)
+        missing = seen.interpolation.carry(self.missing)
         texture = self.texels.at(seen.pixel)
         depth_cost(seen.pixel, seen.distance, missing, texture, self.bounds.inlier, self.bounds.outlier, out)
-        return self.view.balance(out, surface, self.bounds.unseen)
+        return seen.interpolation.balance(out, self.bounds.unseen)
 
     def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> list[Part]:
         """Normalised residuals of inliers and of samples in free space, and their derivatives with respect to Θ."""
-        samples, seen = self.view.follow(surface, sparse_jacobian), self.view.synthesize(surface)
+        seen = self.view.synthesize(surface)
+        samples = seen.interpolation.follow(sparse_jacobian)
         measured, free = (each(surface, samples, seen) for each in (self._linearize_measured, self._linearize_free))
         return [measured, free, self.outline.linearize(surface, sparse_jacobian)]
 
@@ -83,7 +84,7 @@ class ObservedDepth:
         found = self._residuals(seen)
         use = np.flatnonzero(found.cost < self.bounds.outlier - self.bounds.inlier)
         vertices, normals = (
-            self.view.spread(surface, values) for values in (surface.vertices[0].T, surface.normals[0].T)
+            seen.interpolation.spread(values) for values in (surface.vertices[0].T, surface.normals[0].T)
         )
         rows = depth_rows(vertices, normals, self.view.camera.center, use, found.inverse_deviation)
         return PointLinearization(found.normalized[use], rows, use, samples, vertices)
@@ -98,7 +99,7 @@ class ObservedDepth:
         out = (pixel > 0) & (away > 0)
         if not out.any():
             return PointLinearization.empty(samples)
-        vertices = self.view.spread(surface, surface.vertices[0].T)
+        vertices = seen.interpolation.spread(surface.vertices[0].T)
         distances = np.ascontiguousarray(free_m[1:-1, 1:-1, None])
         weight = 1 / np.sqrt(FREE_SCALE_M * np.maximum(away[out], MIN_FREE_M))
         rows = color_rows(distances, self.view.camera, vertices[out])[:, 0] * weight[:, None]
@@ -111,8 +112,10 @@ class ObservedDepth:
         measured, pixel = cost < np.inf, np.where(self.classes.beyond.ravel()[seen.pixel[0]], 0, seen.pixel[0])
         classes = self.classes.at(pixel)
         free = (classes.free_m > 0) & (pixel > 0)
-        masks = VertexMasks.of(pixel, facing(self.view, surface), classes.lost, classes.covered, classes.doubtful)
-        mean = -float(self._measured_cost(surface, seen)[0]) / residual.size
+        masks = VertexMasks.of(
+            pixel, facing(seen, surface, self.view.camera.center), classes.lost, classes.covered, classes.doubtful
+        )
+        mean = -float(self._measured_cost(seen)[0]) / residual.size
         size = np.where(free, np.inf, np.abs(residual))
         found = summarize(self.sensor, masks, measured | free, size, mean)
         return replace(

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.pairing.images import DepthImage, Window
-from abs_service.tracker.synthesis.base import Synthesizer
+from abs_service.tracker.synthesis.base import Resampling, Synthesizer
 from abs_service.tracker.synthesis.window import Bordered, corner, within
 from abs_service.tracker.terms.base import Bounds
 from abs_service.tracker.terms.depth.depth_cost import (
@@ -48,13 +48,14 @@ class Unusable:
 class Texels(Protocol):
     """The texture of one sensor's frame in its view."""
 
-    def observe(self, image: DepthImage, window: Window, scale: float) -> NDArray[np.float32]:
+    def observe(self, image: DepthImage, window: Window, scale: float, resampling: Resampling) -> NDArray[np.float32]:
         """Begins a frame; distances (rows, columns) in the window of the view [m], without mean offset, NaN if unknown.
 
         Args:
             image: the depth image.
             window: of the view.
             scale: on the deviations of the noise model.
+            resampling: of the image for the view.
         """
         ...
 
@@ -87,23 +88,23 @@ def texels(sensor: str, synthesizer: Synthesizer, noise: DepthNoise, bounds: Bou
     # Cost of no measurement, unbounded, so that leaving the image does not lower the cost.
     beyond = np.array([0, 0, 0, 0, 0, 0, bounds.outlier - bounds.inlier, 0], np.float32)
     image = Bordered(border, beyond)
-    return WholeTexels(sensor, synthesizer, noise, image) if synthesizer.resamples else TexelsOnDemand(noise, image)
+    return WholeTexels(sensor, noise, image) if synthesizer.resamples else TexelsOnDemand(noise, image)
 
 
 class WholeTexels:
     """A texture that is rendered in the sensor's image and resampled for the view; see `Texels`."""
 
-    def __init__(self, sensor: str, synthesizer: Synthesizer, noise: DepthNoise, image: Bordered):
-        self._sensor, self._synthesizer, self._noise, self._image = sensor, synthesizer, noise, image
+    def __init__(self, sensor: str, noise: DepthNoise, image: Bordered):
+        self._sensor, self._noise, self._image = sensor, noise, image
         self._texture = np.zeros((2, 2, 8), np.float32)
         self._window: Window = image.window
         self._distance = np.zeros((0, 0), np.float32)
 
-    def observe(self, image: DepthImage, window: Window, scale: float) -> NDArray[np.float32]:
+    def observe(self, image: DepthImage, window: Window, scale: float, resampling: Resampling) -> NDArray[np.float32]:
         """Renders the noise model over the window."""
         texture = self._image.begin(image.shape, window)
         write_texture(Scaled(self._noise, scale), *image.within(window), corner(window), texture)
-        self._texture, self._window = self._synthesizer.texture(self._sensor, texture), window
+        self._texture, self._window = resampling.texture(self._sensor, texture), window
         part = within(self._texture, window)
         self._distance = np.empty(part.shape[:2], np.float32)
         distances(part, self._distance)
@@ -142,7 +143,7 @@ class TexelsOnDemand:
         self._costs = ConstantCosts(self._done, self._distance, self._distance, image.border, 0.0, 0.0)
         self._complete: list[NDArray[np.int32]] = []  # pixels of single candidates, which are read again and again
 
-    def observe(self, image: DepthImage, window: Window, scale: float) -> NDArray[np.float32]:
+    def observe(self, image: DepthImage, window: Window, scale: float, resampling: Resampling) -> NDArray[np.float32]:
         """Corrects the distances in the window, and renders nothing yet."""
         self._texture, self._window = self._image.move(image.shape, window), window
         self._scaled = Scaled(self._noise, scale)

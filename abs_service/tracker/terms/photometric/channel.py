@@ -6,10 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.pairing.images import ChannelImage, Image, limits
-from abs_service.tracker.models.base import Surface
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.synthesis.window import NOTHING_HAS, Bordered, corner
-from abs_service.tracker.terms.base import NO_OCCLUDERS, Bounds
+from abs_service.tracker.terms.base import Bounds, Prediction
 from abs_service.tracker.terms.photometric.channel_cost import VALUE, copy, fill
 from abs_service.tracker.terms.photometric.illumination import Illumination
 from abs_service.tracker.terms.photometric.observed_channel import ObservedChannel
@@ -48,38 +47,34 @@ class ChannelTerm:
         self._synthesizer = synthesizer
         self._view = synthesizer.view(sensor, appearance)
         self._illumination = illumination
-        self._bias = RegistrationBias(self._view)
+        self._bias = RegistrationBias(self._view.camera)
         self._noise = noise
         self._bounds = bounds
         self._registration_noise = registration_noise
         self._texels = np.zeros((0, 0, 4), np.float32)
         self._bordered = Bordered(UNKNOWN, np.array([NOTHING_HAS, 0, 1, 0], np.float32))
 
-    def observe(
-        self,
-        image: Image,
-        predicted: Surface,
-        reach_m: float = np.inf,
-        occluders: NDArray[np.float64] = NO_OCCLUDERS,
-    ) -> ObservedChannel:
+    def observe(self, image: Image, prediction: Prediction) -> ObservedChannel:
         """Sets the image; NaN, also in the border, means no measurement, and infinity an occluder."""
         if not isinstance(image, ChannelImage):
             raise TypeError(f"sensor {self.sensor} has noise of one channel but delivered {type(image).__name__}")
-        window = self._synthesizer.window(self.sensor, predicted, reach_m)
+        predicted, occluders = prediction.surface, prediction.occluders
+        window = self._synthesizer.window(self.sensor, predicted, prediction.reach_m)
         if self._texels.shape[:2] != image.values.shape:  # new memory takes as long as filling it
             self._texels = np.full((*image.values.shape, 4), UNKNOWN, np.float32)
         is_mosaic = len(image.channels) > 1
         values, constant = np.ascontiguousarray(image.values[window]), LOG_SQRT_2PI + self._bounds.inlier
         fill(values, image.channels, self._noise.deviation(values), constant, *corner(window), self._texels)
-        picture = self._synthesizer.image(self.sensor, self._texels)
+        picture = prediction.resampling.image(self.sensor, self._texels)
         texture = self._bordered.move(picture.shape[:2], window)
         copy(picture, *limits(window, picture.shape), texture)
-        self._view.look(predicted)
+        view = self._view.observe(predicted)
+        seen = view.synthesize(predicted)
         if not is_mosaic:
-            self._bias.observe(picture[..., VALUE, None], predicted)
+            self._bias.observe(picture[..., VALUE, None], seen.interpolation.spread(predicted.vertices[0].T))
         observed = ObservedChannel(
             sensor=self.sensor,
-            view=self._view,
+            view=view,
             bounds=self._bounds,
             illumination=self._illumination,
             widening=NO_WIDENING,
@@ -88,7 +83,7 @@ class ChannelTerm:
             texture=texture.reshape(-1, 4),
             is_mosaic=is_mosaic,
         ).exposed(predicted)
-        widening = self._registration_noise.widening(self._view, predicted, observed.deviation(predicted))
+        widening = self._registration_noise.widening(view.attribute_gradients(seen), observed.deviation(predicted))
         if len(occluders):
             self._bordered.inside[occluded_pixels(self._view.camera, occluders)[window], VALUE] = np.inf
         return replace(observed, widening=widening)

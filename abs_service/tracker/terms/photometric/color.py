@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from abs_service.pairing.images import ColorImage, Image, Window
 from abs_service.tracker.models.base import SparseJacobian, Surface
-from abs_service.tracker.synthesis.base import Synthesis, Synthesizer, View
+from abs_service.tracker.synthesis.base import ObservedView, Resampling, Synthesis, Synthesizer
 from abs_service.tracker.synthesis.window import NOTHING_HAS, Bordered
-from abs_service.tracker.terms.base import NO_OCCLUDERS, Bounds, facing
+from abs_service.tracker.terms.base import NO_OCCLUDERS, Bounds, Prediction, facing
 from abs_service.tracker.terms.gradients import noiseless_color_rows
 from abs_service.tracker.terms.linearization import Part, PointLinearization
 from abs_service.tracker.terms.patches import Patches
@@ -45,7 +45,7 @@ class ColorTerm:
         self.sensor = sensor
         self._synthesizer = synthesizer
         self._view = synthesizer.view(sensor, colors)
-        self._bias = RegistrationBias(self._view)
+        self._bias = RegistrationBias(self._view.camera)
         self._bounds = bounds
         self._sigma = np.array([[noise.sigma]], np.float32)
         self._constant = bounds.inlier + 3 * (np.log(noise.sigma) + LOG_SQRT_2PI)
@@ -53,31 +53,26 @@ class ColorTerm:
         self._levels = np.zeros((0, 0, 3), np.uint8)
         self._bordered = Bordered(np.full(3, np.nan, np.float32), np.full(3, NOTHING_HAS, np.float32))
 
-    def observe(
-        self,
-        image: Image,
-        predicted: Surface,
-        reach_m: float = np.inf,
-        occluders: NDArray[np.float64] = NO_OCCLUDERS,
-    ) -> "ObservedColor":
+    def observe(self, image: Image, prediction: Prediction) -> "ObservedColor":
         """Sets the colour image; NaN, as in the border, means no measurement, and infinity an occluder."""
         if not isinstance(image, ColorImage):
             raise TypeError(f"sensor {self.sensor} has a colour noise model but delivered {type(image).__name__}")
-        window = self._synthesizer.window(self.sensor, predicted, reach_m)
-        picture = self._resampled(image.rgb) if self._synthesizer.resamples else self._ordered(image.rgb, window)
+        predicted, occluders = prediction.surface, prediction.occluders
+        window = self._synthesizer.window(self.sensor, predicted, prediction.reach_m)
+        picture = self._picture(image.rgb, window, prediction.resampling)
         texture = self._bordered.move(picture.shape[:2], window).reshape(-1, 3)
         self._bordered.inside[:] = picture[window]
-        self._view.look(predicted)
-        self._bias.observe(picture, predicted)
-        seen = self._view.synthesize(predicted)
-        widening = self._registration_noise.widening(self._view, predicted, self._sigma)
+        view = self._view.observe(predicted)
+        seen = view.synthesize(predicted)
+        self._bias.observe(picture, seen.interpolation.spread(predicted.vertices[0].T))
+        widening = self._registration_noise.widening(view.attribute_gradients(seen), self._sigma)
         inverse = np.float32(1) / (self._sigma * widening.factor)
         illumination = Exposed().adapt(texture[seen.pixel[0]], seen.attributes[0].T)
         if len(occluders):
             self._bordered.inside[occluded_pixels(self._view.camera, occluders)[window]] = np.inf
         return ObservedColor(
             sensor=self.sensor,
-            view=self._view,
+            view=view,
             bounds=self._bounds,
             illumination=illumination,
             bias=self._bias,
@@ -87,9 +82,13 @@ class ColorTerm:
             normalizer=(self._constant + 3 * widening.log.mean(axis=1)).astype(np.float32),
         )
 
-    def _resampled(self, rgb: NDArray[np.uint8]) -> NDArray[np.float32]:
-        """The image in the view's camera, NaN where unknown."""
-        return self._synthesizer.image(self.sensor, rgb.astype(np.float32))
+    def _picture(
+        self, rgb: NDArray[np.uint8], window: Window, resampling: Resampling
+    ) -> NDArray[np.float32] | NDArray[np.uint8]:
+        """The image in the view's camera, complete in the window; NaN where a resampled one is unknown."""
+        if self._synthesizer.resamples:
+            return resampling.image(self.sensor, rgb.astype(np.float32))
+        return self._ordered(rgb, window)
 
     def _ordered(self, rgb: NDArray[np.uint8], window: Window) -> NDArray[np.uint8]:
         """The image, of which a view with reversed channels is copied in the window: one layout for the kernels."""
@@ -120,7 +119,7 @@ class ObservedColor:
     """
 
     sensor: str
-    view: View
+    view: ObservedView
     bounds: Bounds
     illumination: Exposed
     bias: RegistrationBias
@@ -136,17 +135,17 @@ class ObservedColor:
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
         """−Σ_v log of the density of the measured colours (population,)."""
-        return self._cost_of(self._synthesize(surface), surface)
+        return self._cost_of(self._synthesize(surface))
 
     def _synthesize(self, surface: Surface) -> Synthesis:
         """The colours of a population as this frame's exposure shows them."""
-        return self.illumination.shine(self.view.synthesize(surface), surface, self.view)
+        return self.illumination.shine(self.view.synthesize(surface), surface)
 
-    def _cost_of(self, seen: Synthesis, surface: Surface) -> NDArray[np.float64]:
+    def _cost_of(self, seen: Synthesis) -> NDArray[np.float64]:
         """Cost (population,) of what is synthesised."""
         out = np.empty(len(seen.pixel))
         _color_cost(seen.pixel, seen.attributes, *self._measured, out)
-        return self.view.balance(out, surface, self.bounds.unseen)
+        return seen.interpolation.balance(out, self.bounds.unseen)
 
     @property
     def _measured(self) -> Measured:
@@ -154,13 +153,14 @@ class ObservedColor:
 
     def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> list[Part]:
         """Normalised residuals of the inliers, three channels each, and their derivatives with respect to theta."""
-        residual, measured = self._residuals(self._synthesize(surface))
+        seen = self._synthesize(surface)
+        residual, measured = self._residuals(seen)
         use = measured & (self.normalizer + 0.5 * np.sum(residual**2, axis=1) < self.bounds.outlier)
-        vertices = self.view.spread(surface, surface.vertices[0].T)
+        vertices = seen.interpolation.spread(surface.vertices[0].T)
         inverse = np.broadcast_to(self.inverse, residual.shape)[use]
         rows = noiseless_color_rows(self.image, self.view.camera, vertices[use], inverse).reshape(-1, 3)
         points = np.repeat(np.flatnonzero(use), residual.shape[1])
-        samples = self.view.follow(surface, sparse_jacobian)
+        samples = seen.interpolation.follow(sparse_jacobian)
         bias = self.bias.derivatives(vertices, rows, points)
         return [PointLinearization(residual[use].ravel(), rows, points, samples, vertices, bias)]
 
@@ -170,15 +170,17 @@ class ObservedColor:
         residual, measured = self._residuals(seen)
         pixel, known = seen.pixel[0], np.isfinite(seen.attributes[0]).all(axis=0)
         hidden = np.isinf(self.texture[pixel, 0])
-        masks = VertexMasks.of(pixel, facing(self.view, surface), np.zeros_like(hidden), hidden, ~known)
-        mean = -float(self._cost_of(seen, surface)[0]) / len(residual)
+        masks = VertexMasks.of(
+            pixel, facing(seen, surface, self.view.camera.center), np.zeros_like(hidden), hidden, ~known
+        )
+        mean = -float(self._cost_of(seen)[0]) / len(residual)
         size = np.sqrt(np.mean(residual**2, axis=1))
         return summarize(self.sensor, masks, measured, size, mean, channels=3)
 
     def match(self, surface: Surface, sparse_jacobian: SparseJacobian, patches: Patches) -> PointLinearization:
         """See `ObservedTerm`."""
         seen, costs = self._synthesize(surface), costs_of(_color_cost, self._measured)
-        return matched(self.view, surface, sparse_jacobian, seen, patches, self.image.shape, costs)
+        return matched(self.view.camera, surface, sparse_jacobian, seen, patches, self.image.shape, costs)
 
     def misfit(self, surface: Surface) -> NDArray[np.float64]:
         """Zero: colours carry no distance."""

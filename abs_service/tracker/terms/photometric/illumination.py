@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.models.base import Surface
-from abs_service.tracker.synthesis.base import Synthesis, View
+from abs_service.tracker.synthesis.base import Synthesis
 from abs_service.tracker.terms.photometric.exposure import gains
 from calib.jit import kernel
 
@@ -22,7 +22,7 @@ class Illumination(Protocol):
         """The illumination with the exposure of an image; see `gains` for what is measured and expected."""
         ...
 
-    def shine(self, seen: Synthesis, surface: Surface, view: View) -> Synthesis:
+    def shine(self, seen: Synthesis, surface: Surface) -> Synthesis:
         """The synthesis of a population with its attributes as they look in this light."""
         ...
 
@@ -34,7 +34,7 @@ class Passive:
         """Itself."""
         return self
 
-    def shine(self, seen: Synthesis, surface: Surface, view: View) -> Synthesis:
+    def shine(self, seen: Synthesis, surface: Surface) -> Synthesis:
         """The synthesis itself."""
         return seen
 
@@ -53,7 +53,7 @@ class Exposed:
         """The light with the gains of an image."""
         return Exposed(gains(measured, expected))
 
-    def shine(self, seen: Synthesis, surface: Surface, view: View) -> Synthesis:
+    def shine(self, seen: Synthesis, surface: Surface) -> Synthesis:
         """The synthesis with its attributes as the image is exposed."""
         return replace(seen, attributes=seen.attributes * self._gains[:, None])
 
@@ -72,10 +72,10 @@ class Active:
         """Itself: the lamp and the sensor's exposure are one, and known."""
         return self
 
-    def shine(self, seen: Synthesis, surface: Surface, view: View) -> Synthesis:
+    def shine(self, seen: Synthesis, surface: Surface) -> Synthesis:
         """The synthesis with reflectivities as bright as they look on each member of the population."""
         shade = lambert(surface, self._center)
-        return replace(seen, attributes=seen.attributes * view.carry(surface, shade)[:, None])
+        return replace(seen, attributes=seen.attributes * seen.interpolation.carry(shade)[:, None])
 
 
 def lambert(surface: Surface, center: NDArray[np.floating]) -> NDArray[np.float32]:

@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.models.base import SparseJacobian, Surface
-from abs_service.tracker.synthesis.base import Synthesis, View
+from abs_service.tracker.synthesis.base import Synthesis
 from abs_service.tracker.terms.linearization import PointLinearization
 from abs_service.tracker.terms.patches import NEAR_PX, Patches, found_at
+from calib.camera import Camera
 
 #: Largest shift of a patch to the right or down [px], and largest number of its samples that are compared.
 REACH_PX, MOST = 8, 40
@@ -50,7 +51,7 @@ def costs_of(kernel: Callable[..., None], measured: Measured) -> Costs:
 
 
 def matched(
-    view: View,
+    camera: Camera,
     surface: Surface,
     sparse_jacobian: SparseJacobian,
     seen: Synthesis,
@@ -59,11 +60,11 @@ def matched(
     costs: Costs,
 ) -> PointLinearization:
     """Residuals of the places in the image, two for each sample, whose patch is found there; see `Term.match`."""
-    of_samples = np.argmax(view.spread(surface, np.eye(int(patches.max()) + 1)[patches]), axis=1)
+    of_samples = np.argmax(seen.interpolation.spread(np.eye(int(patches.max()) + 1)[patches]), axis=1)
     shift = _shifts(seen, (shape[0], shape[1]), of_samples, costs)
     found = np.flatnonzero(np.isfinite(shift[:, 0]))
-    vertices = view.spread(surface, surface.vertices[0].T)
-    return found_at(view.camera, vertices, found, shift[found], view.follow(surface, sparse_jacobian))
+    vertices = seen.interpolation.spread(surface.vertices[0].T)
+    return found_at(camera, vertices, found, shift[found], seen.interpolation.follow(sparse_jacobian))
 
 
 def _shifts(seen: Synthesis, shape: tuple[int, int], of_samples: NDArray[np.intp], costs: Costs) -> NDArray[np.float64]:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.models.base import SparseJacobian, Surface
-from abs_service.tracker.synthesis.base import Synthesis, View
+from abs_service.tracker.synthesis.base import ObservedView, Synthesis
 from abs_service.tracker.synthesis.perspective import project_with_jacobian
 from abs_service.tracker.terms.base import NO_OCCLUDERS, Bounds, facing
 from abs_service.tracker.terms.gradients import channel_gradients, shortened
@@ -39,7 +39,7 @@ class ObservedChannel:
     """
 
     sensor: str
-    view: View
+    view: ObservedView
     bounds: Bounds
     illumination: Illumination
     widening: Widening
@@ -69,11 +69,11 @@ class ObservedChannel:
         seen = self._synthesize(surface)
         out = np.empty(len(seen.pixel))
         channel_cost(seen.pixel, seen.attributes, *self._measured, out)
-        return self.view.balance(out, surface, self.bounds.unseen)
+        return seen.interpolation.balance(out, self.bounds.unseen)
 
     def _synthesize(self, surface: Surface) -> Synthesis:
         """The values of a population as they look in this light."""
-        return self.illumination.shine(self.view.synthesize(surface), surface, self.view)
+        return self.illumination.shine(self.view.synthesize(surface), surface)
 
     @property
     def _measured(self) -> Measured:
@@ -88,7 +88,7 @@ class ObservedChannel:
         seen = self.view.synthesize(surface)
         residual, inverse, normalizer = self._residuals(seen, surface)
         use = 0.5 * residual**2 + normalizer < self.bounds.outlier
-        vertices = self.view.spread(surface, surface.vertices[0].T)
+        vertices = seen.interpolation.spread(surface.vertices[0].T)
         gradients, gains = self._gradients(seen, surface)
         places, projection = project_with_jacobian(self.view.camera, vertices)
         rows = np.einsum("mi,mij->mj", gradients[use] * inverse[use, None], projection[use])
@@ -99,7 +99,7 @@ class ObservedChannel:
         deviation = np.minimum(deviation, np.median(np.abs(residual)) / NORMAL_MEDIAN)
         noise = deviation**2 @ np.einsum("mi,mij->m", gains[use], projection[use] ** 2)
         rows = shortened(rows, float(noise))
-        samples, points = self.view.follow(surface, sparse_jacobian), np.flatnonzero(use)
+        samples, points = seen.interpolation.follow(sparse_jacobian), np.flatnonzero(use)
         bias = self.bias.derivatives(vertices, rows, points)
         return [PointLinearization(residual[use], rows, points, samples, vertices, bias)]
 
@@ -109,14 +109,16 @@ class ObservedChannel:
         residual = self._residuals(seen, surface)[0]
         pixel, known = seen.pixel[0], np.isfinite(seen.attributes[0]).all(axis=0)
         hidden = np.isinf(self.texture[pixel, VALUE])
-        masks = VertexMasks.of(pixel, facing(self.view, surface), np.zeros_like(hidden), hidden, ~known)
+        masks = VertexMasks.of(
+            pixel, facing(seen, surface, self.view.camera.center), np.zeros_like(hidden), hidden, ~known
+        )
         mean = -float(self.cost(surface)[0]) / len(residual)
         return summarize(self.sensor, masks, np.isfinite(residual), np.abs(residual), mean)
 
     def match(self, surface: Surface, sparse_jacobian: SparseJacobian, patches: Patches) -> PointLinearization:
         """See `ObservedTerm`."""
         seen, costs = self._synthesize(surface), costs_of(channel_cost, self._measured)
-        return matched(self.view, surface, sparse_jacobian, seen, patches, self.image.shape, costs)
+        return matched(self.view.camera, surface, sparse_jacobian, seen, patches, self.image.shape, costs)
 
     def misfit(self, surface: Surface) -> NDArray[np.float64]:
         """Zero: brightness carries no distance."""
@@ -148,12 +150,12 @@ class ObservedChannel:
         the surface's own where that is known, which is also exactly how a residual changes within a pixel.
         """
         channel = self.texture[seen.pixel[0], CHANNEL].astype(int)
-        own = replace(seen, attributes=self.view.attribute_gradients(surface).T)  # along both axes, as two members
-        shining = self.illumination.shine(own, surface, self.view).attributes
+        own = replace(seen, attributes=self.view.attribute_gradients(seen).T)  # along both axes, as two members
+        shining = self.illumination.shine(own, surface).attributes
         gradients = shining[:, channel, np.arange(len(channel))].T.astype(np.float64)
         unknown = np.isnan(gradients).any(axis=1)
-        samples = self.view.spread(surface, surface.vertices[0].T.astype(np.float64))[unknown]
-        gains = self.view.gradient_noise_gains(surface)
+        samples = seen.interpolation.spread(surface.vertices[0].T.astype(np.float64))[unknown]
+        gains = self.view.gradient_noise_gains(seen).copy()
         gradients[unknown], gains[unknown] = channel_gradients(
             self.image[..., VALUE], self.image[..., CHANNEL], self.view.camera, samples
         )
@@ -163,7 +165,7 @@ class ObservedChannel:
         self, seen: Synthesis, surface: Surface
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Normalised residual, infinite without a measurement, inverse deviation, log of the normaliser, each (n,)."""
-        shining = self.illumination.shine(seen, surface, self.view)
+        shining = self.illumination.shine(seen, surface)
         texels = self.texture[seen.pixel[0]].astype(np.float64)
         each, channel = np.arange(len(texels)), texels[:, CHANNEL].astype(int)
         widening = self.widening

@@ -11,9 +11,8 @@ J. R. Braasch, M. A. Sutton, Optical Engineering 39, 2000). No residual shows it
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.models.base import Surface
-from abs_service.tracker.synthesis.base import View
 from abs_service.tracker.terms.image_noise import noise_deviation
+from calib.camera import Camera
 
 #: Deviation of the factor on f'': of ½ p (1 − p) at a place p between two pixels, and of ½ δ² at a distance δ from a
 #: pixel's centre, both uniform.
@@ -27,18 +26,17 @@ class RegistrationBias:
     """The bias of one print in the images of one sensor, as large as the first of them shows.
 
     Args:
-        view: of the mesh in the camera of the images.
+        camera: of the images.
     """
 
-    def __init__(self, view: View):
-        self._view = view
+    def __init__(self, camera: Camera):
+        self._camera = camera
         self._deviation_px, self._begun = 0.0, False
 
-    def observe(self, image: NDArray[np.float32] | NDArray[np.uint8], predicted: Surface) -> None:
-        """Measures the bias in the first image (height, width, channels), where the predicted mesh is in it."""
+    def observe(self, image: NDArray[np.float32] | NDArray[np.uint8], vertices: NDArray[np.floating]) -> None:
+        """Measures the bias in the first image (height, width, channels), where vertices (m, 3) [m] are in it."""
         if not self._begun:
-            vertices = self._view.spread(predicted, predicted.vertices[0].T)
-            self._deviation_px = deviation_px(image, self._view.camera.project(vertices))
+            self._deviation_px = deviation_px(image, self._camera.project(vertices))
             self._begun = True
 
     def derivatives(
@@ -51,7 +49,7 @@ class RegistrationBias:
             rows: derivatives of the residuals with respect to the position of their vertex (m, 3) [1/m].
             points: index of the vertex of each residual (m,).
         """
-        camera = self._view.camera
+        camera = self._camera
         axes = camera.T_rs[:3]
         depth = (vertices - camera.center) @ axes[:, 2]
         return (

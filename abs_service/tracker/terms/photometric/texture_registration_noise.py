@@ -6,9 +6,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.models.base import Surface
-from abs_service.tracker.synthesis.base import View
-
 
 class Widening(NamedTuple):
     """Factor by which texture registration noise widens the sensor's standard deviation.
@@ -36,15 +33,13 @@ class TextureRegistrationNoise:
 
     px: float
 
-    def widening(self, view: View, predicted: Surface, deviation: NDArray[np.floating]) -> Widening:
+    def widening(self, gradients: NDArray[np.float32], deviation: NDArray[np.floating]) -> Widening:
         """Widening of the sensor's own noise at the predicted surface.
 
         Args:
-            view: the sensor's, after `look`.
-            predicted: the predicted mesh, a population of one.
+            gradients: of the appearance at the samples (m, channels, 2) [1/px]; NaN where unknown.
             deviation: the sensor's own standard deviation of every sample, broadcastable to (m, channels).
         """
-        gradients = view.attribute_gradients(predicted)
         if self.px == 0 or np.isnan(gradients).all():  # the samples of a dense view differ from candidate to candidate
             return NO_WIDENING
         square = np.nan_to_num(np.einsum("nci,nci->nc", gradients, gradients))

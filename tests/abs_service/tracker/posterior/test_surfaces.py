@@ -32,11 +32,10 @@ def test_a_sensor_synthesises_a_surface_once_in_a_frame():
         model.deform(away[None]),
         SparseView(CAMERA, mesh.faces, mesh.colors),
     )
-    view.look(front)
-    seen = view.synthesize(front)
-    view.synthesize(back)
-    assert view.synthesize(front) is seen
-    view.look(front)
-    again = view.synthesize(front)
+    frame = view.observe(front)
+    seen = frame.synthesize(front)
+    frame.synthesize(back)
+    assert frame.synthesize(front) is seen
+    again = view.observe(front).synthesize(front)
     assert again is not seen
     np.testing.assert_array_equal(again.pixel, seen.pixel)

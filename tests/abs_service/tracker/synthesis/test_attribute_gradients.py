@@ -58,9 +58,8 @@ def test_a_linear_texture_is_synthesised_exactly_at_the_centres_of_pixels(turn, 
     mesh = sheet(height=flat)
     around = pose.from_rotation_vector([0, 0, 0], [0, 0, 1.0])
     motion = around @ pose.from_rotation_vector(turn, shift) @ np.linalg.inv(around)
-    surface, view = moved(mesh, motion), view_of(mesh, CAMERA)
-    view.look(surface)
-    seen = view.synthesize(surface)
+    surface = moved(mesh, motion)
+    seen = view_of(mesh, CAMERA).observe(surface).synthesize(surface)
     visible = seen.pixel[0] > 0
     row, column = np.divmod(seen.pixel[0][visible], CAMERA.width + 2)
     rays = CAMERA.directions(np.stack([column - 1, row - 1], axis=-1)) @ CAMERA.T_rs[:3, :3].T
@@ -80,12 +79,11 @@ def test_a_linear_texture_is_synthesised_exactly_at_the_centres_of_pixels(turn, 
 def test_the_kernels_are_their_equation(seed, camera):
     generator = np.random.default_rng(seed)
     mesh = sheet(5, 6)
-    view = view_of(mesh, camera)
-    view.look(as_surface((mesh.vertices, mesh.normals)))
+    view = view_of(mesh, camera).observe(as_surface((mesh.vertices, mesh.normals)))
     vertices = mesh.vertices + generator.normal(0, 0.01, mesh.vertices.shape)
     surface = as_surface((vertices, mesh.normals), (vertices + 0.5, mesh.normals))
     seen = view.synthesize(surface)
-    per_pixel, at_vertices = view.attribute_gradients(surface), canvas_values(mesh)
+    per_pixel, at_vertices = view.attribute_gradients(seen), canvas_values(mesh)
     for k, attributes in enumerate(seen.attributes):
         for v, found in enumerate(attributes.T):
             expected = at_vertices[v].astype(float)
@@ -103,8 +101,8 @@ def test_what_is_unknown_beside_a_vertex_leaves_it_level_and_an_edge_on_view_doe
     gradients = FirstOrder(CAMERA, mesh, values[n:], STEP_M)
     half_turn = pose.from_rotation_vector([0, np.pi / 2 - 0.01, 0], [0.0, 0, 0])
     around = pose.from_rotation_vector([0, 0, 0], [0, 0, 1.0])
-    gradients.look(moved(mesh, around @ half_turn @ np.linalg.inv(around)))
-    per_pixel = gradients.per_pixel(values[:n].T)
+    seen = gradients.observe(moved(mesh, around @ half_turn @ np.linalg.inv(around)))
+    per_pixel = seen.per_pixel(values[:n].T)
     assert np.isfinite(per_pixel).all()
     assert np.abs(per_pixel).max() < 20 * np.abs(LINEAR).max() / CAMERA.fx
 
@@ -126,5 +124,5 @@ def test_attributes_of_the_vertices_alone_are_level():
     rig = Rig("r", {"color": Sensor("color", CAMERA, GaussianColor())})
     surface = as_surface((mesh.vertices + 1e-3, mesh.normals), (mesh.vertices, mesh.normals))
     np.testing.assert_array_equal(
-        Sparse(rig, mesh).view("color", mesh.colors).synthesize(surface).attributes[0].T, mesh.colors
+        Sparse(rig, mesh).view("color", mesh.colors).observe(surface).synthesize(surface).attributes[0].T, mesh.colors
     )

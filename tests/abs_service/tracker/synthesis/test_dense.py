@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.models.rigid import Rigid
+from abs_service.tracker.synthesis.base import ObservedView
 from abs_service.tracker.synthesis.dense import DenseView
 from abs_service.tracker.synthesis.projection import Projected, Projection, in_sight
 from abs_service.tracker.synthesis.rasterization.texturing import lattice, paint
@@ -106,9 +107,10 @@ def facing(face: np.ndarray, place: np.ndarray) -> np.ndarray:
 LATTICE = lattice(MESH, 4)
 
 
-def view(camera: Camera, step: int = 1) -> DenseView:
-    """The sheet with the coordinates of its points as colours, in cm."""
-    return DenseView(camera, MESH.faces, (LATTICE.vertices * 100).astype(np.float32), step, 4)
+def view(camera: Camera, step: int = 1) -> ObservedView:
+    """The sheet with the coordinates of its points as colours, in cm, in a frame in which it is predicted at rest."""
+    made = DenseView(camera, MESH.faces, (LATTICE.vertices * 100).astype(np.float32), step, 4)
+    return made.observe(moved([0] * 6))
 
 
 def moved(*thetas: list[float]) -> Surface:
@@ -119,15 +121,14 @@ def moved(*thetas: list[float]) -> Surface:
 @pytest.mark.parametrize(("camera", "tolerance"), [(PINHOLE, 1e-3), (CAMERA, 0.02)])
 def test_samples_lie_on_the_mesh_and_on_the_centres_of_pixels(camera, tolerance):
     surface = moved([0.2, -0.3, 0.1, 0.01, 0, 0.02])
-    dense = view(camera)
-    seen = dense.synthesize(surface)
+    seen = view(camera).synthesize(surface)
     assert 700 < seen.pixel.shape[1] < 64 * 48
     assert np.all(seen.pixel > 0)
-    points = dense.spread(surface, surface.vertices[0].T.astype(float))
+    points = seen.interpolation.spread(surface.vertices[0].T.astype(float))
     centres = np.stack([seen.pixel[0] % 66 - 1, seen.pixel[0] // 66 - 1], axis=-1)
     assert np.abs(camera.project(points) - centres).max() < tolerance
     np.testing.assert_allclose(seen.distance[0], camera.distance(points), atol=2e-5)
-    np.testing.assert_allclose(dense.carry(surface, surface.vertices[:, 2])[0], points[:, 2], atol=1e-5)
+    np.testing.assert_allclose(seen.interpolation.carry(surface.vertices[:, 2])[0], points[:, 2], atol=1e-5)
 
 
 def test_a_population_is_its_members_one_by_one():
@@ -163,8 +164,8 @@ def test_what_lies_behind_the_mesh_itself_is_no_sample():
     vertices = np.concatenate([MESH.vertices, MESH.vertices + np.array([0, 0, 0.2])])
     normals = np.tile((0.0, 0.0, -1.0), (len(vertices), 1))
     faces = np.concatenate([MESH.faces, MESH.faces + len(MESH.vertices)])
-    both = DenseView(CAMERA, faces, np.zeros((2 * len(LATTICE.vertices), 0), np.float32), 1, 4)
-    both = both.synthesize(as_surface((vertices, normals)))
+    both, surface = np.zeros((2 * len(LATTICE.vertices), 0), np.float32), as_surface((vertices, normals))
+    both = DenseView(CAMERA, faces, both, 1, 4).observe(surface).synthesize(surface)
     near = view(CAMERA).synthesize(as_surface((MESH.vertices, normals[: len(MESH.vertices)])))
     shared = np.isin(both.pixel[0], near.pixel[0])
     assert np.count_nonzero(shared) == near.pixel.shape[1]
@@ -186,7 +187,7 @@ def test_both_syntheses_see_the_same_surface():
     """Sparse and dense distances agree in the same pixel, up to the slope of the surface within a pixel."""
     surface = moved([0.1, -0.2, 0.1, 0.01, 0, 0.02])
     attributes = np.zeros((len(MESH.vertices), 0), np.float32)
-    sparse = SparseView(CAMERA, MESH.faces, attributes).synthesize(surface)
+    sparse = SparseView(CAMERA, MESH.faces, attributes).unoccluded(surface).synthesize(surface)
     dense = view(CAMERA).synthesize(surface)
     place = dict(zip(dense.pixel[0].tolist(), dense.distance[0].tolist()))
     pairs = [(place[p], d) for p, d in zip(sparse.pixel[0].tolist(), sparse.distance[0].tolist()) if p in place]
@@ -197,10 +198,9 @@ def test_both_syntheses_see_the_same_surface():
 def test_the_appearance_is_that_of_the_material_point():
     """The colours are the coordinates of a point on the sheet at rest, for any pose of the sheet."""
     theta = [0.2, -0.3, 0.1, 0.01, 0, 0.02]
-    dense, surface = view(CAMERA), moved(theta)
-    colors = dense.synthesize(surface).attributes[0].T / 100
+    seen = view(CAMERA).synthesize(moved(theta))
     rest = np.ascontiguousarray(MESH.vertices)
-    np.testing.assert_allclose(colors, dense.spread(surface, rest), atol=1e-4)
+    np.testing.assert_allclose(seen.attributes[0].T / 100, seen.interpolation.spread(rest), atol=1e-4)
 
 
 @settings(max_examples=25)
@@ -238,13 +238,13 @@ def test_neither_covering_more_nor_less_is_worth_anything():
     """A perfect fit has the same cost at any distance; a part outside the image has the cost of unseen samples."""
     dense = view(CAMERA)
     near, far = moved([0, 0, 0, 0, 0, -0.1]), moved([0, 0, 0, 0, 0, 0.1])
-    dense.look(moved([0] * 6))
-    counts = [dense.synthesize(surface).pixel.shape[1] for surface in (near, far)]
+    seen = [dense.synthesize(surface) for surface in (near, far)]
+    counts = [one.pixel.shape[1] for one in seen]
     assert counts[0] > 1.2 * counts[1]
-    costs = [dense.balance(np.array([2.0 * n]), surface, 7.0)[0] for n, surface in zip(counts, (near, far))]
+    costs = [one.interpolation.balance(np.array([2.0 * n]), 7.0)[0] for n, one in zip(counts, seen)]
     assert costs[0] == pytest.approx(costs[1])
     nominal = costs[0] / 2
-    half = moved([0, 0, 0, 0.21, 0, 0])  # its right half is outside the image
-    count = dense.synthesize(half).pixel.shape[1]
-    assert nominal * 3 < dense.balance(np.array([2.0 * count]), half, 7.0)[0] < nominal * 6
-    assert dense.balance(np.zeros(1), moved([0, 0, 0, 2, 0, 0]), 7.0)[0] == pytest.approx(7 * nominal)
+    half = dense.synthesize(moved([0, 0, 0, 0.21, 0, 0]))  # its right half is outside the image
+    assert nominal * 3 < half.interpolation.balance(np.array([2.0 * half.pixel.shape[1]]), 7.0)[0] < nominal * 6
+    away = dense.synthesize(moved([0, 0, 0, 2, 0, 0])).interpolation
+    assert away.balance(np.zeros(1), 7.0)[0] == pytest.approx(7 * nominal)

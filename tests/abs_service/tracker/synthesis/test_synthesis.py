@@ -8,10 +8,11 @@ import pytest
 from abs_service.pairing.images import BAYER_ORDERS, ChannelImage, ColorImage
 from abs_service.tracker.estimates.estimate import Status
 from abs_service.tracker.mesh import Mesh
+from abs_service.tracker.models.base import Surface
 from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.synthesis import dense, sparse, undistorted, warped
 from abs_service.tracker.synthesis.base import Synthesizer
-from abs_service.tracker.terms.base import Bounds
+from abs_service.tracker.terms.base import Bounds, Prediction
 from abs_service.tracker.terms.depth.depth import DepthTerm
 from abs_service.tracker.terms.linearization import stack
 from abs_service.tracker.terms.photometric.channel import ChannelTerm
@@ -46,11 +47,15 @@ BOUNDS = Bounds(0.0, 5.0, 20.0)
 
 
 def built(kind, mesh: Mesh = MESH) -> Synthesizer:
-    """The synthesis of a sheet for two distorted sensors, after an observation of a wall at the sheet's pose."""
+    """The synthesis of a sheet for two distorted sensors."""
     sensors = [Sensor("tof", TOF, GaussianPolynomial(((SIGMA,),))), Sensor("color", COLOR, GaussianColor(LEVELS))]
-    synthesizer = kind.build(Rig("r", {sensor.name: sensor for sensor in sensors}), mesh)
-    synthesizer.observe(observation(tof=depth_image(plane_distance(TOF, WALL, 1.0))))
-    return synthesizer
+    return kind.build(Rig("r", {sensor.name: sensor for sensor in sensors}), mesh)
+
+
+def predicted(synthesizer: Synthesizer, surface: Surface) -> Prediction:
+    """The prediction of a surface in an observation of a wall at the sheet's pose."""
+    seen = observation(tof=depth_image(plane_distance(TOF, WALL, 1.0)))
+    return Prediction(surface, resampling=synthesizer.observe(seen))
 
 
 def slope(term, model: Rigid, theta: np.ndarray, parameter: int, step: float) -> tuple[float, float]:
@@ -64,8 +69,9 @@ def slope(term, model: Rigid, theta: np.ndarray, parameter: int, step: float) ->
 @ALL
 def test_the_depth_gradient_is_that_of_the_cost(kind):
     mesh = sheet(21, 31, flat, size=(0.2, 0.14))
-    term = DepthTerm("tof", built(kind, mesh), len(mesh.vertices), GaussianPolynomial(((SIGMA,),)), BOUNDS)
-    term = term.observe(depth_image(plane_distance(TOF, WALL, 1.0)), as_surface((mesh.vertices, mesh.normals)))
+    synthesizer, surface = built(kind, mesh), as_surface((mesh.vertices, mesh.normals))
+    term = DepthTerm("tof", synthesizer, len(mesh.vertices), GaussianPolynomial(((SIGMA,),)), BOUNDS)
+    term = term.observe(depth_image(plane_distance(TOF, WALL, 1.0)), predicted(synthesizer, surface))
     for theta in ([0, 0, 0, 0, 0, 0.006], [0.02, -0.02, 0, 0, 0, -0.004]):
         numerical, linear = slope(term, Rigid(mesh), np.array(theta), 5, 5e-4)
         assert linear == pytest.approx(numerical, rel=0.1)
@@ -84,7 +90,8 @@ def test_the_colour_gradient_is_that_of_the_cost(kind):
     synthesizer = built(kind, mesh)
     term = ColorTerm("color", synthesizer, gradient_colors(synthesizer.canvas.vertices), GaussianColor(LEVELS), BOUNDS)
     wall = gradient_colors(COLOR.unproject(plane_distance(COLOR, WALL, 1.0)))
-    term = term.observe(ColorImage(np.rint(wall).astype(np.uint8)), as_surface((mesh.vertices, mesh.normals)))
+    surface = as_surface((mesh.vertices, mesh.normals))
+    term = term.observe(ColorImage(np.rint(wall).astype(np.uint8)), predicted(synthesizer, surface))
     for parameter in (3, 4):
         theta = 0.01 * np.eye(6)[parameter]
         numerical, linear = slope(term, Rigid(mesh), theta, parameter, 0.01)
@@ -107,11 +114,11 @@ def test_a_mosaic_is_compared_channel_by_channel(kind, order):
     values = np.take_along_axis(wall, channel[..., None].astype(int), axis=2)[..., 0].astype(np.float32)
     surface = as_surface((mesh.vertices, mesh.normals))
     term = ChannelTerm("color", synthesizer, looks, GaussianBayer(LEVELS), Passive(), BOUNDS)
-    fit = term.observe(ChannelImage(values, channel), surface).fit(surface)
+    fit = term.observe(ChannelImage(values, channel), predicted(synthesizer, surface)).fit(surface)
     assert fit.inliers == fit.samples > 0.8 * fit.visible
     assert fit.normalized_residual < 0.3
     wrong = ChannelImage(values, BAYER_ORDERS["gbrg" if order == "rggb" else "rggb"][rows % 2, columns % 2])
-    assert term.observe(wrong, surface).fit(surface).inliers < 0.8 * fit.inliers
+    assert term.observe(wrong, predicted(synthesizer, surface)).fit(surface).inliers < 0.8 * fit.inliers
 
 
 @ALL
@@ -124,7 +131,9 @@ def test_a_lamp_of_its_own_lights_the_samples(kind):
     law = reflectivity * (1.0 / wall) / wall**2  # the cosine of incidence on a wall at 1 m is 1 over the distance
     term = ChannelTerm("tof", synthesizer, looks, GaussianIntensity("amplitude", 50.0), Active(TOF.center), BOUNDS)
     surface = as_surface((MESH.vertices, MESH.normals))
-    term = term.observe(ChannelImage(law.astype(np.float32), np.zeros(law.shape, np.uint8)), surface)
+    term = term.observe(
+        ChannelImage(law.astype(np.float32), np.zeros(law.shape, np.uint8)), predicted(synthesizer, surface)
+    )
     fit = term.fit(surface)
     assert fit.inliers == fit.samples > 0.9 * len(MESH.vertices)
     assert fit.normalized_residual < 0.5
@@ -133,9 +142,10 @@ def test_a_lamp_of_its_own_lights_the_samples(kind):
 @ALL
 def test_what_leaves_the_image_neither_gains_nor_gets_lost(kind):
     """Outside, it has the cost of a mesh without any measurement."""
-    term = DepthTerm("tof", built(kind), len(MESH.vertices), GaussianPolynomial(((SIGMA,),)), BOUNDS)
+    synthesizer = built(kind)
+    term = DepthTerm("tof", synthesizer, len(MESH.vertices), GaussianPolynomial(((SIGMA,),)), BOUNDS)
     surface = as_surface((MESH.vertices, MESH.normals))
-    term = term.observe(depth_image(plane_distance(TOF, WALL, 1.0)), surface)
+    term = term.observe(depth_image(plane_distance(TOF, WALL, 1.0)), predicted(synthesizer, surface))
     there, away, behind = term.cost(
         Rigid(MESH).deform(np.array([np.zeros(6), [0, 0, 0, 2, 0, 0], [0, 0, 0, 0, 0, -3]]))
     )

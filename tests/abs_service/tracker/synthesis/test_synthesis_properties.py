@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from abs_service.pairing.images import BAYER_ORDERS, ONE_CHANNEL, ChannelImage, ColorImage
 from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.synthesis import dense, sparse, undistorted, warped
-from abs_service.tracker.terms.base import Bounds, ObservedTerm
+from abs_service.tracker.terms.base import Bounds, ObservedTerm, Prediction
 from abs_service.tracker.terms.depth.depth import DepthTerm
 from abs_service.tracker.terms.linearization import stack
 from abs_service.tracker.terms.photometric.channel import ChannelTerm
@@ -62,8 +62,8 @@ class Scene:
         self.colors = tints(pose.transform(pose.inverse(motion), points))
         sensors = [Sensor("tof", TOF, DEPTH), Sensor("color", PICTURE, GaussianColor(LEVELS))]
         self.synthesizer = KINDS[kind].build(Rig("r", {sensor.name: sensor for sensor in sensors}), MESH)
-        self.synthesizer.observe(observation(tof=self.depth))
         self.surface = Rigid(MESH).deform(theta[None])
+        self.predicted = Prediction(self.surface, resampling=self.synthesizer.observe(observation(tof=self.depth)))
 
     def mosaic(self, pattern: np.ndarray) -> ChannelImage:
         image = ChannelImage(np.empty(self.colors.shape[:2], np.float32), pattern)
@@ -76,7 +76,7 @@ class Scene:
     def channel(self, noise: GaussianGrey | GaussianBayer, pattern: np.ndarray) -> ObservedChannel:
         looks = self.looks()[:, : int(pattern.max()) + 1]
         term = ChannelTerm("color", self.synthesizer, looks, noise, Passive(), BOUNDS)
-        return term.observe(self.mosaic(pattern), self.surface)
+        return term.observe(self.mosaic(pattern), self.predicted)
 
 
 def residuals(term: ObservedTerm, scene: Scene) -> np.ndarray:
@@ -98,13 +98,13 @@ def test_a_plane_is_found_where_it_is(kind, turn, shift):
     """
     scene = Scene(kind, np.array(turn + shift))
     depth = DepthTerm("tof", scene.synthesizer, len(MESH.vertices), DEPTH, BOUNDS)
-    depth = depth.observe(scene.depth, scene.surface)
+    depth = depth.observe(scene.depth, scene.predicted)
     residual, fit = residuals(depth, scene), depth.fit(scene.surface)
     assert len(residual) > 0.9 * fit.visible > 100
     steepest = 1.7e-3 * np.sqrt(2) * np.tan(0.25 * np.sqrt(3) + 0.27)  # half a pixel diagonal on an inclined plane
     assert np.abs(residual).max() * DEPTH.sigma < 1.5 * steepest + 1e-5
     color = ColorTerm("color", scene.synthesizer, scene.looks(), GaussianColor(LEVELS), BOUNDS)
-    color = color.observe(ColorImage(np.rint(scene.colors).astype(np.uint8)), scene.surface)
+    color = color.observe(ColorImage(np.rint(scene.colors).astype(np.uint8)), scene.predicted)
     assert color.fit(scene.surface).samples > 100
     bayer = scene.channel(GaussianBayer(LEVELS), BAYER_ORDERS["gbrg"])
     for term in (color, bayer):

@@ -95,8 +95,8 @@ def position_colors(camera: Camera, distance: np.ndarray) -> np.ndarray:
 def test_colours_are_those_of_the_points_that_the_depth_sensor_sees():
     rig = warped_rig()
     color, synthesis = rig.sensors["color"].camera, warped.Settings().build(rig, sheet())
-    synthesis.observe(observation(tof=depth_image(plane_distance(CAMERA, NORMAL, 1.0))))
-    image = synthesis.image("color", position_colors(color, plane_distance(color, NORMAL, 1.0)))
+    seen = synthesis.observe(observation(tof=depth_image(plane_distance(CAMERA, NORMAL, 1.0))))
+    image = seen.image("color", position_colors(color, plane_distance(color, NORMAL, 1.0)))
     view = synthesis.view("color", np.zeros((117, 3), np.float32))
     expected = position_colors(view.camera, plane_distance(view.camera, NORMAL, 1.0))
     known = np.isfinite(image[..., 0])
@@ -114,8 +114,8 @@ def test_colours_of_what_is_hidden_from_the_other_camera_are_unknown():
         on_board = np.all(np.abs(camera.unproject(board)[..., :2]) < 0.04, axis=-1)
         return np.where(on_board, board, wall)
 
-    synthesis.observe(observation(tof=depth_image(with_board(CAMERA))))
-    image = synthesis.image("color", position_colors(color, with_board(color)))
+    seen = synthesis.observe(observation(tof=depth_image(with_board(CAMERA))))
+    image = seen.image("color", position_colors(color, with_board(color)))
     camera = synthesis.view("color", np.zeros((117, 3), np.float32)).camera
     expected = position_colors(camera, with_board(camera))
     known = np.isfinite(image[..., 0])
@@ -126,9 +126,8 @@ def test_colours_of_what_is_hidden_from_the_other_camera_are_unknown():
 
 
 def test_without_distances_no_colour_is_known():
-    synthesis = warped.Settings().build(warped_rig(), sheet())
-    synthesis.observe(observation())
-    assert np.isnan(synthesis.image("color", np.full((120, 160, 3), 9.0, np.float32))).all()
+    seen = warped.Settings().build(warped_rig(), sheet()).observe(observation())
+    assert np.isnan(seen.image("color", np.full((120, 160, 3), 9.0, np.float32))).all()
 
 
 @pytest.mark.parametrize("sensor", ["color", "thermal"])

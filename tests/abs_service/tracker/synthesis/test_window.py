@@ -16,7 +16,7 @@ from abs_service.tracker.posterior.priors.settings import Settings
 from abs_service.tracker.synthesis.projection import Projection
 from abs_service.tracker.synthesis.rasterization.raster import Raster
 from abs_service.tracker.synthesis.window import WHOLE, Bordered, Placed, around
-from abs_service.tracker.terms.base import NO_OCCLUDERS, Bounds
+from abs_service.tracker.terms.base import NO_OCCLUDERS, Bounds, Prediction
 from abs_service.tracker.terms.depth.depth import DepthTerm
 from abs_service.tracker.terms.depth.outline.rim import Rim
 from abs_service.tracker.terms.depth.outline.rim_outline import RimOutline
@@ -75,8 +75,8 @@ def test_a_surface_beside_the_image_has_a_window_and_a_cost(down):
     window = around(WIDE, Projection(WIDE), away, 0.0)
     assert scene()[window].size > 0
     term = depth_term(outline=True)
-    term.observe(depth_image(scene()), moved(0, 0, 0), REACH_M)
-    assert np.isfinite(term.observe(depth_image(scene()), away, 0.0).cost(away)).all()
+    term.observe(depth_image(scene()), Prediction(moved(0, 0, 0), REACH_M))
+    assert np.isfinite(term.observe(depth_image(scene()), Prediction(away, 0.0)).cost(away)).all()
 
 
 @settings(max_examples=60, deadline=None)
@@ -104,7 +104,7 @@ def test_within_reach_depth_costs_the_same_as_in_the_whole_image(outline):
     for x in (0.0, 0.02, -0.03):  # memory reused between frames must have no effect
         predicted = moved(x + 0.004, 0.002, 0)
         image = depth_image(scene(x))
-        whole, window = (term.observe(image, predicted, by) for term, by in zip(terms, (np.inf, REACH_M)))
+        whole, window = (term.observe(image, Prediction(predicted, by)) for term, by in zip(terms, (np.inf, REACH_M)))
         for step in np.random.default_rng(1).uniform(-0.02, 0.02, (20, 3)):
             surface = moved(x + step[0], step[1], 0.3 * step[2])
             np.testing.assert_array_equal(window.cost(surface), whole.cost(surface))
@@ -119,7 +119,8 @@ def test_within_reach_colours_cost_the_same_as_in_the_whole_image():
         picture = ColorImage(np.random.default_rng(seed).integers(0, 255, (120, 200, 3)).astype(np.uint8))
         for hidden_by in (NO_OCCLUDERS, occluder):
             seen = [
-                term.observe(picture, moved(x, 0, 0), reach, hidden_by) for term, reach in zip(terms, (np.inf, REACH_M))
+                term.observe(picture, Prediction(moved(x, 0, 0), reach, hidden_by))
+                for term, reach in zip(terms, (np.inf, REACH_M))
             ]
             for step in np.random.default_rng(1).uniform(-0.02, 0.02, (20, 3)):
                 surface = moved(x + step[0], step[1], 0.3 * step[2])
@@ -137,7 +138,7 @@ def test_within_reach_a_mosaic_costs_the_same_as_in_the_whole_image(order):
         image, predicted = ChannelImage(values, pattern), moved(x, 0, 0)
         for hidden_by in (NO_OCCLUDERS, occluder):
             whole, window = (
-                term.observe(image, predicted, by, hidden_by) for term, by in zip(terms, (np.inf, REACH_M))
+                term.observe(image, Prediction(predicted, by, hidden_by)) for term, by in zip(terms, (np.inf, REACH_M))
             )
             for step in np.random.default_rng(1).uniform(-0.02, 0.02, (20, 3)):
                 surface = moved(x + step[0], step[1], 0.3 * step[2])
@@ -153,15 +154,15 @@ def test_within_reach_a_mosaic_costs_the_same_as_in_the_whole_image(order):
 def test_beyond_the_window_nothing_is_explained():
     """Otherwise a search could escape from a bad fit into unprepared pixels."""
     depth = depth_term()
-    depth.observe(depth_image(scene()), moved(0, 0, 0))  # the first image is seen as a whole
-    seen = depth.observe(depth_image(scene(0.2)), moved(-0.15, 0, 0), 0.01)
+    depth.observe(depth_image(scene()), Prediction(moved(0, 0, 0)))  # the first image is seen as a whole
+    seen = depth.observe(depth_image(scene(0.2)), Prediction(moved(-0.15, 0, 0), 0.01))
     assert seen.cost(moved(0.25, 0, 0))[0] == pytest.approx(len(MESH.vertices) * BOUNDS.outlier, rel=1e-5)
     color = ColorTerm("color", sparse(WIDE, MESH), MESH.colors, GaussianColor(), BOUNDS)
-    color = color.observe(ColorImage(np.full((120, 200, 3), 90, np.uint8)), moved(-0.15, 0, 0), 0.01)
+    color = color.observe(ColorImage(np.full((120, 200, 3), 90, np.uint8)), Prediction(moved(-0.15, 0, 0), 0.01))
     assert color.cost(moved(0.25, 0, 0))[0] == pytest.approx(len(MESH.vertices) * BOUNDS.outlier, rel=1e-5)
     bayer = ChannelTerm("color", sparse(WIDE, MESH), MESH.colors, GaussianBayer(), Passive(), BOUNDS)
     bayer = bayer.observe(
-        ChannelImage(np.full((120, 200), 90, np.float32), BAYER_ORDERS["rggb"]), moved(-0.15, 0, 0), 0.01
+        ChannelImage(np.full((120, 200), 90, np.float32), BAYER_ORDERS["rggb"]), Prediction(moved(-0.15, 0, 0), 0.01)
     )
     assert bayer.cost(moved(0.25, 0, 0))[0] == pytest.approx(len(MESH.vertices) * BOUNDS.outlier, rel=1e-5)
 

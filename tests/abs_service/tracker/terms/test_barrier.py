@@ -12,7 +12,7 @@ from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.objectives import euclidean, likelihood
 from abs_service.tracker.terms.barrier import BarrierTerm
-from abs_service.tracker.terms.base import Bounds
+from abs_service.tracker.terms.base import Bounds, Prediction
 from calib import pose
 from calib.camera import Camera
 from calib.noise.images.binary import LightBarrier
@@ -38,7 +38,7 @@ def term(camera: Camera, faces: np.ndarray, noise: LightBarrier = NOISE, bounds:
 
 def crossing(barrier: BarrierTerm, surface: Surface) -> list[bool]:
     """True for each mesh that crosses the beam, from the cost of an interruption: 0.02 for a miss, 0.1 for an alarm."""
-    return (barrier.observe(BeamReading(True), surface).cost(surface) < 1).tolist()
+    return (barrier.observe(BeamReading(True), Prediction(surface)).cost(surface) < 1).tolist()
 
 
 @given(seeds)
@@ -114,7 +114,7 @@ def test_it_is_one_sample_that_agrees_or_not_and_has_no_slope():
     barrier = term(head(np.zeros(3), np.array([0.0, 0.0, 1.0])), MESH.faces)
     surface = Rigid(MESH).deform(np.array([[0, 0, 0, 0, 0, -0.5]]))
     for interrupted in (True, False):
-        seen = barrier.observe(BeamReading(interrupted), surface)
+        seen = barrier.observe(BeamReading(interrupted), Prediction(surface))
         fit = seen.fit(surface)
         assert (fit.visible, fit.occluded, fit.samples, fit.inliers) == (1, 0, 1, int(interrupted))
         assert fit.mean_log_likelihood == pytest.approx(-NOISE.cost(interrupted)[1])
@@ -128,7 +128,7 @@ def test_an_image_is_no_reading():
     barrier = term(head(np.zeros(3), np.array([0.0, 0.0, 1.0])), MESH.faces)
     surface = as_surface((MESH.vertices, MESH.normals))
     with pytest.raises(TypeError, match="sensor barrier has noise of a light barrier but delivered DepthImage"):
-        barrier.observe(depth_image(np.ones((1, 1))), surface)
+        barrier.observe(depth_image(np.ones((1, 1))), Prediction(surface))
 
 
 def test_readings_do_not_depend_on_the_rest_of_the_population():

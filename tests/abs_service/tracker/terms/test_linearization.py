@@ -17,7 +17,7 @@ from abs_service.tracker.posterior.priors.change_metric import ChangeMetric
 from abs_service.tracker.posterior.priors.motion_prior import MotionPrior
 from abs_service.tracker.posterior.priors.settings import Settings as PriorSettings
 from abs_service.tracker.posterior.priors.stretch_prior import StretchPrior
-from abs_service.tracker.terms.base import Bounds
+from abs_service.tracker.terms.base import Bounds, Prediction
 from abs_service.tracker.terms.depth.depth import DepthTerm
 from abs_service.tracker.terms.depth.observed_depth import ObservedDepth
 from abs_service.tracker.terms.gradients import depth_rows
@@ -38,7 +38,9 @@ BOUNDS = Bounds(0.05, 1.6, 4.6)
 
 def depth_term() -> ObservedDepth:
     term = DepthTerm("tof", sparse(FINE, MESH), len(MESH.vertices), GaussianPolynomial(((SIGMA,),)), BOUNDS)
-    return term.observe(depth_image(plane_distance(FINE, NORMAL, 1.0)), as_surface((MESH.vertices, MESH.normals)))
+    return term.observe(
+        depth_image(plane_distance(FINE, NORMAL, 1.0)), Prediction(as_surface((MESH.vertices, MESH.normals)))
+    )
 
 
 def test_depth_rows_predict_what_the_plane_s_residuals_do():
@@ -149,7 +151,7 @@ def test_only_inliers_and_what_is_in_free_space_are_linearized():
     distance[around & (np.arange(640) < 320)] = np.nan  # a hole in the object, not a background without return
     distance[:240] += 1
     term = DepthTerm("tof", sparse(FINE, mesh), len(mesh.vertices), GaussianPolynomial(((SIGMA,),)), BOUNDS)
-    term = term.observe(depth_image(distance), surface)
+    term = term.observe(depth_image(distance), Prediction(surface))
     linear = stack(term.linearize(surface, SparseJacobian.from_dense(np.zeros((len(mesh.vertices), 3, 2)))), 2)
     pixels = FINE.project(mesh.vertices) + 0.5
     inliers = np.count_nonzero((pixels[:, 0] >= 320) & (pixels[:, 1] >= 240))

@@ -9,7 +9,7 @@ import pytest
 from abs_service.pairing.images import ColorImage
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import Surface
-from abs_service.tracker.terms.base import Bounds
+from abs_service.tracker.terms.base import Bounds, Prediction
 from abs_service.tracker.terms.depth.continuation import CoarseContinuation
 from abs_service.tracker.terms.depth.depth import DepthTerm
 from abs_service.tracker.terms.photometric.color import ColorTerm
@@ -41,7 +41,7 @@ def moved(x: float = 0.0, mesh: Mesh = MESH) -> Surface:
 
 def fit(distance: np.ndarray, surface: Surface, mesh: Mesh = MESH, camera: Camera = CAMERA) -> SensorFit:
     term = DepthTerm("tof", sparse(camera, mesh), len(mesh.vertices), Constant(SIGMA), Bounds(0.05, 1.6, 4.6))
-    term = term.observe(depth_image(distance), surface)
+    term = term.observe(depth_image(distance), Prediction(surface))
     return term.fit(surface)
 
 
@@ -111,7 +111,7 @@ def test_a_colour_camera_has_the_same_classes():
     colors = np.zeros_like(MESH.colors)
     colors[:40], colors[40:60] = 200.0, np.nan
     term = ColorTerm("color", sparse(CAMERA, MESH), colors, GaussianColor(), Bounds(0.05, 16, 19))
-    term = term.observe(image, moved())
+    term = term.observe(image, Prediction(moved()))
     found = term.fit(moved()).counts
     unknown = len(MESH.vertices) - 60
     assert found == VertexCounts(facing=len(MESH.vertices), agreeing=unknown, disagreeing=40)

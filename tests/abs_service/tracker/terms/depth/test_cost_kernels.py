@@ -7,7 +7,7 @@ from hypothesis import given
 from abs_service.pairing.images import ColorImage
 from abs_service.tracker.objectives import euclidean, likelihood
 from abs_service.tracker.posterior.priors.stretch_prior import StretchPrior
-from abs_service.tracker.terms.base import Bounds
+from abs_service.tracker.terms.base import Bounds, Prediction
 from abs_service.tracker.terms.depth.depth import DepthTerm
 from abs_service.tracker.terms.depth.depth_cost import FREE_SCALE_M, ConstantCosts, depth_cost, write_constants
 from abs_service.tracker.terms.depth.texels import missing_texel
@@ -52,7 +52,7 @@ def test_the_depth_cost_is_the_likelihood(seed):
     image[generator.uniform(size=image.shape) < 0.1] = np.nan
     amplitude = generator.uniform(500, 9000, image.shape).astype(np.float32)
     term = DepthTerm("tof", sparse(CAMERA), len(vertices), NOISE, bounds())
-    term = term.observe(type(depth_image(image))(image, amplitude), in_sight(CAMERA, len(vertices)))
+    term = term.observe(type(depth_image(image))(image, amplitude), Prediction(in_sight(CAMERA, len(vertices))))
     expected = reference.depth_cost(
         CAMERA, NOISE, image, amplitude, vertices.astype(float), normals.astype(float), SHARE, RANGE_M
     )
@@ -67,7 +67,7 @@ def test_what_one_measurement_costs(distance, expected):
     sigma = 2e-3
     camera = Camera(8, 6, 10.0, 10.0, 4.0, 3.0)  # the vertex is where a pixel's centre looks
     term = DepthTerm("tof", sparse(camera), 1, GaussianPolynomial(((sigma,),)), bounds())
-    term = term.observe(depth_image(np.full((6, 8), distance)), in_sight(camera, 1))
+    term = term.observe(depth_image(np.full((6, 8), distance)), Prediction(in_sight(camera, 1)))
     cost = term.cost(as_surface((np.array([[0, 0, 1.0]]), np.array([[0, 0, -1.0]]))))[0]
     density = {
         "uniform": (1 - SHARE) / RANGE_M,
@@ -205,9 +205,9 @@ def test_costs_do_not_depend_on_the_rest_of_the_population():
     mesh = sheet()
     predicted = as_surface((mesh.vertices, mesh.normals))
     term = DepthTerm("tof", sparse(CAMERA, mesh), len(mesh.vertices), NOISE, bounds())
-    term = term.observe(depth_image(np.full((CAMERA.height, CAMERA.width), 1.0)), predicted)
+    term = term.observe(depth_image(np.full((CAMERA.height, CAMERA.width), 1.0)), Prediction(predicted))
     color = ColorTerm("color", sparse(CAMERA, mesh), mesh.colors, GaussianColor(), bounds())
-    color = color.observe(ColorImage(np.full((CAMERA.height, CAMERA.width, 3), 90, np.uint8)), predicted)
+    color = color.observe(ColorImage(np.full((CAMERA.height, CAMERA.width, 3), 90, np.uint8)), Prediction(predicted))
     generator = np.random.default_rng(3)
     population = [(mesh.vertices + generator.normal(0, 5e-3, 3), mesh.normals) for _ in range(4)]
     for part in (term, color):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from abs_service.tracker.terms.base import Bounds
+from abs_service.tracker.terms.base import Bounds, Prediction
 from abs_service.tracker.terms.depth.depth import DepthTerm
 from abs_service.tracker.terms.depth.fluctuation import FEWEST, MIN_VERTICES, Fluctuation
 from calib.camera import Camera
@@ -67,7 +67,7 @@ def test_what_is_learnt_of_a_frame_counts_from_the_next_one_on():
     surface = as_surface((vertices, np.tile([0.0, 0.0, -1.0], (len(vertices), 1))))
     term, scales = DepthTerm("tof", sparse(camera), len(vertices), Constant(DEVIATION), Bounds(0.05, 1.6, 4.6)), []
     for _ in range(FEWEST + 2):
-        frame = term.observe(depth_image(1 + generator.normal(0, 4 * DEVIATION, (120, 160))), surface)
+        frame = term.observe(depth_image(1 + generator.normal(0, 4 * DEVIATION, (120, 160))), Prediction(surface))
         before = frame.fit(surface).normalized_residual
         frame.learn(surface)
         assert frame.fit(surface).normalized_residual == before

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from abs_service.tracker.detection.dropouts import AREA_PX, dropouts
 from abs_service.tracker.synthesis import dense
-from abs_service.tracker.terms.base import Bounds
+from abs_service.tracker.terms.base import Bounds, Prediction
 from abs_service.tracker.terms.depth.classification.outline_distance import inwards
 from abs_service.tracker.terms.depth.classification.visibility import classify, surfaces_of
 from abs_service.tracker.terms.depth.depth import DepthTerm
@@ -44,7 +44,7 @@ def cost_without(law: NoReturn, vertex: int) -> float:
     lost[row, column] = np.nan
     costs = []
     for distance in (whole, lost):
-        costs.append(term(law).observe(depth_image(distance), SURFACE).cost(SURFACE)[0])
+        costs.append(term(law).observe(depth_image(distance), Prediction(SURFACE)).cost(SURFACE)[0])
     return float(costs[1] - costs[0])
 
 
@@ -72,7 +72,7 @@ def test_dense_synthesis_weighs_missing_returns_too():
     for law in (NoReturn(0.02), NoReturn(0.2)):
         bounds = Bounds(INLIER, UNIFORM, OUTLIER, law)
         seen = DepthTerm("tof", synthesizer, len(MESH.vertices), Constant(SIGMA), bounds)
-        costs.append(seen.observe(depth_image(lost), SURFACE).cost(SURFACE)[0])
+        costs.append(seen.observe(depth_image(lost), Prediction(SURFACE)).cost(SURFACE)[0])
     expected = synthesizer.view("tof", np.zeros((len(MESH.vertices), 0), np.float32)).render(SURFACE)
     inside = np.isfinite(expected) & np.isnan(lost)
     assert costs[0] - costs[1] == pytest.approx(inside.sum() * np.log((0.98 / 0.02) / (0.8 / 0.2)), rel=0.02)

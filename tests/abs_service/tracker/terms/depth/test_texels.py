@@ -5,10 +5,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from abs_service.pairing.images import DepthImage
+from abs_service.tracker.synthesis.base import AS_MEASURED
 from abs_service.tracker.synthesis.window import Bordered
 from abs_service.tracker.terms.depth.texels import TexelsOnDemand, Unusable, WholeTexels
 from calib.noise.tof_amplitude import TofAmplitude
-from tests.abs_service.tracker.scenes import CAMERA, sparse
 
 NOISE = TofAmplitude(sigma=(1e-3, 2e-3), sigma_amplitude=0.5, mu=(3e-3,), mu_amplitude=0.4)
 BORDER, BEYOND = (np.eye(8)[6].astype(np.float32) * cost for cost in (1.6, 4.5))
@@ -26,13 +26,13 @@ def drawn(generator: np.random.Generator) -> DepthImage:
 @given(st.integers(0, 2**32 - 1))
 def test_single_candidates_and_populations_read_what_the_whole_texture_holds(seed):
     generator = np.random.default_rng(seed)
-    whole = WholeTexels("tof", sparse(CAMERA), NOISE, Bordered(BORDER, BEYOND))
+    whole = WholeTexels("tof", NOISE, Bordered(BORDER, BEYOND))
     on_demand = TexelsOnDemand(NOISE, Bordered(BORDER, BEYOND))
     for _ in range(3):  # of the frame before, nothing is left
         image, (top, left), scale = drawn(generator), generator.integers(0, 8, 2), generator.uniform(1, 3)
         window = slice(top, top + generator.integers(1, 6)), slice(left, left + generator.integers(1, 8))
-        distance = whole.observe(image, window, scale)
-        np.testing.assert_array_equal(on_demand.observe(image, window, scale), distance)
+        distance = whole.observe(image, window, scale, AS_MEASURED)
+        np.testing.assert_array_equal(on_demand.observe(image, window, scale, AS_MEASURED), distance)
         known, chance = np.isfinite(distance), generator.random(distance.shape)
         free_m = np.where(chance < 0.2, chance, 0).astype(np.float32)
         unusable = Unusable((chance > 0.2) & (chance < 0.4), free_m, known & (chance > 0.4))

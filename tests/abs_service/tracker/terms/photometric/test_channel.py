@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from abs_service.pairing.images import BAYER_ORDERS, ONE_CHANNEL, ChannelImage, ColorImage
 from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.objectives import euclidean, likelihood
+from abs_service.tracker.terms.base import Prediction
 from abs_service.tracker.terms.photometric.channel import ChannelTerm
 from abs_service.tracker.terms.photometric.channel_cost import copy, fill
 from abs_service.tracker.terms.photometric.exposure import gains
@@ -67,7 +68,7 @@ def test_the_cost_is_the_likelihood(name, seed):
     hands = CAMERA.center + 0.5 * (vertices[vertices[:, 2] > 0][:3] - CAMERA.center)
     covered = occluded_pixels(CAMERA, hands)
     image.values[~covered & (generator.random(SHAPE) < 0.1)] = np.nan
-    made = made.observe(image, in_sight(CAMERA, len(vertices)), occluders=hands)
+    made = made.observe(image, Prediction(in_sight(CAMERA, len(vertices)), occluders=hands))
     expected = reference.channel_cost(
         *(CAMERA, noise, image.values, image.channel, covered),
         *(looks * shine[:, None], vertices.astype(float), normals.astype(float), SHARE),
@@ -117,7 +118,7 @@ def test_costs_do_not_depend_on_the_rest_of_the_population(name):
     looks = generator.uniform(20, 235, (len(mesh.vertices), int(pattern.max()) + 1)).astype(np.float32)
     made = term(noise, looks)
     image = ChannelImage(generator.uniform(0, 255, SHAPE).astype(np.float32), pattern)
-    made = made.observe(image, as_surface((mesh.vertices, mesh.normals)))
+    made = made.observe(image, Prediction(as_surface((mesh.vertices, mesh.normals))))
     surface = Rigid(mesh).deform(generator.normal(0, 0.02, (4, 6)))
     alone = [made.cost(as_surface((v.T, n.T)))[0] for v, n in zip(surface.vertices, surface.normals)]
     np.testing.assert_array_equal(made.cost(surface), alone)
@@ -126,7 +127,7 @@ def test_costs_do_not_depend_on_the_rest_of_the_population(name):
 def test_a_colour_image_is_not_one_number_per_pixel():
     made = term(GaussianGrey(), np.ones((4, 1), np.float32))
     with pytest.raises(TypeError, match="sensor color has noise of one channel but delivered ColorImage"):
-        made.observe(ColorImage(np.zeros((*SHAPE, 3), np.uint8)), in_sight(CAMERA, 4))
+        made.observe(ColorImage(np.zeros((*SHAPE, 3), np.uint8)), Prediction(in_sight(CAMERA, 4)))
 
 
 @settings(max_examples=20)

@@ -8,6 +8,7 @@ from abs_service.pairing.images import BAYER_ORDERS, ChannelImage, ColorImage
 from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.objectives import likelihood
 from abs_service.tracker.synthesis.sparse import Sparse
+from abs_service.tracker.terms.base import Prediction
 from abs_service.tracker.terms.gradients import color_rows
 from abs_service.tracker.terms.photometric.channel import ChannelTerm
 from abs_service.tracker.terms.photometric.color import ColorTerm
@@ -42,7 +43,7 @@ def test_color_rows_predict_what_a_ramp_s_residuals_do():
     noise = GaussianColor(10.0)
     bounds = LIKELIHOOD.bounds(seen_by(noise))
     term = ColorTerm("color", sparse(COLOR, mesh), colors.astype(np.float32), noise, bounds)
-    term = term.observe(ColorImage(ramp()), as_surface((mesh.vertices, mesh.normals)))
+    term = term.observe(ColorImage(ramp()), Prediction(as_surface((mesh.vertices, mesh.normals))))
     (linear,) = term.linearize(model.deform(model.rest[None]), model.sparse_jacobian(model.rest))
     np.testing.assert_allclose(linear.residual, 0, atol=1e-6)
     for parameter, step in [(3, 0.02), (4, -0.02), (5, 0.1), (2, 0.15)]:
@@ -88,10 +89,12 @@ def test_mosaic_rows_are_exact_within_a_pixel_whatever_the_picture(seed, order):
     looks = generator.uniform(100, 150, (len(synthesizer.canvas.vertices), 3)).astype(np.float32)
     noise = GaussianBayer(50.0)
     term = ChannelTerm("bayer", synthesizer, looks, noise, Passive(), LIKELIHOOD.bounds(seen_by(noise)))
-    view = synthesizer.view("bayer", looks)
+    view = synthesizer.view("bayer", looks).observe(model.deform(model.rest[None]))
     level, right, down = generator.uniform((100, -0.1, -0.1), (150, 0.1, 0.1))
     picture = level + right * np.arange(COLOR.width) + down * np.arange(COLOR.height)[:, None]
-    term = term.observe(ChannelImage(picture.astype(np.float32), BAYER_ORDERS[order]), model.deform(model.rest[None]))
+    term = term.observe(
+        ChannelImage(picture.astype(np.float32), BAYER_ORDERS[order]), Prediction(model.deform(model.rest[None]))
+    )
     (linear,) = term.linearize(model.deform(model.rest[None]), model.sparse_jacobian(model.rest))
     assert len(linear.residual) == len(mesh.vertices)
     for step in np.diag([1e-4, 1e-4, 1e-4, 2e-5, 2e-5, 1e-4]):
@@ -112,7 +115,7 @@ def test_colours_are_read_alike_whatever_the_order_of_their_bytes():
     for rgb in (ramp(), np.ascontiguousarray(ramp()[..., ::-1])[..., ::-1]):
         term = ColorTerm("color", sparse(COLOR, mesh), colors.astype(np.float32), noise, bounds)
         predicted = as_surface((mesh.vertices, mesh.normals))
-        _, second = (term.observe(ColorImage(rgb), predicted, 0.02) for _ in range(2))  # memory is reused
+        _, second = (term.observe(ColorImage(rgb), Prediction(predicted, 0.02)) for _ in range(2))  # memory is reused
         found += second.linearize(model.deform(theta[None]), model.sparse_jacobian(theta))
     np.testing.assert_array_equal(found[0].residual, found[1].residual)
     np.testing.assert_array_equal(found[0].jacobian, found[1].jacobian)

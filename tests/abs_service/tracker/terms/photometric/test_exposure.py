@@ -5,6 +5,7 @@ import pytest
 
 from abs_service.pairing.images import BAYER_ORDERS, ONE_CHANNEL, ChannelImage
 from abs_service.tracker.objectives import likelihood
+from abs_service.tracker.terms.base import Prediction
 from abs_service.tracker.terms.photometric.channel import ChannelTerm
 from abs_service.tracker.terms.photometric.exposure import gains
 from abs_service.tracker.terms.photometric.illumination import Exposed, Passive
@@ -76,7 +77,7 @@ def test_a_darker_image_of_one_value_per_pixel_costs_no_more_where_exposure_adap
             pixel = reference.seen_pixel(CAMERA, vertex, normal)
             if pixel is not None:
                 image.values[pixel] = exposure * look[image.channel[pixel]]
-        term = term.observe(image, surface)
+        term = term.observe(image, Prediction(surface))
         costs.append(float(term.cost(surface)[0]))
     assert (costs[1] > costs[0] + 100) == remains
     assert remains or costs[1] == pytest.approx(costs[0], abs=1.0)

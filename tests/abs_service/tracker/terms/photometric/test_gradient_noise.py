@@ -9,6 +9,7 @@ from abs_service.pairing.images import BAYER_ORDERS, ONE_CHANNEL, ChannelImage
 from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.objectives import likelihood
 from abs_service.tracker.synthesis.sparse import Sparse
+from abs_service.tracker.terms.base import Prediction
 from abs_service.tracker.terms.gradients import channel_gradients, color_rows, noiseless_color_rows
 from abs_service.tracker.terms.image_noise import NORMAL_MEDIAN, noise_deviation
 from abs_service.tracker.terms.linearization import PointLinearization
@@ -102,7 +103,7 @@ def held(print_levels: float, noise: float) -> float:
     looks = at_vertices(first, CAMERA, synthesizer.canvas).astype(np.float32)
     bounds = likelihood.Settings().bounds(rig.sensors[name])
     term, surface = ChannelTerm(name, synthesizer, looks, sensor, Passive(), bounds), model.deform(model.rest[None])
-    term = term.observe(now, surface)
+    term = term.observe(now, Prediction(surface))
     (linear,) = term.linearize(surface, model.sparse_jacobian(model.rest))
     assert isinstance(linear, PointLinearization)
     assert len(linear.residual) > 0.9 * len(model.mesh.vertices)

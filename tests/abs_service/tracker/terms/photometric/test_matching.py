@@ -9,7 +9,7 @@ from abs_service.pairing.images import ChannelImage, ColorImage, Image
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.objectives import likelihood
-from abs_service.tracker.terms.base import Term
+from abs_service.tracker.terms.base import Prediction, Term
 from abs_service.tracker.terms.linearization import PointLinearization
 from abs_service.tracker.terms.patches import MOST, SIGMA_PX, SIZE, is_beside, patches_of
 from abs_service.tracker.terms.photometric.channel import ChannelTerm
@@ -52,7 +52,7 @@ def grey(picture: Print, mesh: Mesh) -> tuple[Term, Image]:
 
 def matched(term: Term, image: Image, mesh: Mesh = MESH) -> PointLinearization:
     model = Rigid(mesh)
-    seen = term.observe(image, as_surface((mesh.vertices, mesh.normals)))
+    seen = term.observe(image, Prediction(as_surface((mesh.vertices, mesh.normals))))
     return seen.match(model.deform(model.rest[None]), model.sparse_jacobian(model.rest), patches_of(mesh))
 
 
@@ -101,7 +101,7 @@ def test_a_print_that_is_gone_or_outside_the_image_is_found_nowhere():
     beside.vertices[:, 0] += 0.3
     term, image = color(random_print(), MESH)
     model = Rigid(beside)
-    term = term.observe(image, as_surface((beside.vertices, beside.normals)))
+    term = term.observe(image, Prediction(as_surface((beside.vertices, beside.normals))))
     places = term.match(model.deform(model.rest[None]), model.sparse_jacobian(model.rest), patches_of(beside))
     assert not is_beside([places])
 

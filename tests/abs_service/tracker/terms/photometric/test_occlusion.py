@@ -6,7 +6,7 @@ import pytest
 from abs_service.pairing.images import ColorImage
 from abs_service.tracker.objectives import likelihood
 from abs_service.tracker.synthesis.sparse import Sparse
-from abs_service.tracker.terms.base import Bounds
+from abs_service.tracker.terms.base import Bounds, Prediction
 from abs_service.tracker.terms.photometric.color import ColorTerm
 from abs_service.tracker.terms.photometric.occlusion import occluded_pixels
 from calib import pose
@@ -26,9 +26,9 @@ def test_an_occluder_that_a_depth_sensor_sees_hides_colours_from_another_camera(
     term = ColorTerm("color", sparse(camera, MESH), MESH.colors, GaussianColor(), Bounds(0.05, 16, 19))
     black = ColorImage(np.zeros((120, 160, 3), np.uint8))
     surface = as_surface((MESH.vertices, MESH.normals))
-    uncovered = term.observe(black, surface)
+    uncovered = term.observe(black, Prediction(surface))
     before, cost = uncovered.fit(surface), uncovered.cost(surface)[0]
-    covered = term.observe(black, surface, occluders=points)
+    covered = term.observe(black, Prediction(surface, occluders=points))
     after = covered.fit(surface)
     assert before.occluded == 0
     low, high = camera.project(points).min(axis=0), camera.project(points).max(axis=0)

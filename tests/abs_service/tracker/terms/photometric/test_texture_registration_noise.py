@@ -9,10 +9,9 @@ from hypothesis import strategies as st
 
 from abs_service.pairing.images import BAYER_ORDERS, ChannelImage, ColorImage
 from abs_service.tracker.models import rigid
-from abs_service.tracker.models.base import Surface
 from abs_service.tracker.objectives import likelihood
 from abs_service.tracker.synthesis import dense
-from abs_service.tracker.synthesis.base import View
+from abs_service.tracker.terms.base import Prediction
 from abs_service.tracker.terms.photometric.channel import ChannelTerm
 from abs_service.tracker.terms.photometric.color import ColorTerm
 from abs_service.tracker.terms.photometric.illumination import Passive
@@ -41,7 +40,7 @@ class Given(TextureRegistrationNoise):
 
     factor: np.ndarray
 
-    def widening(self, view: View, predicted: Surface, deviation: np.ndarray) -> Widening:
+    def widening(self, gradients: np.ndarray, deviation: np.ndarray) -> Widening:
         return Widening(self.factor, np.log(self.factor))
 
 
@@ -64,7 +63,7 @@ def test_the_color_cost_is_the_likelihood_of_widened_noise(seed):
     factor, misplaced = given_widening(generator, len(vertices))
     bounds = likelihood.Settings(SHARE).bounds(Sensor("color", CAMERA, GaussianColor(SIGMA)))
     term = ColorTerm("color", sparse(CAMERA), colors, GaussianColor(SIGMA), bounds, misplaced)
-    term = term.observe(ColorImage(image), in_sight(CAMERA, len(vertices)))
+    term = term.observe(ColorImage(image), Prediction(in_sight(CAMERA, len(vertices))))
     points = vertices.astype(float), normals.astype(float)
     expected = reference.color_cost(CAMERA, SIGMA * factor, image, colors.astype(float), *points, SHARE)
     assert term.cost(as_surface((vertices, normals)))[0] == pytest.approx(expected, rel=1e-5)
@@ -85,7 +84,7 @@ def test_the_channel_cost_is_the_likelihood_of_widened_noise(seed, order):
     noise = GaussianBayer(SIGMA)
     bounds = likelihood.Settings(SHARE).bounds(Sensor("color", CAMERA, noise))
     term = ChannelTerm("color", sparse(CAMERA), looks, noise, Passive(), bounds, misplaced)
-    term = term.observe(image, in_sight(CAMERA, len(vertices)))
+    term = term.observe(image, Prediction(in_sight(CAMERA, len(vertices))))
     expected = reference.channel_cost(
         *(CAMERA, noise, image.values, image.channel, np.zeros(SHAPE, bool)),
         *(looks, vertices.astype(float), normals.astype(float), SHARE, factor),
@@ -102,8 +101,9 @@ def test_the_variance_grows_by_the_change_of_the_print_over_its_sigma():
     )
     view = synthesizer.view("color", np.ascontiguousarray(print_.T, np.float32))
     predicted = as_surface((mesh.vertices, mesh.normals))
-    view.look(predicted)
-    widening = TextureRegistrationNoise(0.3).widening(view, predicted, np.array([[SIGMA]]))
+    seen = view.observe(predicted)
+    gradients = seen.attribute_gradients(seen.synthesize(predicted))
+    widening = TextureRegistrationNoise(0.3).widening(gradients, np.array([[SIGMA]]))
     here, ahead, aside = (
         np.stack([reference.project(CAMERA, vertex.astype(float) + step) for vertex in mesh.vertices])
         for step in 1e-4 * np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]])
@@ -123,8 +123,9 @@ def test_where_every_candidate_has_samples_of_its_own_the_noise_is_the_sensor_s(
     synthesizer = dense.Settings().build(rig, mesh)
     view = synthesizer.view("color", np.ones((len(synthesizer.canvas.vertices), 3), np.float32))
     predicted = as_surface((mesh.vertices, mesh.normals))
-    view.look(predicted)
-    assert TextureRegistrationNoise(0.3).widening(view, predicted, np.ones((1, 1))) is NO_WIDENING
+    seen = view.observe(predicted)
+    gradients = seen.attribute_gradients(seen.synthesize(predicted))
+    assert TextureRegistrationNoise(0.3).widening(gradients, np.ones((1, 1))) is NO_WIDENING
 
 
 @pytest.mark.slow

@@ -52,9 +52,8 @@ def test_vertices_behind_the_mesh_s_own_surface_and_those_that_face_away_are_no_
     mesh = folded()
     view = SparseView(CAMERA, mesh.faces, mesh.colors)
     surface = as_surface((mesh.vertices, mesh.normals))
-    assert (view.synthesize(surface).pixel[0] >= 0).all()
-    view.look(surface)
-    pixel = view.synthesize(surface).pixel[0]
+    assert (view.unoccluded(surface).synthesize(surface).pixel[0] >= 0).all()
+    pixel = view.observe(surface).synthesize(surface).pixel[0]
     x, near = mesh.vertices[:, 0], mesh.vertices[:, 2] < 0.95
     covered = ~near & (x > -0.03) & (x < 0.03) & (np.abs(mesh.vertices[:, 1]) < 0.07)
     assert (pixel[covered] == -1).all()
@@ -65,12 +64,13 @@ def test_vertices_behind_the_mesh_s_own_surface_and_those_that_face_away_are_no_
 def test_what_is_hidden_stays_hidden_for_every_candidate_of_the_frame():
     mesh = folded()
     model, view = Rigid(mesh), SparseView(CAMERA, mesh.faces, mesh.colors)
-    view.look(model.deform(np.zeros((1, 6))))
+    front = view.observe(model.deform(np.zeros((1, 6))))
     candidates = np.random.default_rng(1).normal(0, 0.02, (5, 6))
-    pixel = view.synthesize(model.deform(candidates)).pixel
+    pixel = front.synthesize(model.deform(candidates)).pixel
     assert np.array_equal(pixel < 0, np.broadcast_to(pixel[0] < 0, pixel.shape))
-    view.look(model.deform(np.array([[np.pi, 0, 0, 0, 0, 0.0]])))
-    assert not np.array_equal(view.synthesize(model.deform(candidates)).pixel[0] < 0, pixel[0] < 0)
+    back = view.observe(model.deform(np.array([[np.pi, 0, 0, 0, 0, 0.0]])))
+    assert not np.array_equal(back.synthesize(model.deform(candidates)).pixel[0] < 0, pixel[0] < 0)
+    np.testing.assert_array_equal(front.synthesize(model.deform(candidates)).pixel, pixel)
 
 
 def test_an_open_sheet_hides_nothing_from_any_side():
@@ -78,6 +78,5 @@ def test_an_open_sheet_hides_nothing_from_any_side():
     surface = as_surface((mesh.vertices, mesh.normals))
     for x in np.linspace(-0.6, 0.6, 7):
         camera = Camera(64, 48, 150.0, 152.0, 31.2, 23.9, T_rs=pose.look_at([x, 0.1, 0.0], [0.0, 0.0, 1.0]))
-        view = SparseView(camera, mesh.faces, mesh.colors)
-        view.look(surface)
+        view = SparseView(camera, mesh.faces, mesh.colors).observe(surface)
         assert (view.synthesize(surface).pixel > 0).all()

@@ -10,7 +10,7 @@ from abs_service.tracker.models.base import Surface
 from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.synthesis.rasterization.raster import Raster
 from abs_service.tracker.synthesis.window import WHOLE
-from abs_service.tracker.terms.base import Bounds
+from abs_service.tracker.terms.base import Bounds, Prediction
 from abs_service.tracker.terms.depth.classification.background import MIN_PIXELS, Background
 from abs_service.tracker.terms.depth.classification.visibility import classify, surfaces_of, where
 from abs_service.tracker.terms.depth.depth import DepthTerm
@@ -130,7 +130,7 @@ def test_a_surface_that_moved_as_a_whole_is_still_the_object():
 def term_before(distance: np.ndarray) -> ObservedDepth:
     noise = GaussianPolynomial(((3e-3,),))
     term = DepthTerm("tof", sparse(STRAIGHT, MESH), len(MESH.vertices), noise, Bounds(0.05, 1.6, 4.6))
-    return term.observe(depth_image(distance), as_surface((MESH.vertices, MESH.normals)))
+    return term.observe(depth_image(distance), Prediction(as_surface((MESH.vertices, MESH.normals))))
 
 
 def moved(x: float) -> Surface:

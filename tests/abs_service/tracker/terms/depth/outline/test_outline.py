@@ -14,7 +14,7 @@ from abs_service.tracker.models.base import SparseJacobian
 from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.objectives import likelihood
 from abs_service.tracker.synthesis.projection import Optics
-from abs_service.tracker.terms.base import Bounds
+from abs_service.tracker.terms.base import Bounds, Prediction
 from abs_service.tracker.terms.depth.classification.outline_distance import inwards, outvoted
 from abs_service.tracker.terms.depth.classification.visibility import classify, surfaces_of
 from abs_service.tracker.terms.depth.outline.rim import Edges, Rim, look_up, read
@@ -211,7 +211,7 @@ def test_free_space_right_beside_the_outline_is_held_against_no_vertex(outline_p
     sensor = Sensor("tof", CAMERA, Constant(5e-3))
     comparison = Comparison(Bounds(0.05, 1.6, 4.6), outline_px=outline_px)
     term = measurement(sensor.noise).term(sensor, MESH, sparse(CAMERA, MESH), comparison)
-    term = term.observe(depth_image(picture(by=-2e-3)), moved(MESH, 0.0))
+    term = term.observe(depth_image(picture(by=-2e-3)), Prediction(moved(MESH, 0.0)))
     fit = term.fit(moved(MESH, 0.0))
     assert (fit.inliers == fit.visible) == (outline_px > 0)
     assert fit.occluded == 0
