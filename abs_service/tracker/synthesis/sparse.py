@@ -21,6 +21,7 @@ from abs_service.tracker.synthesis.projection import Optics, Projection
 from abs_service.tracker.synthesis.rasterization.raster import Raster
 from abs_service.tracker.synthesis.window import around
 from calib.camera import Camera
+from calib.jit import kernel
 from calib.rig import Rig
 
 #: Self-occlusion: a vertex is occluded if the rendered mesh is nearer to the camera by more than this [m].
@@ -106,12 +107,17 @@ class SparseView:
         self._hidden, self._seen = np.zeros(predicted.vertices.shape[2], np.bool_), {}
         self._gradients.look(predicted)
         seen = self._synthesize(predicted)
-        stride = self.camera.width + 2
-        row, column = np.divmod(seen.pixel[0], stride)
-        inside = seen.pixel[0] > 0
-        front = np.where(inside, self._front(predicted, (row - 1) * inside, (column - 1) * inside), np.float32(np.inf))
-        facing = np.einsum("in,in->n", predicted.normals[0], self._sight(predicted)) < 0
-        self._hidden = ~facing | (front < seen.distance[0] - HIDING_M)
+        pixel, hidden = seen.pixel[0], np.empty_like(self._hidden)
+        hide(
+            predicted.vertices[0],
+            predicted.normals[0],
+            self.camera.center,
+            self._front(predicted, pixel),
+            seen.distance[0],
+            pixel,
+            hidden,
+        )
+        self._hidden = hidden
 
     def synthesize(self, surface: Surface) -> Synthesis:
         """Synthesises a population of deformed meshes; occluded vertices are ignored.
@@ -167,11 +173,37 @@ class SparseView:
             self._rendered = (surface, image)
         return image
 
-    def _front(self, surface: Surface, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> NDArray[np.float32]:
-        """Radial distances (k,) [m] of `render` at single pixels; renders only those unless the image is cached."""
-        last, image = self._rendered
+    def _front(self, surface: Surface, pixel: NDArray[np.int32]) -> NDArray[np.float32]:
+        """Radial distances (n,) [m] of `render` at pixels, see `Synthesis`; renders only those unless it is cached.
+
+        Anything for samples that the camera does not see.
+        """
+        (last, image), stride = self._rendered, self.camera.width + 2
+        rows, columns = np.divmod(np.maximum(pixel - (stride + 1), 0), stride)
         return image[rows, columns] if last is surface else self._raster.render_at(surface.vertices[0], rows, columns)
 
-    def _sight(self, surface: Surface) -> NDArray[np.float64]:
-        """Lines of sight (3, n) from the camera to the vertices of a population of one [m]."""
-        return surface.vertices[0] - self.camera.center[:, None]
+
+@kernel
+def hide(
+    vertices: NDArray[np.float32],
+    normals: NDArray[np.float32],
+    center: NDArray[np.float64],
+    front: NDArray[np.float32],
+    distance: NDArray[np.float32],
+    pixel: NDArray[np.int32],
+    hidden: NDArray[np.bool_],
+) -> None:
+    """Marks vertices (3, n) [m] that face away from a camera's centre (3,), or in front of which the mesh itself lies.
+
+    Args:
+        vertices, normals: of the surface (3, n).
+        center: of the camera [m].
+        front, distance: of the rendered mesh at the vertices' pixels, and of the vertices (n,) [m].
+        pixel: not above 0 where the camera does not see the vertex (n,).
+        hidden: result (n,).
+    """
+    for v in range(hidden.size):
+        along = 0.0
+        for i in range(3):
+            along += normals[i, v] * (np.float64(vertices[i, v]) - center[i])
+        hidden[v] = not along < 0 or (pixel[v] > 0 and front[v] < distance[v] - np.float32(HIDING_M))
