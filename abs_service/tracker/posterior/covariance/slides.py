@@ -95,7 +95,7 @@ def add_information(
         center, size: of the motions (3,) [m] and [m].
         known, most: the sums (6, 6), zeros before.
     """
-    told, along = np.empty(6), np.zeros((3, 6))
+    seen, along = np.empty(6), np.zeros((3, 6))
     along[0, 0] = along[1, 1] = along[2, 2] = 1.0
     for m in range(rows.shape[0]):
         a, b, c = rows[m, 0], rows[m, 1], rows[m, 2]
@@ -104,12 +104,12 @@ def add_information(
             (places[m, 1] - center[1]) / size,
             (places[m, 2] - center[2]) / size,
         )
-        told[0], told[1], told[2], told[3], told[4], told[5] = a, b, c, y * c - z * b, z * a - x * c, x * b - y * a
+        seen[0], seen[1], seen[2], seen[3], seen[4], seen[5] = a, b, c, y * c - z * b, z * a - x * c, x * b - y * a
         along[0, 4], along[0, 5], along[1, 3], along[1, 5], along[2, 3], along[2, 4] = z, -y, -z, x, y, -x
         square = a * a + b * b + c * c
         for i in range(6):
             for j in range(6):
-                known[i, j] += told[i] * told[j]
+                known[i, j] += seen[i] * seen[j]
                 most[i, j] += square * (
                     along[0, i] * along[0, j] + along[1, i] * along[1, j] + along[2, i] * along[2, j]
                 )

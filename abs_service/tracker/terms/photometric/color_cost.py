@@ -30,7 +30,9 @@ def color_residuals(
             total += residual[v, c] * residual[v, c]
         square[v] = total
         if not (pixel[v] > 0 and total < 1e60):  # NaN is no number below it
-            residual[v, :], square[v] = np.inf, np.inf
+            square[v] = np.inf
+            for c in range(3):
+                residual[v, c] = np.inf
 
 
 @kernel

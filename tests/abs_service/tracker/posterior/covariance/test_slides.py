@@ -52,7 +52,7 @@ def test_information_on_rigid_motions_matches_numpy(seed: int, count: int):
     add_information(rows, places, center, size, known, most)
     turns = np.cross(np.eye(3), ((places - center) / size)[:, None])  # turn × place, of every axis
     motions = np.concatenate([np.tile(np.eye(3), (count, 1, 1)), turns], axis=1).transpose(0, 2, 1)
-    told = np.einsum("mi,mik->mk", rows, motions)
-    np.testing.assert_allclose(known, told.T @ told, atol=1e-9)
+    seen = np.einsum("mi,mik->mk", rows, motions)
+    np.testing.assert_allclose(known, seen.T @ seen, atol=1e-9)
     weighted = motions * np.linalg.norm(rows, axis=1)[:, None, None]
     np.testing.assert_allclose(most, np.einsum("mik,mil->kl", weighted, weighted), atol=1e-9)
