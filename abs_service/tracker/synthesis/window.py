@@ -95,10 +95,6 @@ class Bordered:
         self.window = window
         return self._image
 
-    def copy(self, image: NDArray[np.float32] | NDArray[np.uint8]) -> None:
-        """Copies the window of an image (height, width, channels)."""
-        copy_window(image, *limits(self.window, image.shape), self._image)
-
 
 class Placed(Generic[Number]):
     """An image with a border that holds a window's values, zeros elsewhere; its memory is reused between frames."""
@@ -147,19 +143,3 @@ def _fill(image: NDArray[np.float32], top: int, bottom: int, left: int, right: i
         for column in range(left + 1, right + 1):
             for channel in range(value.size):
                 image[row, column, channel] = value[channel]
-
-
-@kernel
-def copy_window(
-    image: NDArray[np.float32] | NDArray[np.uint8],
-    top: int,
-    bottom: int,
-    left: int,
-    right: int,
-    bordered: NDArray[np.float32],
-) -> None:
-    """Copies rows and columns of an image into one with a border; NumPy takes three times as long for levels."""
-    for row in range(top, bottom):
-        for column in range(left, right):
-            for channel in range(image.shape[2]):
-                bordered[row + 1, column + 1, channel] = image[row, column, channel]

@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 from abs_service.pairing.images import ColorImage, Image, Window
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import Synthesis, Synthesizer, View
-from abs_service.tracker.synthesis.window import NOTHING_HAS, Bordered
 from abs_service.tracker.terms.base import NO_OCCLUDERS, Bounds, facing
 from abs_service.tracker.terms.gradients import noiseless_color_rows
 from abs_service.tracker.terms.linearization import Part, PointLinearization
 from abs_service.tracker.terms.patches import Patches
 from abs_service.tracker.terms.photometric.color_cost import color_cost, color_residuals
+from abs_service.tracker.terms.photometric.copied_pixels import CopiedPixels
 from abs_service.tracker.terms.photometric.illumination import Exposed
 from abs_service.tracker.terms.photometric.matching import Measured, costs_of, matched
 from abs_service.tracker.terms.photometric.occlusion import occluded_pixels
@@ -51,7 +51,7 @@ class ColorTerm:
         self._constant = bounds.inlier + 3 * (np.log(noise.sigma) + LOG_SQRT_2PI)
         self._registration_noise = registration_noise
         self._levels = np.zeros((0, 0, 3), np.uint8)
-        self._bordered = Bordered(np.full(3, np.nan, np.float32), np.full(3, NOTHING_HAS, np.float32))
+        self._pixels = CopiedPixels()
 
     def observe(
         self,
@@ -65,16 +65,15 @@ class ColorTerm:
             raise TypeError(f"sensor {self.sensor} has a colour noise model but delivered {type(image).__name__}")
         window = self._synthesizer.window(self.sensor, predicted, reach_m)
         picture = self._resampled(image.rgb) if self._synthesizer.resamples else self._ordered(image.rgb, window)
-        texture = self._bordered.move(picture.shape[:2], window).reshape(-1, 3)
-        self._bordered.copy(picture)
+        self._pixels.observe(picture, window)
         self._view.look(predicted)
         self._bias.observe(picture, predicted)
         seen = self._view.synthesize(predicted)
         widening = self._registration_noise.widening(self._view, predicted, self._sigma)
         inverse = np.float32(1) / (self._sigma * widening.factor)
-        illumination = Exposed().adapt(texture[seen.pixel[0]], seen.attributes[0].T)
+        illumination = Exposed().adapt(self._pixels.at(seen.pixel)[seen.pixel[0]], seen.attributes[0].T)
         if len(occluders):
-            self._bordered.inside[occluded_pixels(self._view.camera, occluders)[window]] = np.inf
+            self._pixels.cover(occluded_pixels(self._view.camera, occluders))
         return ObservedColor(
             sensor=self.sensor,
             view=self._view,
@@ -82,7 +81,7 @@ class ColorTerm:
             illumination=illumination,
             bias=self._bias,
             image=picture,
-            texture=texture,
+            pixels=self._pixels,
             inverse=np.repeat(inverse, 3 // widening.factor.shape[1], axis=1),
             normalizer=(self._constant + 3 * widening.log.mean(axis=1)).astype(np.float32),
         )
@@ -114,7 +113,7 @@ class ObservedColor:
         illumination: exposure of the image.
         bias: of the registration of edges.
         image: colours (height, width, 3) in the view's camera.
-        texture: the same with a border of one pixel, flattened (pixels, 3).
+        pixels: the same with a border of one pixel, as samples read them.
         inverse: inverse deviations (n or 1, 3) of the samples' colours.
         normalizer: cost (n or 1,) of a colour that agrees exactly.
     """
@@ -125,7 +124,7 @@ class ObservedColor:
     illumination: Exposed
     bias: RegistrationBias
     image: NDArray[np.float32] | NDArray[np.uint8]
-    texture: NDArray[np.float32]
+    pixels: CopiedPixels
     inverse: NDArray[np.float32]
     normalizer: NDArray[np.float32]
 
@@ -145,12 +144,11 @@ class ObservedColor:
     def _cost_of(self, seen: Synthesis, surface: Surface) -> NDArray[np.float64]:
         """Cost (population,) of what is synthesised."""
         out = np.empty(len(seen.pixel))
-        color_cost(seen.pixel, seen.attributes, *self._measured, out)
+        color_cost(seen.pixel, seen.attributes, *self._measured(seen.pixel), out)
         return self.view.balance(out, surface, self.bounds.unseen)
 
-    @property
-    def _measured(self) -> Measured:
-        return self.texture, self.inverse, self.normalizer, self.bounds.outlier, self.bounds.unseen
+    def _measured(self, pixel: NDArray[np.int32]) -> Measured:
+        return self.pixels.at(pixel), self.inverse, self.normalizer, self.bounds.outlier, self.bounds.unseen
 
     def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> list[Part]:
         """Normalised residuals of the inliers, three channels each, and their derivatives with respect to theta."""
@@ -169,7 +167,7 @@ class ObservedColor:
         seen = self._synthesize(surface)
         square = self._residuals(seen)[1]
         pixel, known = seen.pixel[0], np.isfinite(seen.attributes[0]).all(axis=0)
-        hidden = np.isinf(self.texture[pixel, 0])
+        hidden = np.isinf(self.pixels.at(seen.pixel)[pixel, 0])
         masks = VertexMasks.of(pixel, facing(self.view, surface), np.zeros_like(hidden), hidden, ~known)
         mean = -float(self._cost_of(seen, surface)[0]) / len(square)
         return summarize(self.sensor, masks, square < np.inf, np.sqrt(square / 3), mean, channels=3)
@@ -190,5 +188,5 @@ class ObservedColor:
         """Normalised residuals (n, 3), and the sums of their squares (n,); infinite where nothing is measured."""
         n = seen.pixel.shape[1]
         residual, square = np.empty((n, 3)), np.empty(n)
-        color_residuals(seen.pixel[0], seen.attributes[0], self.texture, self.inverse, residual, square)
+        color_residuals(seen.pixel[0], seen.attributes[0], self.pixels.at(seen.pixel), self.inverse, residual, square)
         return residual, square

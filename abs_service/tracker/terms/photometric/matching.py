@@ -35,13 +35,13 @@ _SHIFTS = np.stack([part.ravel() for part in np.meshgrid(_STEPS, _STEPS)], axis=
 _STILL = len(_SHIFTS) // 2
 
 
-def costs_of(kernel: Callable[..., None], measured: Measured) -> Costs:
+def costs_of(kernel: Callable[..., None], measured: Callable[[NDArray[np.int32]], Measured]) -> Costs:
     """Costs by a kernel of (pixel, attributes, *measured, result) that sums over as many samples as it is given."""
-    texture, scale, normalizer, outlier, unseen = measured
 
     def costs(
         pixel: NDArray[np.int32], attributes: NDArray[np.float32], samples: NDArray[np.intp]
     ) -> NDArray[np.float64]:
+        texture, scale, normalizer, outlier, unseen = measured(pixel)
         out, own = np.empty(len(pixel)), samples % len(scale)
         kernel(pixel, attributes, texture, scale[own], normalizer[own], outlier, unseen, out)
         return out
