@@ -62,7 +62,7 @@ def solved(curvature: NDArray[np.float64], right: NDArray[np.float64]) -> NDArra
     Raises:
         LinAlgError: the curvature is not positive definite.
     """
-    _, found, is_indefinite = scipy.linalg.lapack.dposv(curvature, right)
+    _, found, is_indefinite = scipy.linalg.lapack.dposv(curvature.T, right)  # symmetric: the copy keeps its order
     if is_indefinite:
         raise np.linalg.LinAlgError(NOT_POSITIVE)
     return np.asarray(found, np.float64)
@@ -90,7 +90,7 @@ def posterior_covariance(quadratic: Quadratic) -> NDArray[np.float64]:
 
 def _cholesky(curvature: NDArray[np.float64]) -> NDArray[np.float64]:
     """Lower Cholesky factor (dim, dim), see `whitened`."""
-    factor, is_indefinite = scipy.linalg.lapack.dpotrf(curvature, lower=True)
+    factor, is_indefinite = scipy.linalg.lapack.dpotrf(curvature.T, lower=True)  # symmetric: the copy keeps its order
     if is_indefinite:
         raise np.linalg.LinAlgError(NOT_POSITIVE)
     return factor

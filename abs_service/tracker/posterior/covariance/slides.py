@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from abs_service.tracker.models.base import DeformationModel
 from abs_service.tracker.posterior.optimum import Optimum
 from abs_service.tracker.terms.linearization import Part, PointLinearization
+from calib.jit import kernel
 
 #: Error of the directions [rad] in which residuals of an outline tell of motion, root mean square, and those of points:
 #: a surface that bends follows another one beneath it that is so much inclined.
@@ -57,7 +58,7 @@ class SlideObservability:
         for k, part in enumerate(optimum.sensed):
             known[k], feigned[k] = _information(part, *frame)
             feigned[k] *= (POINT_ERROR if isinstance(part, PointLinearization) else EDGE_ERROR) ** 2
-        slides = _slides(known.sum(axis=0), _motions(vertices, *frame))
+        slides = _slides(known.sum(axis=0), vertices, *frame)
         held = np.maximum(_along(slides, known - feigned), 0.0).sum(axis=0)
         return float(1 / np.sqrt(_LEAST + held.min()))
 
@@ -72,18 +73,59 @@ def _information(
     part: Part, center: NDArray[np.float64], size: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Information of residuals on rigid motions, and what it were in the direction of most, each (6, 6)."""
-    if not len(part.rows):
-        return np.zeros((6, 6)), np.zeros((6, 6))
-    motions = _motions(part.places, center, size)
-    known = (part.rows[:, None] @ motions)[:, 0]
-    weighted = (motions * np.linalg.norm(part.rows, axis=1)[:, None, None]).reshape(-1, 6)
-    return known.T @ known, weighted.T @ weighted
+    known, most = np.zeros((2, 6, 6))
+    if len(part.rows):
+        add_information(part.rows, np.ascontiguousarray(part.places, np.float64), center, size, known, most)
+    return known, most
 
 
-def _slides(known: NDArray[np.float64], motions: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Motions (6, 6), columns, that information (6, 6) tells apart; each moves the vertices by 1, root mean square."""
-    flat = motions.reshape(-1, 6)
-    moved = flat.T @ flat / len(motions)
+@kernel
+def add_information(
+    rows: NDArray[np.float64],
+    places: NDArray[np.float64],
+    center: NDArray[np.float64],
+    size: float,
+    known: NDArray[np.float64],
+    most: NDArray[np.float64],
+) -> None:
+    """Adds up (row M)ᵀ(row M) and |row|² MᵀM, of the motions M (3, 6) of every place; see `_motions`.
+
+    Args:
+        rows, places: derivatives [1/m] of residuals with respect to their places [m], each (m, 3).
+        center, size: of the motions (3,) [m] and [m].
+        known, most: the sums (6, 6), zeros before.
+    """
+    seen, along = np.empty(6), np.zeros((3, 6))
+    along[0, 0] = along[1, 1] = along[2, 2] = 1.0
+    for m in range(rows.shape[0]):
+        a, b, c = rows[m, 0], rows[m, 1], rows[m, 2]
+        x, y, z = (
+            (places[m, 0] - center[0]) / size,
+            (places[m, 1] - center[1]) / size,
+            (places[m, 2] - center[2]) / size,
+        )
+        seen[0], seen[1], seen[2], seen[3], seen[4], seen[5] = a, b, c, y * c - z * b, z * a - x * c, x * b - y * a
+        along[0, 4], along[0, 5], along[1, 3], along[1, 5], along[2, 3], along[2, 4] = z, -y, -z, x, y, -x
+        square = a * a + b * b + c * c
+        for i in range(6):
+            for j in range(6):
+                known[i, j] += seen[i] * seen[j]
+                most[i, j] += square * (
+                    along[0, i] * along[0, j] + along[1, i] * along[1, j] + along[2, i] * along[2, j]
+                )
+
+
+def _slides(
+    known: NDArray[np.float64], vertices: NDArray[np.float64], center: NDArray[np.float64], size: float
+) -> NDArray[np.float64]:
+    """Motions (6, 6), columns, that information (6, 6) tells apart; each moves vertices (n, 3) by 1, root mean square.
+
+    Args:
+        known: the information.
+        vertices, center, size: the vertices [m] and their `_frame`, about which no turn shifts them on average.
+    """
+    places, moved = (vertices - center) / size, np.eye(6)
+    moved[3:, 3:] -= places.T @ places / len(places)
     inverse = np.linalg.inv(np.linalg.cholesky(moved + 1e-9 * np.eye(6)))
     return np.asarray(inverse.T @ np.linalg.eigh(inverse @ known @ inverse.T)[1], np.float64)
 

@@ -117,7 +117,7 @@ class ObservedChannel:
 
     def match(self, surface: Surface, sparse_jacobian: SparseJacobian, patches: Patches) -> PointLinearization:
         """See `ObservedTerm`."""
-        seen, costs = self._synthesize(surface), costs_of(channel_cost, self._measured)
+        seen, costs = self._synthesize(surface), costs_of(channel_cost, lambda _: self._measured)
         return matched(self.view.camera, surface, sparse_jacobian, seen, patches, self.image.shape, costs)
 
     def misfit(self, surface: Surface) -> NDArray[np.float64]:

@@ -2,11 +2,13 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import abs_service as a
 from abs_service.tracker.detection.strip.strip_detection import Strip
 from abs_service.tracker.models.gravity import Gravity
-from abs_service.tracker.posterior.covariance.slides import SlideObservability
+from abs_service.tracker.posterior.covariance.slides import SlideObservability, add_information
 from abs_service.tracker.posterior.curvature import Quadratic
 from abs_service.tracker.posterior.linearized_cost import LinearizedCost
 from abs_service.tracker.posterior.optimum import Optimum
@@ -40,3 +42,17 @@ def test_a_strip_whose_gripper_is_fixed_does_not_slide(is_free: bool, expected_m
     nothing = LinearizedCost(theta, Quadratic(theta, np.eye(size)), np.eye(size), [], model.sparse_jacobian(theta))
     optimum = Optimum(theta, model.deform(theta[None]), nothing, [], np.eye(size))
     assert SlideObservability(model).deviation(optimum) == pytest.approx(expected_m)
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 50))
+def test_information_on_rigid_motions_matches_numpy(seed: int, count: int):
+    generator, center, size = np.random.default_rng(seed), np.array([0.1, -0.2, 0.9]), 0.15
+    rows, places = generator.standard_normal((2, count, 3))
+    known, most = np.zeros((2, 6, 6))
+    add_information(rows, places, center, size, known, most)
+    turns = np.cross(np.eye(3), ((places - center) / size)[:, None])  # turn × place, of every axis
+    motions = np.concatenate([np.tile(np.eye(3), (count, 1, 1)), turns], axis=1).transpose(0, 2, 1)
+    seen = np.einsum("mi,mik->mk", rows, motions)
+    np.testing.assert_allclose(known, seen.T @ seen, atol=1e-9)
+    weighted = motions * np.linalg.norm(rows, axis=1)[:, None, None]
+    np.testing.assert_allclose(most, np.einsum("mik,mil->kl", weighted, weighted), atol=1e-9)
