@@ -8,7 +8,7 @@ import scipy  # its parts are imported when they are first used
 from numpy.typing import NDArray
 
 from abs_service.tracker.terms.grouped import GroupedLinearization
-from abs_service.tracker.terms.linearization import Part, PointLinearization, add_squares
+from abs_service.tracker.terms.linearization import Part, PointLinearization, add_gradients, add_squares
 
 #: Message of the error for a curvature without a Cholesky factor.
 NOT_POSITIVE = "the curvature of the cost is not positive definite"
@@ -34,11 +34,12 @@ def gauss_newton(parts: Sequence[Part | GroupedLinearization], dimension: int) -
     """Gauss–Newton approximation of the cost: sums of the gradients Jᵀr and the curvatures JᵀJ of all parts."""
     gradient, curvature, at_points = np.zeros(dimension), np.zeros((dimension, dimension)), []
     for part in (part for part in parts if len(part.residual)):
-        part.add_gradient(gradient)
         if isinstance(part, PointLinearization):
             at_points.append(part)
         else:
+            part.add_gradient(gradient)
             part.add_curvature(curvature)
+    add_gradients(at_points, gradient)
     add_squares(at_points, [np.ones(len(part.residual)) for part in at_points], curvature)
     return Quadratic(gradient, curvature)
 

@@ -24,28 +24,36 @@ class CopiedPixels:
         self._texture = np.zeros((2, 2, 3), np.float32)
         self._picture: Picture = np.zeros((0, 0, 3), np.uint8)
         self._covered, self._limits, self._is_complete = _NO_MASK, (0, 0, 0, 0), False
+        self._copied: list[NDArray[np.int32]] = []  # pixels of single candidates, which are read again and again
 
     def observe(self, picture: Picture, window: Window) -> None:
         """Sets the image (height, width, 3), contiguous, of which a window may show the object."""
         self._texture, self._picture = self._bordered.move(picture.shape[:2], window), picture
-        self._covered, self._limits, self._is_complete = _NO_MASK, limits(window, picture.shape), False
+        self._limits = limits(window, picture.shape)
+        self.cover(_NO_MASK)
 
     def cover(self, covered: NDArray[np.bool_]) -> None:
-        """Sets the pixels (height, width) that show an occluder."""
-        self._covered, self._is_complete = covered, False
+        """Sets the pixels (height, width) that show an occluder; an empty mask: none."""
+        self._covered, self._is_complete, self._copied = covered, False, []
 
     def at(self, pixel: NDArray[np.int32]) -> NDArray[np.float32]:
         """The image (pixels, 3), complete at the pixels of samples (population, m), see `Synthesis`."""
-        top, bottom, left, right = self._limits
-        if not self._is_complete and pixel.size < (bottom - top) * (right - left):
-            copy_pixels(pixel.ravel(), self._picture, self._covered, self._limits, self._texture)
-        elif not self._is_complete:
-            window = slice(top, bottom), slice(left, right)
-            self._bordered.inside[:] = self._picture[window]
-            if self._covered.size:
-                self._bordered.inside[self._covered[window]] = np.inf
-            self._is_complete = True
+        if not (self._is_complete or any(pixel is one for one in self._copied)):
+            self._copy(pixel)
         return self._texture.reshape(-1, 3)
+
+    def _copy(self, pixel: NDArray[np.int32]) -> None:
+        """Copies these pixels, or the window if it has fewer."""
+        top, bottom, left, right = self._limits
+        if pixel.size < (bottom - top) * (right - left):
+            copy_pixels(pixel.ravel(), self._picture, self._covered, self._limits, self._texture)
+            self._copied += [pixel] if len(pixel) == 1 else []
+            return
+        window = slice(top, bottom), slice(left, right)
+        self._bordered.inside[:] = self._picture[window]
+        if self._covered.size:
+            self._bordered.inside[self._covered[window]] = np.inf
+        self._is_complete = True
 
 
 @kernel
