@@ -30,6 +30,9 @@ UNJUDGED_DEVIATIONS = 3.0
 #: A free edge is off the outline if it is farther from it than so many pixels, and than the bound of its cost.
 OFF_PX = 3.0
 
+#: Where the field of view turns out to end so many pixels beside a free edge, it cut the object there.
+BESIDE_PX = 2.0
+
 
 class RimOutline:
     """The outline of an object over time; each frame of it is an `ObservedRimOutline`.
@@ -55,6 +58,7 @@ class RimOutline:
         self._kernel = rim_cost(camera.lens)
         self._rim = rim
         self._edges = Edges(rim.outer, rim.inner, np.zeros(len(rim.outer), np.float32))
+        self._beside, self._is_cut = np.full((len(rim.outer), 2), -1), np.zeros(len(rim.outer), np.bool_)
         self._raggedness = Raggedness(deviation, ragged)
         self._min_off_px = max(OFF_PX, FARTHEST * deviation)
         self._begun, self._is_round = False, False
@@ -75,7 +79,8 @@ class RimOutline:
         image = OutlineImage(self._camera, self._projection, away, first)
         if not self._begun:
             self._classify(image, predicted, distance)
-        free = np.flatnonzero(self.classes == RimClass.FREE)
+        self._update_cut(seen.beyond, window)
+        free = np.flatnonzero((self.classes == RimClass.FREE) & ~self._is_cut)
         ends = self._edges.some(free).ends(predicted)
         edges = self._edges.some(free[~is_behind(self._camera, ends, expected, window)])
         points, places, of_edges = image.locate(edges, predicted)
@@ -86,12 +91,12 @@ class RimOutline:
         self._raggedness.update(of_edges, directions, places)  # counts from the next frame on
         doubtful = np.zeros(distance.shape, np.bool_)
         doubtful[part] = (seen.free_m[part] > 0) & (away > -UNJUDGED_DEVIATIONS * deviation)
-        covered = np.flatnonzero((self.classes == RimClass.OCCLUDED) | (self.classes == RimClass.BORDER))
+        covered = (self.classes == RimClass.OCCLUDED) | (self.classes == RimClass.BORDER) | self._is_cut
         return ObservedRimOutline(
             image=image,
             edges=edges,
             hidden=len(free) - len(edges.outer),
-            covered=self._edges.some(covered),
+            covered=self._edges.some(np.flatnonzero(covered)),
             along=rim_directions(places, directions),
             is_round=self._is_round,
             deviation=deviation,
@@ -108,3 +113,21 @@ class RimOutline:
         outer, inner = self._edges.ends(predicted), self._edges.starts(predicted)
         gap = exact_gap(self._camera, outer, outer - inner, gap, image.look)
         self._edges = Edges(self._rim.outer, self._rim.inner, gap)
+        _, places, _ = image.locate(self._edges, predicted)
+        directions = self._edges.directions(self._camera, predicted, places)
+        directions /= np.maximum(np.linalg.norm(directions, axis=1, keepdims=True), np.finfo(float).tiny)
+        self._beside = np.floor(places + BESIDE_PX * directions + 0.5).astype(np.intp)
+
+    def _update_cut(self, beyond: NDArray[np.bool_], window: Window) -> None:
+        """Finds the edges that were free in the first image, and beside which the field of view ends by later ones.
+
+        Args:
+            beyond: pixels (rows, columns) in a window that lie beyond the field of view.
+            window: of the image; what is outside it stays as it was.
+        """
+        if not (beyond.any() or self._is_cut.any()):
+            return
+        column, row = (self._beside - np.array(corner(window)[::-1], np.intp)).T
+        known = (row >= 0) & (column >= 0) & (row < beyond.shape[0]) & (column < beyond.shape[1])
+        known &= self.classes == RimClass.FREE
+        self._is_cut[known] = beyond[row[known], column[known]]
