@@ -165,6 +165,21 @@ def test_the_edge_of_a_body_that_turns_away_is_a_silhouette():
     assert np.mean(found[x > 0.14] == RimClass.SILHOUETTE) > 0.9
 
 
+@pytest.mark.parametrize(("rows", "is_free"), [(61, False), (21, True)])
+def test_the_few_free_edges_of_a_round_body_are_not_used(rows: int, is_free: bool):
+    """A long roll's ends have less than a quarter of the free edges and silhouettes, a short one's more."""
+    size = 0.1994, 0.0055 * rows
+    roll = sheet(rows, 25, lambda x, y: 1.1 - np.sqrt(0.1**2 - np.clip(x, -0.0997, 0.0997) ** 2) + 0 * y, size)
+    view = sparse(CAMERA, roll).view("tof", np.zeros((len(roll.vertices), 0), np.float32))
+    shown = view.render(moved(roll, 0.0))
+    found = begun(np.where(np.isfinite(shown), shown, BESIDE_M).astype(np.float32), roll).classes
+    outer = roll.vertices[Rim.of(roll).outer]
+    share = np.mean(found[np.abs(outer[:, 0]) < 0.06] == RimClass.FREE)
+    assert share > 0.9 if is_free else share == 0
+    sides = (np.abs(outer[:, 0]) > 0.09) & (np.abs(outer[:, 1]) < 0.4 * size[1])
+    assert np.all(found[sides] == RimClass.SILHOUETTE)
+
+
 @pytest.mark.parametrize(
     ("slopes", "expected"),
     [((1.2, 1.2), RimClass.SILHOUETTE), ((1.2, 0.0), RimClass.FREE), ((0.5, 0.5), RimClass.FREE)],
