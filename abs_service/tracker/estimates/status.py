@@ -197,9 +197,11 @@ _ABSENT = {
 def _placed(fits: Sequence[SensorFit], shape: ShapeQuality, innovation: float, limits: Settings) -> Iterator[str]:
     """Reasons by where the mesh lies."""
     if is_misplaced(fits, shape, limits):
+        off_m = rim_distance(fits)
+        off = f"{off_m * 1e3:.0f} mm" if np.isfinite(off_m) else "an unknown distance"
         yield (
             f"{rim_share(fits):.0%} of the free edges lie off the object's outline, by "
-            f"{_length(rim_distance(fits))} together or across a slide: " + (_SLID if _hangs_over(fits) else _GOES_ON)
+            f"{off} together or across a slide: " + (_SLID if _hangs_over(fits) else _GOES_ON)
         )
     if any(fit.is_surprised for fit in fits) and not any(np.isfinite(fit.remainder.share) for fit in fits):
         yield (
@@ -239,11 +241,6 @@ def is_misplaced(fits: Sequence[SensorFit], shape: ShapeQuality, limits: Setting
     """True if the free edges lie off the outline: too many of them, or by more than the covariances claim."""
     claimed = np.fmax(limits.degraded_rim_m, shape.deviation_m)
     return rim_share(fits) > limits.degraded_rim or bool(rim_distance(fits) > claimed)
-
-
-def _length(distance: float) -> str:
-    """A distance [m] in words, infinite if it is not known."""
-    return f"{distance * 1e3:.0f} mm" if np.isfinite(distance) else "an unknown distance"
 
 
 def _hangs_over(fits: Sequence[SensorFit]) -> bool:

@@ -38,7 +38,7 @@ _STEPS = ((0, -1), (0, 1), (-1, 0), (1, 0))
 
 
 class Edge(NamedTuple):
-    """Where a field of view ends.
+    """End of a field of view.
 
     Attributes:
         beyond: pixels (height, width) near a side of the image that are beyond it.
@@ -162,7 +162,7 @@ def _runs(places: NDArray[np.intp], side: int, shape: tuple[int, int]) -> list[N
 
 
 def _beyond(shape: tuple[int, int], side: int, run: NDArray[np.intp]) -> Edge:
-    """What is beyond the straight line through a run (2, n) of places near a side of an image (height, width).
+    """The end of a view at the straight line through a run (2, n) of places near a side of an image (height, width).
 
     A field of view is convex, so all that is beyond a straight piece of its end is outside it.
     """

@@ -214,7 +214,7 @@ def test_a_mesh_that_hangs_over_where_the_image_cut_the_object_has_slid():
     assert look(found, picture(whole), cut).fit(moved(cut, 0.0)).off_m == 0
     drawn = picture(whole, end - 0.06 - whole.vertices[:, 0].max())
     drawn[:, :30] = picture(whole)[:, :30]  # as if the board were longer
-    assert look(found, drawn, cut).fit(moved(cut, 0.0)).off_m > 0.015
+    assert look(found, drawn, cut).fit(moved(cut, 0.0)).off_m == np.inf  # nothing tells how far
 
 
 def test_the_distance_of_the_edges_from_the_outline_is_told_in_metres():
