@@ -134,14 +134,11 @@ def _outline(
         areas: missing returns (height, width).
         near: where they are looked for.
     """
-    (height, width), padded = areas.shape, np.pad(areas, 1)
-    found = []
-    for side, (down, right) in enumerate(_STEPS):
-        beside = padded[1 + down : 1 + down + height, 1 + right : 1 + right + width]
-        last = np.argwhere(near & ~areas & beside)
-        found.append((last, last + np.array([down, right]), np.full(len(last), side, np.intp)))
-    last, beyond, sides = (np.concatenate(part) for part in zip(*found, strict=True))
-    return last, beyond, sides
+    last, padded = np.argwhere(near & grown(areas, 1) & ~areas), np.pad(areas, 1)
+    steps = np.array(_STEPS)
+    beside = last[:, None] + steps
+    which, sides = np.nonzero(padded[tuple((beside + 1).transpose(2, 0, 1))])
+    return last[which], beside[which, sides], sides
 
 
 def _from_side(
