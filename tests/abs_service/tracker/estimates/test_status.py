@@ -153,11 +153,6 @@ def test_a_mesh_off_its_outline_is_degraded():
     status, reasons = judge([on_the_rim(visible=60, outside=15, inside=9)], (), SHAPE, 0.0, SETTINGS)
     assert (status, len(reasons)) == (Status.DEGRADED, 1)
     assert reasons[0].startswith("40% of the free edges lie off the object's outline")
-    assert "slid or turned" in reasons[0]
-    (reason,) = judge([on_the_rim(visible=60, outside=2, inside=22)], (), SHAPE, 0.0, SETTINGS)[1]
-    assert "nearly all of these end inside it" in reason, "the top of a box that is seen from above now"
-    few = [on_the_rim(visible=4, outside=4), fit(1.0)]
-    assert judge(few, (), SHAPE, 0.0, SETTINGS)[0] == Status.TRACKING
 
 
 @pytest.mark.parametrize(
@@ -167,13 +162,16 @@ def test_a_mesh_off_its_outline_is_degraded():
         (0.006, 1e-3, Status.DEGRADED),
         (0.006, 7e-3, Status.TRACKING),  # it is as uncertain
         (0.006, float("nan"), Status.DEGRADED),
+        (float("inf"), 14e-3, Status.DEGRADED),
     ],
 )
 def test_edges_farther_off_the_outline_than_the_covariances_claim_degrade_an_estimate(off_m, claimed_m, status):
     shape = replace(SHAPE, deviation_m=claimed_m)
     found, reasons = judge([on_the_rim(visible=60, inside=11, off_m=off_m)], (), shape, 0.0, SETTINGS)
     assert found == status
-    assert [one[:20] for one in reasons] == (["18% of the free edge"] if status == Status.DEGRADED else [])
+    by = "an unknown distance" if off_m > 1 else "6 mm"
+    expected = f"18% of the free edges lie off the object's outline, by {by} together"
+    assert [one[: len(expected)] for one in reasons] == ([expected] if status == Status.DEGRADED else [])
 
 
 def test_an_estimate_that_the_motion_prior_has_held_back_is_degraded():
