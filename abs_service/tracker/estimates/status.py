@@ -10,6 +10,7 @@ from annotated_types import Gt, Interval
 from abs_service.tracker.estimates.estimate import Status
 from abs_service.tracker.estimates.shape_quality import ShapeQuality
 from abs_service.tracker.terms.agreement import (
+    appearance_share,
     contradicting,
     distances_share,
     has_left,
@@ -25,6 +26,9 @@ from abs_service.tracker.terms.agreement import (
     unexplained_share,
 )
 from abs_service.tracker.terms.sensor_fit import SensorFit
+
+#: Images hold a surface if so large a share of what should be in sight agrees with one of them.
+HELD = 0.9
 
 #: The limits on the deviation of vertices shrink with the side of an object that is smaller [m].
 SMALL_M = 0.06
@@ -237,9 +241,14 @@ def _shaped(shape: ShapeQuality, limits: Settings) -> Iterator[str]:
 
 
 def is_misplaced(fits: Sequence[SensorFit], shape: ShapeQuality, limits: Settings) -> bool:
-    """True if the free edges lie off the outline: too many of them, or by more than the covariances claim."""
+    """True if the free edges lie off the outline: too many of them, or by more than the covariances claim.
+
+    Edges inside the outline do not count where images hold the surface: something lies against them.
+    """
     claimed = np.fmax(limits.degraded_rim_m, shape.deviation_m)
-    return rim_share(fits) > limits.degraded_rim or bool(rim_distance(fits) > claimed)
+    is_off = rim_share(fits) > limits.degraded_rim or bool(rim_distance(fits) > claimed)
+    is_held = shape.no_outline_deviation_m < limits.degraded_rim_m and appearance_share(fits) > HELD
+    return is_off and not (is_held and not _hangs_over(fits))
 
 
 def _hangs_over(fits: Sequence[SensorFit]) -> bool:

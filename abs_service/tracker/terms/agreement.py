@@ -84,6 +84,13 @@ def distances_share(fits: Sequence[SensorFit]) -> float:
     return max((good / known for good, known, whole in seen if known >= max(MIN_JUDGED, whole / 2)), default=1.0)
 
 
+def appearance_share(fits: Sequence[SensorFit]) -> float:
+    """Share that agrees of what should be in sight; the largest of the sensors of appearance, 0 without."""
+    distances = of_distances(fits)
+    counts = (fit.counts for fit in fits if fit not in distances and fit.counts.expected >= MIN_JUDGED)
+    return max((one.agreeing / one.expected for one in counts), default=0.0)
+
+
 def contradicting(fits: Sequence[SensorFit]) -> list[tuple[str, str, float]]:
     """Name, kind of measurement and agreeing share of every sensor that contradicts the mesh.
 

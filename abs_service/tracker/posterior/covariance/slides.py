@@ -43,23 +43,32 @@ class SlideObservability:
         is_exact = model.mesh.is_complete and len(model.rest) == _RIGID
         self._is_free = bool(np.mean(left**2) < _SMALL_SHARE * np.mean(motions**2)) and not is_exact
 
-    def deviation(self, optimum: Optimum) -> float:
+    def deviations(self, optimum: Optimum) -> tuple[float, float]:
         """Standard deviation [m] of the vertices, root mean square, along the slide that is held least; 0 without any.
+
+        The second is that without the outline, infinite for a model that does not slide.
 
         Args:
             optimum: the estimate of a frame; its priors do not count.
         """
         if not self._is_free:
-            return 0.0
+            return 0.0, np.inf
         vertices = optimum.vertices.astype(np.float64)
         frame = _frame(vertices)
         known, feigned = np.zeros((2, len(optimum.sensed), 6, 6))
         for k, part in enumerate(optimum.sensed):
             known[k], feigned[k] = _information(part, *frame)
             feigned[k] *= (POINT_ERROR if isinstance(part, PointLinearization) else EDGE_ERROR) ** 2
-        slides = _slides(known.sum(axis=0), _motions(vertices, *frame))
-        held = np.maximum(_along(slides, known - feigned), 0.0).sum(axis=0)
-        return float(1 / np.sqrt(_LEAST + held.min()))
+        inside = [isinstance(part, PointLinearization) for part in optimum.sensed]
+        motions = _motions(vertices, *frame)
+        return _least_held(known, feigned, motions), _least_held(known[inside], feigned[inside], motions)
+
+
+def _least_held(known: NDArray[np.float64], feigned: NDArray[np.float64], motions: NDArray[np.float64]) -> float:
+    """Deviation [m] along the slide that is held least, by information of parts, known and feigned (parts, 6, 6)."""
+    slides = _slides(known.sum(axis=0), motions)
+    held = np.maximum(_along(slides, known - feigned), 0.0).sum(axis=0)
+    return float(1 / np.sqrt(_LEAST + held.min()))
 
 
 def _frame(vertices: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
@@ -71,13 +80,22 @@ def _frame(vertices: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
 def _information(
     part: Part, center: NDArray[np.float64], size: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Information of residuals on rigid motions, and what it were in the direction of most, each (6, 6)."""
+    """Information of residuals on rigid motions, and what it were in the direction of most, each (6, 6).
+
+    A gradient in an image lies across the line of sight, however steeply that meets the surface, and is off within the
+    image only.
+    """
     if not len(part.rows):
         return np.zeros((6, 6)), np.zeros((6, 6))
     motions = _motions(part.places, center, size)
     known = (part.rows[:, None] @ motions)[:, 0]
-    weighted = (motions * np.linalg.norm(part.rows, axis=1)[:, None, None]).reshape(-1, 6)
-    return known.T @ known, weighted.T @ weighted
+    weighted = motions * np.linalg.norm(part.rows, axis=1)[:, None, None]
+    of_most = weighted.reshape(-1, 6).T @ weighted.reshape(-1, 6)
+    if isinstance(part, PointLinearization) and part.center.size:  # of an image
+        sight = part.places - part.center
+        unseen = ((sight / np.linalg.norm(sight, axis=1)[:, None])[:, None] @ weighted)[:, 0]
+        of_most -= unseen.T @ unseen
+    return known.T @ known, of_most
 
 
 def _slides(known: NDArray[np.float64], motions: NDArray[np.float64]) -> NDArray[np.float64]:
