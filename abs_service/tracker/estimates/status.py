@@ -10,10 +10,11 @@ from annotated_types import Gt, Interval
 from abs_service.tracker.estimates.estimate import Status
 from abs_service.tracker.estimates.shape_quality import ShapeQuality
 from abs_service.tracker.terms.agreement import (
-    appearance_share,
     contradicting,
     distances_share,
+    hangs_over,
     has_left,
+    image_agrees,
     inlier_share,
     most_agreeing,
     occluded_share,
@@ -26,9 +27,6 @@ from abs_service.tracker.terms.agreement import (
     unexplained_share,
 )
 from abs_service.tracker.terms.sensor_fit import SensorFit
-
-#: Images hold a surface if so large a share of what should be in sight agrees with one of them.
-HELD = 0.9
 
 #: The limits on the deviation of vertices shrink with the side of an object that is smaller [m].
 SMALL_M = 0.06
@@ -204,7 +202,7 @@ def _placed(fits: Sequence[SensorFit], shape: ShapeQuality, innovation: float, l
         yield (
             f"{rim_share(fits):.0%} of the free edges lie off the object's outline, by "
             f"{rim_distance(fits) * 1e3:.0f} mm together or across a slide: "
-            + (_SLID if _hangs_over(fits) else _GOES_ON)
+            + (_SLID if hangs_over(fits) else _GOES_ON)
         )
     if any(fit.is_surprised for fit in fits) and not any(np.isfinite(fit.remainder.share) for fit in fits):
         yield (
@@ -243,14 +241,9 @@ def _shaped(shape: ShapeQuality, limits: Settings) -> Iterator[str]:
 def is_misplaced(fits: Sequence[SensorFit], shape: ShapeQuality, limits: Settings) -> bool:
     """True if the free edges lie off the outline: too many of them, or by more than the covariances claim.
 
-    Edges inside the outline do not count where images hold the surface: something lies against them.
+    Edges inside the outline do not count if distances and images hold the surface: something lies against them.
     """
     claimed = np.fmax(limits.degraded_rim_m, shape.deviation_m)
     is_off = rim_share(fits) > limits.degraded_rim or bool(rim_distance(fits) > claimed)
-    is_held = shape.no_outline_deviation_m < limits.degraded_rim_m and appearance_share(fits) > HELD
-    return is_off and not (is_held and not _hangs_over(fits))
-
-
-def _hangs_over(fits: Sequence[SensorFit]) -> bool:
-    """True if a mesh off its outline hangs over it: one that slides does so on the side that it slides to."""
-    return any(4 * rim.outside >= rim.inside for rim in rims(fits))
+    is_held = shape.no_outline_deviation_m < limits.degraded_rim_m and image_agrees(fits)
+    return is_off and (hangs_over(fits) or not is_held)

@@ -162,7 +162,9 @@ class ObservedColor:
         points = np.repeat(np.flatnonzero(use), residual.shape[1])
         samples = self.view.follow(surface, sparse_jacobian)
         bias = self.bias.derivatives(vertices, rows, points)
-        return [PointLinearization(residual[use].ravel(), rows, points, samples, vertices, bias, self.view.camera.center)]
+        return [
+            PointLinearization(residual[use].ravel(), rows, points, samples, vertices, bias, self.view.camera.center)
+        ]
 
     def fit(self, surface: Surface) -> SensorFit:
         """Agreement of the sensor with a population of one."""

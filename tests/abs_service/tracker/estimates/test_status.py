@@ -176,6 +176,22 @@ def test_edges_farther_off_the_outline_than_the_covariances_claim_degrade_an_est
     assert [one[:20] for one in reasons] == (["18% of the free edge"] if status == Status.DEGRADED else [])
 
 
+@pytest.mark.parametrize(
+    ("agreeing", "deviation_m", "outside", "status"),
+    [
+        (95, 1e-3, 0, Status.TRACKING),
+        (95, 1e-3, 6, Status.DEGRADED),  # it hangs over at the other side: it has slid
+        (85, 1e-3, 0, Status.DEGRADED),
+        (95, 6e-3, 0, Status.DEGRADED),  # a plain surface agrees wherever it is
+    ],
+)
+def test_an_arm_against_the_edges_of_a_print_is_no_slide(agreeing, deviation_m, outside, status):
+    colors = replace(seen(agreeing=agreeing, disagreeing=100 - agreeing), sensor="color")
+    distances = replace(on_the_rim(visible=60, inside=22, outside=outside, off_m=0.04), remainder=Remainder(0.1, 0.1))
+    shape = replace(SHAPE, no_outline_deviation_m=deviation_m)
+    assert judge([distances, colors], (), shape, 0.0, SETTINGS)[0] == status
+
+
 def test_an_estimate_that_the_motion_prior_has_held_back_is_degraded():
     assert judge([fit(1.0)], (), SHAPE, 1.9, SETTINGS) == (Status.TRACKING, ())
     status, reasons = judge([fit(1.0)], (), SHAPE, 2.8, SETTINGS)
@@ -212,14 +228,19 @@ def test_colors_that_agree_do_not_outvote_distances_that_do_not():
     assert judge([beside, colors], (), SHAPE, 0.0, SETTINGS)[0] == Status.DEGRADED, "none of the object is on the mesh"
     assert judge([depth("tof", 5, 14), colors], (), SHAPE, 0.0, SETTINGS)[0] == Status.TRACKING, "too few say nothing"
     dark = replace(colors, counts=VertexCounts(facing=10_000, agreeing=4_000, disagreeing=6_000))
-    assert judge([depth("tof", 300, 0), dark], (), SHAPE, 0.0, SETTINGS)[0] == Status.TRACKING, "a lamp went out"
+    lying = depth("tof", 300, 0)
+    standing = replace(lying, rim=RimFit(visible=20))
+    assert judge([standing, dark], (), SHAPE, 0.0, SETTINGS)[0] == Status.TRACKING, "a lamp went out"
+    _, reasons = judge([lying, dark], (), SHAPE, 0.0, SETTINGS)
+    assert facts(reasons) == ("only 40% of the colours of tof agree",), "no edge tells that it has not slid"
 
 
 def test_distances_that_agree_do_not_outvote_colors_of_a_mesh_half_of_which_is_elsewhere_on_a_floor():
     half = replace(fit(0.95), sensor="rgb", counts=VertexCounts(facing=300, agreeing=170, disagreeing=130))
     reasons = facts(judge([depth("tof", 265, 35), half], (), SHAPE, 0.0, SETTINGS)[1])
     assert reasons == ("only 57% of the colours of rgb agree",)
-    assert judge([depth("tof", 299, 1), half], (), SHAPE, 0.0, SETTINGS)[0] == Status.TRACKING, "the light changed"
+    standing = replace(depth("tof", 299, 1), rim=RimFit(visible=20))
+    assert judge([standing, half], (), SHAPE, 0.0, SETTINGS)[0] == Status.TRACKING, "the light changed"
 
 
 def test_a_mesh_whose_colors_agree_while_hardly_a_distance_does_is_lost():
