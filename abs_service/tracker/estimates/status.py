@@ -22,7 +22,6 @@ from abs_service.tracker.terms.agreement import (
     outside_share,
     rim_distance,
     rim_share,
-    rims,
     turned_away_share,
     unexplained_share,
 )

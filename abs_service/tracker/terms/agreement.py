@@ -17,7 +17,7 @@ LEAST_COLORS = 2 / 3
 #: edge in sight, distances do not tell.
 UNLIT_DISTANCES = 0.05
 
-#: An image shows where a surface is if more than this share of what should be in sight agrees with it.
+#: An image shows where a surface is if more than this share of the vertices that it shows agrees.
 NEARLY_ALL = 0.9
 
 
@@ -89,10 +89,10 @@ def distances_share(fits: Sequence[SensorFit]) -> float:
 
 
 def image_agrees(fits: Sequence[SensorFit]) -> bool:
-    """True if nearly all that should be in sight agrees with an image of the appearance."""
+    """True if nearly all that an image of the appearance shows of the surface agrees."""
     distances = of_distances(fits)
-    counts = [fit.counts for fit in fits if fit not in distances and fit.counts.expected >= MIN_JUDGED]
-    return any(one.agreeing > NEARLY_ALL * one.expected for one in counts)
+    images = [fit for fit in fits if fit not in distances and _judged(fit) >= MIN_JUDGED]
+    return any(fit.counts.agreeing > NEARLY_ALL * _judged(fit) for fit in images)
 
 
 def contradicting(fits: Sequence[SensorFit]) -> list[tuple[str, str, float]]:
