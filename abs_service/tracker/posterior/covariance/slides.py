@@ -13,9 +13,10 @@ from abs_service.tracker.models.base import DeformationModel
 from abs_service.tracker.posterior.optimum import Optimum
 from abs_service.tracker.terms.linearization import Part, PointLinearization
 
-#: Error of the directions [rad], root mean square, in which residuals of outlines and images tell of motion, and of
-#: those of distances: a surface that bends follows another one beneath it that is so much inclined.
-EDGE_ERROR, NORMAL_ERROR = 0.1, 0.3
+#: Error of the directions [rad], root mean square, in which residuals tell of motion: of outlines; of images, since
+#: a print may hardly change along a direction; of distances, since a surface that bends follows another one beneath
+#: it that is so much inclined.
+EDGE_ERROR, PRINT_ERROR, NORMAL_ERROR = 0.1, 0.2, 0.3
 
 #: A model moves rigidly if so many of its vertices lack no more than this share of such motions, in squares.
 _PROBES, _SMALL_SHARE = 60, 1e-3
@@ -58,7 +59,7 @@ class SlideObservability:
         known, feigned = np.zeros((2, len(optimum.sensed), 6, 6))
         for k, part in enumerate(optimum.sensed):
             known[k], feigned[k] = _information(part, *frame)
-            feigned[k] *= (NORMAL_ERROR if _is_of_distances(part) else EDGE_ERROR) ** 2
+            feigned[k] *= _direction_error(part) ** 2
         inside = [isinstance(part, PointLinearization) for part in optimum.sensed]
         motions = _motions(vertices, *frame)
         return _least_held(known, feigned, motions), _least_held(known[inside], feigned[inside], motions)
@@ -71,8 +72,11 @@ def _least_held(known: NDArray[np.float64], feigned: NDArray[np.float64], motion
     return float(1 / np.sqrt(_LEAST + held.min()))
 
 
-def _is_of_distances(part: Part) -> bool:
-    return isinstance(part, PointLinearization) and not part.center.size
+def _direction_error(part: Part) -> float:
+    """Error of the directions in which residuals tell of motion [rad]."""
+    if isinstance(part, PointLinearization):
+        return PRINT_ERROR if part.center.size else NORMAL_ERROR
+    return EDGE_ERROR
 
 
 def _frame(vertices: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
