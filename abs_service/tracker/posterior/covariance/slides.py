@@ -61,13 +61,13 @@ class SlideObservability:
             known[k], feigned[k] = _information(part, *frame)
             feigned[k] *= _direction_error(part) ** 2
         inside = [isinstance(part, PointLinearization) for part in optimum.sensed]
-        motions = _motions(vertices, *frame)
-        return _least_held(known, feigned, motions), _least_held(known[inside], feigned[inside], motions)
+        of_one = _of_one(_motions(vertices, *frame))
+        return _least_held(known, feigned, of_one), _least_held(known[inside], feigned[inside], of_one)
 
 
-def _least_held(known: NDArray[np.float64], feigned: NDArray[np.float64], motions: NDArray[np.float64]) -> float:
+def _least_held(known: NDArray[np.float64], feigned: NDArray[np.float64], of_one: NDArray[np.float64]) -> float:
     """Deviation [m] along the slide that is held least, by information of parts, known and feigned (parts, 6, 6)."""
-    slides = _slides(known.sum(axis=0), motions)
+    slides = _slides(known.sum(axis=0), of_one)
     held = np.maximum(_along(slides, known - feigned), 0.0).sum(axis=0)
     return float(1 / np.sqrt(_LEAST + held.min()))
 
@@ -101,17 +101,21 @@ def _information(
     of_most = weighted.reshape(-1, 6).T @ weighted.reshape(-1, 6)
     if isinstance(part, PointLinearization) and part.center.size:  # of an image
         sight = part.places - part.center
-        unseen = ((sight / np.linalg.norm(sight, axis=1)[:, None])[:, None] @ weighted)[:, 0]
+        x, y, z = (sight / np.linalg.norm(sight, axis=1)[:, None]).T[..., None]
+        unseen = x * weighted[:, 0] + y * weighted[:, 1] + z * weighted[:, 2]
         of_most -= unseen.T @ unseen
     return known.T @ known, of_most
 
 
-def _slides(known: NDArray[np.float64], motions: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Motions (6, 6), columns, that information (6, 6) tells apart; each moves the vertices by 1, root mean square."""
+def _of_one(motions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Motions (6, 6), rows, each of which moves the vertices of motions (n, 3, 6) by 1, root mean square."""
     flat = motions.reshape(-1, 6)
-    moved = flat.T @ flat / len(motions)
-    inverse = np.linalg.inv(np.linalg.cholesky(moved + 1e-9 * np.eye(6)))
-    return np.asarray(inverse.T @ np.linalg.eigh(inverse @ known @ inverse.T)[1], np.float64)
+    return np.asarray(np.linalg.inv(np.linalg.cholesky(flat.T @ flat / len(motions) + 1e-9 * np.eye(6))), np.float64)
+
+
+def _slides(known: NDArray[np.float64], of_one: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Motions (6, 6), columns, that information (6, 6) tells apart, of those that move the vertices by 1."""
+    return np.asarray(of_one.T @ np.linalg.eigh(of_one @ known @ of_one.T)[1], np.float64)
 
 
 def _along(slides: NDArray[np.float64], information: NDArray[np.float64]) -> NDArray[np.float64]:
