@@ -73,6 +73,7 @@ class PointLinearization:
         sparse_jacobian: derivative of the points with respect to theta.
         positions: of all points (n, 3) [m].
         shared: derivatives (m, s) with respect to errors that the residuals share, times those errors' deviations.
+        center: of the camera (3,) [m] that tells of motion across its lines of sight only; empty (0,) for distances.
     """
 
     residual: NDArray[np.float64]
@@ -81,6 +82,7 @@ class PointLinearization:
     sparse_jacobian: SparseJacobian
     positions: NDArray[np.floating]
     shared: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
+    center: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
 
     @classmethod
     def empty(cls, sparse_jacobian: SparseJacobian) -> "PointLinearization":

@@ -160,7 +160,9 @@ class ObservedColor:
         points = np.repeat(use, residual.shape[1])
         samples = seen.interpolation.follow(sparse_jacobian)
         bias = self.bias.derivatives(vertices, rows, points)
-        return [PointLinearization(residual[use].ravel(), rows, points, samples, vertices, bias)]
+        return [
+            PointLinearization(residual[use].ravel(), rows, points, samples, vertices, bias, self.view.camera.center)
+        ]
 
     def fit(self, surface: Surface) -> SensorFit:
         """Agreement of the sensor with a population of one."""

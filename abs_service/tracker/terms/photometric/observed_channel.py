@@ -101,7 +101,7 @@ class ObservedChannel:
         rows = shortened(rows, float(noise))
         samples, points = seen.interpolation.follow(sparse_jacobian), np.flatnonzero(use)
         bias = self.bias.derivatives(vertices, rows, points)
-        return [PointLinearization(residual[use], rows, points, samples, vertices, bias)]
+        return [PointLinearization(residual[use], rows, points, samples, vertices, bias, self.view.camera.center)]
 
     def fit(self, surface: Surface) -> SensorFit:
         """Agreement of the sensor with a population of one."""
