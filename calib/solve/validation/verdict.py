@@ -13,6 +13,7 @@ from calib.solve.validation.cross_validation import Agreement, TooFewToSplitErro
 from calib.solve.validation.free_shape import free_shape
 from calib.solve.validation.other_lens import other_lenses, undescribed
 from calib.solve.validation.projection_uncertainty import UncertaintyMap
+from calib.solve.validation.square_pixels import not_square
 from calib.solve.validation.unlike_shots.changes import unseen
 from calib.solve.validation.unlike_shots.contradictions import Contradiction, outliers
 from calib.solve.validation.unlike_shots.findings import unlike_shots
@@ -90,6 +91,7 @@ def assess(
     reasons += weak_directions(solution, distance)
     reasons += outliers(solution, {one.shot for one in contradicting})
     reasons += undescribed(solution, needed_px)
+    reasons += not_square(solution)
     try:
         agreements = cross_validate(solution, distance, note, half)
         reasons += _disagreeing(agreements, needed_px)
