@@ -41,7 +41,7 @@ def solved(views: list[CornerView], *given: Camera) -> Solution:
 
 
 def test_a_board_that_sank_while_rows_were_read_is_not_trusted() -> None:
-    assessment = assess(solved(rolling_shutter(0.5)), 1.0, 1.0)
+    assessment = assess(solved(rolling_shutter(0.3)), 1.0, 1.0)
     assert not assessment.trusted
     assert any("wider than high, and those of sensors are square" in reason for reason in assessment.reasons)
 
@@ -51,7 +51,7 @@ def test_a_board_that_was_held_still_is_trusted() -> None:
 
 
 def test_a_camera_that_is_given_with_such_pixels_dispels_the_doubt() -> None:
-    solution = solved(rolling_shutter(0.5))
+    solution = solved(rolling_shutter(0.3))
     other = solution.cameras["color"]
     assert not_square(solution)
-    assert not not_square(replace(solution, task=solved(rolling_shutter(0.5), other).task))
+    assert not not_square(replace(solution, task=solved(rolling_shutter(0.3), other).task))
