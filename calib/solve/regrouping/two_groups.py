@@ -40,7 +40,7 @@ class TwoGroups:
 
     @property
     def advice(self) -> str:
-        """What to leave out; of groups that are about as large, one of both."""
+        """Advice: shots to leave out; of groups that are about as large, either."""
         smaller = numbered(self.smaller)
         if len(self.smaller) <= _EQUAL * len(self.larger):
             return f"Look at both groups, and leave one out: --skip {smaller}"

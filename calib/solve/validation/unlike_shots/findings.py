@@ -1,4 +1,4 @@
-"""Whether all shots show one board and one rig: what is wrong, with the most likely cause first."""
+"""Findings on shots that do not show the same board and rig as the others, the most likely cause first."""
 
 from collections.abc import Collection, Sequence
 from typing import NamedTuple
