@@ -15,7 +15,7 @@ def test_samples_read_the_window_its_end_and_occluders(seed, as_levels):
     generator, pixels = np.random.default_rng(seed), CopiedPixels()
     for _ in range(3):  # of the frame before, nothing is left
         levels = generator.integers(0, 256, (HEIGHT, WIDTH, 3))
-        picture = levels.astype(np.uint8 if as_levels else np.float32)
+        picture = levels.astype(np.uint8) if as_levels else levels.astype(np.float32)
         top, left = generator.integers(HEIGHT - 2), generator.integers(WIDTH - 2)
         window = (
             slice(top, generator.integers(top + 1, HEIGHT + 1)),
