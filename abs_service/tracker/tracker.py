@@ -111,8 +111,9 @@ class Tracker:
         motion = self._posterior.motion.update(frame.motion, optimum.theta, optimum.inverse_curvature)
         covariance = self._theta_covariance.update(optimum, frame.motion, motion)
         vertex_covariance = self._vertex_covariance.update(optimum, frame, covariance)
-        unheld = max(single_frame_deviation(optimum, frame.motion), self._slides.deviation(optimum))
-        shape = self._shape.compare(optimum.vertices, vertex_covariance, unheld)
+        unheld, without_outline = self._slides.deviations(optimum)
+        unheld = max(single_frame_deviation(optimum, frame.motion), unheld)
+        shape = self._shape.compare(optimum.vertices, vertex_covariance, unheld, without_outline)
         fits = outcome.compared(frame).fits
         frame.learn(optimum.surface)
         verdict, reasons = status.judge(

@@ -18,9 +18,9 @@ from calib.solve.bundle import rotations
 from calib.solve.bundle.adjustment import Adjustment, NotSolvedError
 from calib.solve.bundle.parameters.layout import POSE
 from calib.solve.solution import Solution
-from calib.solve.validation.contradictions import Contradiction, contradictions
 from calib.solve.validation.free_shape import free_shape
-from calib.solve.validation.steadiness import Change, changes_of_place
+from calib.solve.validation.unlike_shots.contradictions import Contradiction, contradictions
+from calib.solve.validation.unlike_shots.steadiness import Change, changes_of_place
 
 #: Minimum number of common shots of two sensors.
 MIN_SHOTS = 3

@@ -10,7 +10,7 @@ from calib.calibration_check.stored import Stored, Views
 from calib.solve.bundle.adjustment import NotSolvedError
 from calib.solve.bundle.parameters.lens_parameters import MATRIX
 from calib.solve.solution import Solution
-from calib.solve.validation.steadiness import HARMLESS
+from calib.solve.validation.unlike_shots.steadiness import HARMLESS
 from calib.solve.validation.verdict import Assessment
 
 

@@ -7,9 +7,14 @@ from calib.solve.bundle.adjustment import NotSolvedError, adjust
 from calib.solve.bundle.formulation import formulate, groups_of
 from calib.solve.bundle.parameters.state import State
 from calib.solve.bundle.tasks import Task
+from calib.solve.regrouping.guesses import by_relative_pose
+from calib.solve.regrouping.two_groups import two_groups
 from calib.solve.solution import Solution
 from calib.solve.start.board_poses import untilted
 from calib.solve.start.start import start
+
+#: Two groups explain why there is no minimum if corners miss this many times more with the cameras of the other group.
+_APART = 3.0
 
 
 def calibrate(task: Task, note: Callable[[str], None] = lambda _: None) -> Solution:
@@ -37,5 +42,15 @@ def _solve(task: Task, start: State, note: Callable[[str], None]) -> Solution:
     try:
         return Solution(task, adjust(formulation, start, len(groups), note))
     except NotSolvedError as error:
-        why = diagnoses.unlike_the_rest(task, start) or untilted(start.boards.values())
+        why = _two(task, start) or diagnoses.unlike_the_rest(task, start) or untilted(start.boards.values())
         raise NotSolvedError(f"{error}{why}") from error
+
+
+def _two(task: Task, start: State) -> str:
+    """Two groups of shots that have no minimum together, as the end of a sentence; "" if there are none."""
+    if len(task.sensors) < 2 or any(sensor.free_running for sensor in task.sensors.values()):
+        return ""
+    cameras = {name: sensor.camera for name, sensor in start.sensors.items()}
+    found = two_groups(task, cameras, [by_relative_pose(task, cameras)])
+    said = [str(two) for two in found if two.other_px > _APART * two.alone_px]
+    return "".join(f". {each[:1].upper()}{each[1:]}" for each in said)

@@ -12,8 +12,8 @@ from calib.calibration_check.hypotheses import TERMS, Kind
 from calib.calibration_check.mistakes import Mistake
 from calib.calibration_check.stored import Views
 from calib.solve.validation.board_shape import ShapeError
-from calib.solve.validation.contradictions import Contradiction
 from calib.solve.validation.distance_errors import Displaced, Misread
+from calib.solve.validation.unlike_shots.contradictions import Contradiction
 
 #: Distance bias that is as good as any depth camera's, and that is unacceptable [m].
 UNNOTICED_M, WRONG_M = 0.002, 0.01

@@ -24,12 +24,14 @@ class ShapeQuality:
         folded_share: share of the pairs of neighbouring faces that are folded onto each other, 0…1.
         deviation_m: standard deviation of the position of a vertex, median [m].
         single_frame_deviation_m: the same by the measurements of this frame alone, without the past [m].
+        no_outline_deviation_m: the same along the rigid motion that is held least, without the outline [m].
     """
 
     stretch: float = 0.0
     folded_share: float = 0.0
     deviation_m: float = float("nan")
     single_frame_deviation_m: float = float("nan")
+    no_outline_deviation_m: float = float("nan")
 
 
 class ShapeComparison:
@@ -45,14 +47,18 @@ class ShapeComparison:
         self._corners = mesh.faces[self._pairs].reshape(-1, 6)
 
     def compare(
-        self, vertices: NDArray[np.floating], vertex_covariance: NDArray[np.float64], single_frame_deviation_m: float
+        self,
+        vertices: NDArray[np.floating],
+        vertex_covariance: NDArray[np.float64],
+        single_frame_deviation_m: float,
+        no_outline_deviation_m: float,
     ) -> ShapeQuality:
         """Quality of deformed vertices (n, 3) [m] with covariances (n, 3, 3) [m²].
 
         Args:
             vertices: deformed vertices.
             vertex_covariance: of every vertex.
-            single_frame_deviation_m: see `ShapeQuality`.
+            single_frame_deviation_m, no_outline_deviation_m: see `ShapeQuality`.
         """
         stretch, variance = np.empty(len(self._edges)), np.einsum("nii->n", vertex_covariance)
         folded = compare_shapes(vertices, self._edges, self._lengths, self._corners, stretch)
@@ -61,6 +67,7 @@ class ShapeComparison:
             folded_share=folded / len(self._pairs) if len(self._pairs) else 0.0,
             deviation_m=float(np.sqrt(percentile(variance, 0.5))),
             single_frame_deviation_m=single_frame_deviation_m,
+            no_outline_deviation_m=no_outline_deviation_m,
         )
 
 

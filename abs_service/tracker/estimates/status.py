@@ -12,7 +12,9 @@ from abs_service.tracker.estimates.shape_quality import ShapeQuality
 from abs_service.tracker.terms.agreement import (
     contradicting,
     distances_share,
+    hangs_over,
     has_left,
+    image_agrees,
     inlier_share,
     most_agreeing,
     occluded_share,
@@ -20,7 +22,6 @@ from abs_service.tracker.terms.agreement import (
     outside_share,
     rim_distance,
     rim_share,
-    rims,
     turned_away_share,
     unexplained_share,
 )
@@ -197,10 +198,11 @@ _ABSENT = {
 def _placed(fits: Sequence[SensorFit], shape: ShapeQuality, innovation: float, limits: Settings) -> Iterator[str]:
     """Reasons by where the mesh lies."""
     if is_misplaced(fits, shape, limits):
+        off_m = rim_distance(fits)
+        off = f"{off_m * 1e3:.0f} mm" if np.isfinite(off_m) else "an unknown distance"
         yield (
             f"{rim_share(fits):.0%} of the free edges lie off the object's outline, by "
-            f"{rim_distance(fits) * 1e3:.0f} mm together or across a slide: "
-            + (_SLID if _hangs_over(fits) else _GOES_ON)
+            f"{off} together or across a slide: " + (_SLID if hangs_over(fits) else _GOES_ON)
         )
     if any(fit.is_surprised for fit in fits) and not any(np.isfinite(fit.remainder.share) for fit in fits):
         yield (
@@ -237,11 +239,11 @@ def _shaped(shape: ShapeQuality, limits: Settings) -> Iterator[str]:
 
 
 def is_misplaced(fits: Sequence[SensorFit], shape: ShapeQuality, limits: Settings) -> bool:
-    """True if the free edges lie off the outline: too many of them, or by more than the covariances claim."""
+    """True if the free edges lie off the outline: too many of them, or by more than the covariances claim.
+
+    Edges inside the outline do not count if distances and images hold the surface: something lies against them.
+    """
     claimed = np.fmax(limits.degraded_rim_m, shape.deviation_m)
-    return rim_share(fits) > limits.degraded_rim or bool(rim_distance(fits) > claimed)
-
-
-def _hangs_over(fits: Sequence[SensorFit]) -> bool:
-    """True if a mesh off its outline hangs over it: one that slides does so on the side that it slides to."""
-    return any(4 * rim.outside >= rim.inside for rim in rims(fits))
+    is_off = rim_share(fits) > limits.degraded_rim or bool(rim_distance(fits) > claimed)
+    is_held = shape.no_outline_deviation_m < limits.degraded_rim_m and image_agrees(fits)
+    return is_off and (hangs_over(fits) or not is_held)

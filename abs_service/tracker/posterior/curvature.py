@@ -8,7 +8,7 @@ import scipy  # its parts are imported when they are first used
 from numpy.typing import NDArray
 
 from abs_service.tracker.terms.grouped import GroupedLinearization
-from abs_service.tracker.terms.linearization import Part, PointLinearization, add_squares
+from abs_service.tracker.terms.linearization import Part, PointLinearization, add_gradients, add_squares
 
 #: Message of the error for a curvature without a Cholesky factor.
 NOT_POSITIVE = "the curvature of the cost is not positive definite"
@@ -34,11 +34,12 @@ def gauss_newton(parts: Sequence[Part | GroupedLinearization], dimension: int) -
     """Gauss–Newton approximation of the cost: sums of the gradients Jᵀr and the curvatures JᵀJ of all parts."""
     gradient, curvature, at_points = np.zeros(dimension), np.zeros((dimension, dimension)), []
     for part in (part for part in parts if len(part.residual)):
-        part.add_gradient(gradient)
         if isinstance(part, PointLinearization):
             at_points.append(part)
         else:
+            part.add_gradient(gradient)
             part.add_curvature(curvature)
+    add_gradients(at_points, gradient)
     add_squares(at_points, [np.ones(len(part.residual)) for part in at_points], curvature)
     return Quadratic(gradient, curvature)
 
@@ -62,7 +63,7 @@ def solved(curvature: NDArray[np.float64], right: NDArray[np.float64]) -> NDArra
     Raises:
         LinAlgError: the curvature is not positive definite.
     """
-    _, found, is_indefinite = scipy.linalg.lapack.dposv(curvature, right)
+    _, found, is_indefinite = scipy.linalg.lapack.dposv(curvature.T, right)  # symmetric: the copy keeps its order
     if is_indefinite:
         raise np.linalg.LinAlgError(NOT_POSITIVE)
     return np.asarray(found, np.float64)
@@ -90,7 +91,7 @@ def posterior_covariance(quadratic: Quadratic) -> NDArray[np.float64]:
 
 def _cholesky(curvature: NDArray[np.float64]) -> NDArray[np.float64]:
     """Lower Cholesky factor (dim, dim), see `whitened`."""
-    factor, is_indefinite = scipy.linalg.lapack.dpotrf(curvature, lower=True)
+    factor, is_indefinite = scipy.linalg.lapack.dpotrf(curvature.T, lower=True)  # symmetric: the copy keeps its order
     if is_indefinite:
         raise np.linalg.LinAlgError(NOT_POSITIVE)
     return factor

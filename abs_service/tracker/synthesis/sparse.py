@@ -24,6 +24,7 @@ from abs_service.tracker.synthesis.projection import Optics, Projection
 from abs_service.tracker.synthesis.rasterization.raster import Raster
 from abs_service.tracker.synthesis.window import around
 from calib.camera import Camera
+from calib.jit import kernel
 from calib.rig import Rig
 
 #: Self-occlusion: a vertex is occluded if the rendered mesh is nearer to the camera by more than this [m].
@@ -97,12 +98,11 @@ class SparseView:
         """The view without the vertices that face away or are self-occluded in the predicted mesh."""
         view = self.unoccluded(predicted)
         seen = view.synthesize(predicted)
-        row, column = np.divmod(seen.pixel[0], self.camera.width + 2)
-        inside = seen.pixel[0] > 0
-        front = self._raster.render_at(predicted.vertices[0], (row - 1) * inside, (column - 1) * inside)
-        sight = predicted.vertices[0] - self.camera.center[:, None]
-        facing = np.einsum("in,in->n", predicted.normals[0], sight) < 0
-        return replace(view, hidden=~facing | (inside & (front < seen.distance[0] - HIDING_M)), single={})
+        pixel, distance, stride = seen.pixel[0], seen.distance[0], self.camera.width + 2
+        rows, columns = np.divmod(np.maximum(pixel - (stride + 1), 0), stride)
+        front, hidden = self._raster.render_at(predicted.vertices[0], rows, columns), np.empty_like(view.hidden)
+        hide(predicted.vertices[0], predicted.normals[0], self.camera.center, front, distance, pixel, hidden)
+        return replace(view, hidden=hidden, single={})
 
     def unoccluded(self, predicted: Surface) -> "ObservedSparseView":
         """The view of all vertices, whatever may be before them."""
@@ -195,3 +195,29 @@ class AtVertices:
 
 
 AT_VERTICES = AtVertices()
+
+
+@kernel
+def hide(
+    vertices: NDArray[np.float32],
+    normals: NDArray[np.float32],
+    center: NDArray[np.float64],
+    front: NDArray[np.float32],
+    distance: NDArray[np.float32],
+    pixel: NDArray[np.int32],
+    hidden: NDArray[np.bool_],
+) -> None:
+    """Marks vertices (3, n) [m] that face away from a camera's centre (3,), or in front of which the mesh itself lies.
+
+    Args:
+        vertices, normals: of the surface (3, n).
+        center: of the camera [m].
+        front, distance: of the rendered mesh at the vertices' pixels, and of the vertices (n,) [m].
+        pixel: not above 0 where the camera does not see the vertex (n,).
+        hidden: result (n,).
+    """
+    for v in range(hidden.size):
+        along = 0.0
+        for i in range(3):
+            along += normals[i, v] * (np.float64(vertices[i, v]) - center[i])
+        hidden[v] = not along < 0 or (pixel[v] > 0 and front[v] < distance[v] - np.float32(HIDING_M))

@@ -1,5 +1,6 @@
 """Window of a camera's image that can contain the object; only its pixels are prepared for a frame."""
 
+import math
 from typing import Generic, TypeVar
 
 import numpy as np
@@ -34,12 +35,15 @@ def around(camera: Camera, projection: Projection, predicted: Surface, reach_m: 
     nearest = seen.inverse_z.max(initial=0.0)
     if not np.isfinite(reach_m * nearest):
         return WHOLE
-    margin = reach_m * max(camera.fx, camera.fy) * nearest + 2
-    low, high = extent(seen)
-    size = np.array([camera.height, camera.width])
-    first = np.clip(np.floor(low - margin), 0, size - 1).astype(int) // 2 * 2
-    last = np.clip(np.ceil(high + margin) + 1, first + 1, size).astype(int).tolist()
-    return slice(int(first[0]), last[0]), slice(int(first[1]), last[1])
+    margin, (low, high) = reach_m * max(camera.fx, camera.fy) * nearest + 2, extent(seen)
+    (top, left), (bottom, right) = (low - margin).tolist(), (high + margin).tolist()
+    return _between(top, bottom, camera.height), _between(left, right, camera.width)
+
+
+def _between(first: float, last: float, size: int) -> slice:
+    """Rows or columns from one to another, of as many as the image has."""
+    begin = int(min(max(first, 0), size - 1)) // 2 * 2
+    return slice(begin, math.ceil(min(max(last, begin), size - 1)) + 1)
 
 
 def corner(window: Window) -> tuple[int, int]:

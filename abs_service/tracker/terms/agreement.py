@@ -13,8 +13,12 @@ MIN_JUDGED = 20
 #: A vertex beside its place has a colour that agrees by chance, every third one on a print. So half of a mesh may be
 #: elsewhere if fewer than this share of a sensor's colours agree …
 LEAST_COLORS = 2 / 3
-#: … and more than this share of the distances disagree: those stay as they were when a lamp goes out.
+#: … and more than this share of the distances disagree: those stay as they were when a lamp goes out. Without a free
+#: edge in sight, distances do not tell.
 UNLIT_DISTANCES = 0.05
+
+#: An image shows where a surface is if more than this share of the vertices that it shows agrees.
+NEARLY_ALL = 0.9
 
 
 def inlier_share(fits: Sequence[SensorFit]) -> float:
@@ -84,13 +88,21 @@ def distances_share(fits: Sequence[SensorFit]) -> float:
     return max((good / known for good, known, whole in seen if known >= max(MIN_JUDGED, whole / 2)), default=1.0)
 
 
+def image_agrees(fits: Sequence[SensorFit]) -> bool:
+    """True if nearly all that an image of the appearance shows of the surface agrees."""
+    distances = of_distances(fits)
+    images = [fit for fit in fits if fit not in distances and _judged(fit) >= MIN_JUDGED]
+    return any(fit.counts.agreeing > NEARLY_ALL * _judged(fit) for fit in images)
+
+
 def contradicting(fits: Sequence[SensorFit]) -> list[tuple[str, str, float]]:
     """Name, kind of measurement and agreeing share of every sensor that contradicts the mesh.
 
-    Most of its distances disagree, or a third of its colours together with some distances.
+    Most of its distances disagree, or a third of its colours: together with some distances, or if no free edge tells
+    whether the surface is where it was. On a table, its distances agree wherever it is.
     """
     distances = of_distances(fits)
-    moved = any(fit.counts.disagreeing > UNLIT_DISTANCES * _judged(fit) for fit in distances)
+    moved = any(fit.counts.disagreeing > UNLIT_DISTANCES * _judged(fit) or not rims(fits) for fit in distances)
     result = []
     for fit in fits:
         what, least = ("distances", 1 / 2) if fit in distances else ("colours", LEAST_COLORS if moved else 0.0)
@@ -132,3 +144,8 @@ def rim_distance(fits: Sequence[SensorFit]) -> float:
 def rims(fits: Sequence[SensorFit]) -> list[RimFit]:
     """Agreement of the edges with the outline, of the sensors in which enough are visible."""
     return [fit.rim for fit in fits if fit.rim.visible >= MIN_RIM]
+
+
+def hangs_over(fits: Sequence[SensorFit]) -> bool:
+    """True if a mesh off its outline hangs over it: one that slides does so on the side that it slides to."""
+    return any(4 * rim.outside >= rim.inside for rim in rims(fits))

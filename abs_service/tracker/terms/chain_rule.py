@@ -19,7 +19,7 @@ _ROUNDING = 1e-15
 def sum_at_points(
     rows: NDArray[np.float64], points: NDArray[np.int64], values: NDArray[np.float64], at_points: NDArray[np.float64]
 ) -> None:
-    """Sum of rowᵀ times value (3, k) over the residuals of each point, into zeros (n, 3, k)."""
+    """Adds rowᵀ times value (3, k) of every residual to that of its point (n, 3, k)."""
     for m in range(points.size):
         for i in range(3):
             total = at_points[points[m], i]

@@ -61,7 +61,7 @@ def color_rows(
         camera: its camera.
         vertices: positions (n, 3) [m].
     """
-    return _image_rows(image, *project_with_jacobian(camera, vertices))
+    return _image_rows(image, *project_with_jacobian(camera, vertices), np.ones((1, image.shape[2])))
 
 
 def noiseless_color_rows(
@@ -80,7 +80,7 @@ def noiseless_color_rows(
         weight: of the measurements (n, channels) [1/image unit].
     """
     places, projection = project_with_jacobian(camera, vertices)
-    rows = _image_rows(image, places, projection) * weight[..., None]
+    rows = _image_rows(image, places, projection, weight)
     weighted = np.square(noise_deviation(image, places) * weight).sum(axis=1)
     entries = projection.reshape(len(projection), 6)
     return shortened(rows, _NOISE_GAIN * float(weighted @ np.vecdot(entries, entries)))
@@ -98,11 +98,14 @@ def shortened(rows: NDArray[np.float64], noise: float) -> NDArray[np.float64]:
 
 
 def _image_rows(
-    image: NDArray[np.float32] | NDArray[np.uint8], places: NDArray[np.float64], projection: NDArray[np.float64]
+    image: NDArray[np.float32] | NDArray[np.uint8],
+    places: NDArray[np.float64],
+    projection: NDArray[np.float64],
+    weight: NDArray[np.floating],
 ) -> NDArray[np.float64]:
-    """`color_rows` at places (n, 2), with the Jacobians of the projection (n, 2, 3) there."""
+    """Weighted (n or 1, channels) `color_rows` at places (n, 2), with the Jacobians of the projection (n, 2, 3)."""
     rows = np.empty((len(places), image.shape[2], 3))
-    _color_rows(image, places, _REGRESSION, projection, rows)
+    _color_rows(image, places, _REGRESSION, projection, weight, rows)
     return rows
 
 
@@ -188,9 +191,10 @@ def _color_rows(
     places: NDArray[np.float64],
     weights: NDArray[np.float64],
     projection: NDArray[np.float64],
+    scales: NDArray[np.floating],
     rows: NDArray[np.float64],
 ) -> None:
-    """Image gradients at places (n, 2) by regression, times the Jacobians of the projection (n, 2, 3)."""
+    """Image gradients at places (n, 2) by regression, times the Jacobians of the projection (n, 2, 3) and scales."""
     height, width, channels = image.shape
     side, reach = weights.shape[0], weights.shape[0] // 2
     for v in range(places.shape[0]):
@@ -205,5 +209,6 @@ def _color_rows(
                     value = weights[i, j] * (own[c] if np.isnan(color) else color)
                     right += (j - reach) * value
                     down += (i - reach) * value
+            scale = scales[v if scales.shape[0] > 1 else 0, c]
             for k in range(3):
-                rows[v, c, k] = right * projection[v, 0, k] + down * projection[v, 1, k]
+                rows[v, c, k] = (right * projection[v, 0, k] + down * projection[v, 1, k]) * scale

@@ -73,6 +73,7 @@ class PointLinearization:
         sparse_jacobian: derivative of the points with respect to theta.
         positions: of all points (n, 3) [m].
         shared: derivatives (m, s) with respect to errors that the residuals share, times those errors' deviations.
+        center: of the camera (3,) [m] that tells of motion across its lines of sight only; empty (0,) for distances.
     """
 
     residual: NDArray[np.float64]
@@ -81,6 +82,7 @@ class PointLinearization:
     sparse_jacobian: SparseJacobian
     positions: NDArray[np.floating]
     shared: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
+    center: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
 
     @classmethod
     def empty(cls, sparse_jacobian: SparseJacobian) -> "PointLinearization":
@@ -115,10 +117,6 @@ class PointLinearization:
         """Sum of the derivatives (s, dim) of the residuals that share an error, times that error's deviation."""
         return self.transposed_times(self.shared, self.sparse_jacobian.dimension).T
 
-    def add_gradient(self, total: NDArray[np.float64]) -> None:
-        """Adds Jᵀr to a gradient (dim,)."""
-        total += self.transposed_times(self.residual[:, None], len(total))[:, 0]
-
     def leverage(self, covariance: NDArray[np.float64], at_points: AtPoints) -> NDArray[np.float64]:
         """diag(J Σ Jᵀ) (m,) of a covariance Σ (dim, dim) of theta, or of what that is at the points."""
         result = np.empty(len(self.residual))
@@ -134,10 +132,24 @@ class PointLinearization:
 Part = Linearization | PointLinearization
 
 
+def add_gradients(parts: Sequence[PointLinearization], total: NDArray[np.float64]) -> None:
+    """Adds Jᵀr of every part to a gradient (dim,).
+
+    What different sensors measure of the same points is added up at the points first.
+    """
+    at_points: dict[SparseJacobian, NDArray[np.float64]] = {}
+    for part in parts:
+        samples = part.sparse_jacobian
+        forces = at_points.setdefault(samples, np.zeros((len(samples.local), 3, 1)))
+        chain_rule.sum_at_points(part.rows, part.points, part.residual[:, None], forces)
+    for samples, forces in at_points.items():
+        chain_rule.transpose_times(forces, samples.blocks, total[:, None])
+
+
 def add_squares(parts: Sequence[Part], weights: Sequence[NDArray[np.float64]], total: NDArray[np.float64]) -> None:
     """Adds Jᵀ diag(weights) J, of weights (m,) of every part, not negative, to a matrix (dim, dim).
 
-    What different sensors measure of the same points is added up at the points first.
+    See `add_gradients`.
     """
     at_points: dict[SparseJacobian, NDArray[np.float64]] = {}
     for part, own in zip(parts, weights, strict=True):

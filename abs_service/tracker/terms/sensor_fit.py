@@ -23,7 +23,8 @@ class RimFit:
         visible: on free edges, not behind an occluder, in a hole or behind the mesh's own surface.
         outside: of these, beside the object: the mesh hangs over the outline.
         inside: of these, far inside the outline: measured surface of the object continues beyond the mesh.
-        off_m: distance of the visible ones from the outline [m], see `displacement` and `motion` in `rim_motion`.
+        off_m: distance of the visible ones from the outline [m], see `displacement` and `motion` in `rim_motion`; ∞ if
+            the mesh has slid by an unknown distance.
         occluded: on free edges, but not visible.
         covered: on edges that something hid in the first image, or that its border cut.
         uncovered: of these, measured surface of the object now continues beyond the mesh.

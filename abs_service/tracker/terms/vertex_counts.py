@@ -82,16 +82,20 @@ class VertexMasks:
 
     def count(self, measured: NDArray[np.bool_], agreeing: NDArray[np.bool_]) -> VertexCounts:
         """Numbers of samples, by masks (n,) of those that are measured and those that agree."""
-        known, good = self.visible & measured, _count(self.visible & agreeing)
-        facing = _count(self.visible) + self.occluded + _count(self.outside) + _count(self.unjudged)
+        visible, missing, outside, unjudged, covered, behind = map(
+            _count,
+            (self.visible, self.missing, self.outside, self.unjudged, self.behind_occluder, self.behind_itself),
+        )
+        known, good = _count(self.visible & measured), _count(self.visible & agreeing)
+        facing = visible + missing + covered + behind + outside + unjudged
         return VertexCounts(
             facing=facing,
             agreeing=good,
-            disagreeing=_count(known) - good,
-            missing=_count(self.missing) + _count(self.visible) - _count(known),
-            behind_occluder=_count(self.behind_occluder),
-            behind_itself=_count(self.behind_itself),
-            outside=_count(self.outside),
+            disagreeing=known - good,
+            missing=missing + visible - known,
+            behind_occluder=covered,
+            behind_itself=behind,
+            outside=outside,
             turned_away=len(self.visible) - facing,
         )
 

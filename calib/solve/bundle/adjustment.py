@@ -17,7 +17,8 @@ from scipy.optimize import least_squares
 from scipy.sparse.linalg import aslinearoperator
 
 from calib.solve.bundle import robust, uncertainty, variance_components
-from calib.solve.bundle.equations import Equations
+from calib.solve.bundle.bent_boards import bend_covariance
+from calib.solve.bundle.equations import DAMPING, Equations
 from calib.solve.bundle.observability import require_determined, require_touched
 from calib.solve.bundle.parameters.layout import Layout
 from calib.solve.bundle.parameters.state import State
@@ -39,10 +40,6 @@ NO_MINIMUM = (
 #: Convergence: smallest decrease of the cost in a stage, a tenth of a deviation of the worst determined parameter.
 #: Deviations are as large as the residuals say: before the first estimate they may be many times too small.
 MIN_GAIN = 0.005
-
-#: Damping relative to the diagonal of the curvature, for the redundant parameters of a rational lens without
-#: distortion.
-DAMPING = 1e-10
 
 #: Lower bound of a group's deviation factor.
 MIN_FACTOR = 0.01
@@ -96,10 +93,15 @@ class Adjustment:
 
     @cached_property
     def covariance(self) -> NDArray[np.float64]:
-        """Covariance of increments of the parameters (size, size), from how far the poses of the board disagree."""
+        """Covariance of increments of the parameters (size, size), from how far the poses of the board disagree.
+
+        What a bend of the board does to all of them alike is added.
+        """
         if self.layout.board_start == 0:
             return self.independent
-        return uncertainty.with_boards(self.independent, uncertainty.pose_covariance(self.pose_information, self.noise))
+        sensors = uncertainty.pose_covariance(self.pose_information, self.noise)
+        sensors = sensors + bend_covariance(self.equations, self.residuals)
+        return uncertainty.with_boards(self.independent, sensors)
 
     @cached_property
     def pose_information(self) -> uncertainty.PoseInformation:

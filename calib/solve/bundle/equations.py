@@ -19,6 +19,10 @@ from calib.solve.bundle.parameters.state import SensorState, State
 #: Sensors by their names.
 Sensors = Mapping[str, SensorState]
 
+#: Damping relative to the diagonal of the curvature, for the redundant parameters of a rational lens without
+#: distortion.
+DAMPING = 1e-10
+
 
 @dataclass(frozen=True)
 class Group:

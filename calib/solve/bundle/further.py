@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from calib.solve.bundle import robust
-from calib.solve.bundle.adjustment import DAMPING
-from calib.solve.bundle.equations import Equations
+from calib.solve.bundle.equations import DAMPING, Equations
 from calib.solve.bundle.uncertainty import MAX_SHARE, MIN_POSES
 
 

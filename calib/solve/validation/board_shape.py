@@ -6,15 +6,14 @@ equations, its deviation from the scatter of the distinct poses (a sandwich esti
 `calib.solve.bundle.uncertainty`).
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
 
-from calib.solve.bundle.blocks import Corners
-from calib.solve.bundle.equations import Equations
+from calib.solve.bundle.bent_boards import shape_columns
 from calib.solve.bundle.further import further
 from calib.solve.solution import Solution
 from calib.solve.validation import projection_uncertainty
@@ -107,40 +106,11 @@ def shape_errors(solution: Solution, distance: float, needed_px: float) -> list[
 
 def _estimates(solution: Solution, distance: float) -> Iterator[ShapeError]:
     equations = solution.adjustment.equations
-    columns = shape_columns(equations, equations.jacobian(np.zeros(equations.layout.size)).toarray(), _displacements)
+    columns = shape_columns(equations, equations.jacobian(np.zeros(equations.layout.size)), _displacements)
     shapes = (Shape.STRETCH, Shape.TAGS, *(Shape.BEND,) * (columns.shape[1] - 2))
     every = further(equations, solution.adjustment.residuals, [column[:, None] for column in columns.T])
     for shape, one in zip(shapes, every, strict=False):  # of too few poses there are none
         yield ShapeError(shape, one.sizes.item(), one.sigmas.item(), _effect(solution, one.changes, distance))
-
-
-def shape_columns(
-    equations: Equations,
-    jacobian: NDArray[np.float64],
-    displacements: Callable[[NDArray[np.float64]], NDArray[np.float64]],
-) -> NDArray[np.float64]:
-    """Derivatives of the residuals with respect to displacements of the board's points (n, m).
-
-    Args:
-        equations: see there.
-        jacobian: of the equations, dense.
-        displacements: of points of the board (k, 3) in its frame (k, m, 3) [m].
-    """
-    layout = equations.layout
-    turns = np.stack([equations.base.boards[shot][:3, :3] for shot in layout.shots])
-    found = []
-    for group, rows in zip(equations.groups, equations.slices(), strict=True):
-        count = displacements(np.zeros((1, 3))).shape[1]
-        if not isinstance(group.measured, Corners) or group.shots.ndim > 1:
-            found.append(np.zeros((rows.stop - rows.start, count)))
-            continue
-        shots = group.shots[group.views_of_rows]
-        own = jacobian[rows]
-        starts = layout.board_start + 6 * shots + 3
-        by_place = np.stack([own[np.arange(len(shots)), starts + axis] for axis in range(3)], axis=1)
-        displaced = np.repeat(displacements(group.measured.points_b), 2, axis=0)
-        found.append(np.einsum("ni,nij,nkj->nk", by_place, turns[shots], displaced))
-    return np.concatenate(found)
 
 
 def _displacements(points: NDArray[np.float64]) -> NDArray[np.float64]:

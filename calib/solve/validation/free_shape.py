@@ -15,12 +15,11 @@ from numpy.typing import NDArray
 from scipy import linalg, sparse
 
 from calib.solve.bundle import robust
-from calib.solve.bundle.adjustment import DAMPING
+from calib.solve.bundle.bent_boards import shape_columns
 from calib.solve.bundle.blocks import Corners
-from calib.solve.bundle.equations import Equations
+from calib.solve.bundle.equations import DAMPING, Equations
 from calib.solve.bundle.uncertainty import PoseInformation, information_of
 from calib.solve.solution import Solution
-from calib.solve.validation.board_shape import shape_columns
 
 #: Degrees of the polynomials: out of the board, in its plane, and in an image; those that poses and camera matrices do
 #: as well are left out.
@@ -65,7 +64,7 @@ def free_shape(solution: Solution) -> FreeShape:
     equations = solution.adjustment.equations
     jacobian = equations.jacobian(np.zeros(equations.layout.size))
     residuals, measured, count = solution.adjustment.residuals, int(equations.ends[-1]), equations.layout.board_start
-    added = np.hstack([shape_columns(equations, jacobian.toarray(), _of_board), _of_lenses(equations, residuals)])
+    added = np.hstack([shape_columns(equations, jacobian, _of_board), _of_lenses(equations, residuals)])
     if equations.layout.size + added.shape[1] > _MOST * measured:
         added = added[:, :0]
     size = equations.layout.size

@@ -1,24 +1,23 @@
 """Verdict on a calibration, in words."""
 
-from collections.abc import Callable, Collection, Mapping, Sequence, Set
+from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
 from calib.formats.plausibility import exchanged
-from calib.solve.calibrate import calibrate
 from calib.solve.solution import Solution
-from calib.solve.validation import changes, projection_uncertainty
-from calib.solve.validation.board_shape import ShapeError, shape_errors
-from calib.solve.validation.contradictions import SCATTERS_PX, Contradiction, Scatter, contradictions, outliers, scatter
+from calib.solve.validation import projection_uncertainty
+from calib.solve.validation.board_shape import shape_errors
 from calib.solve.validation.cross_validation import Agreement, TooFewToSplitError, cross_validate
-from calib.solve.validation.distance_errors import distance_errors
-from calib.solve.validation.free_shape import FreeShape, free_shape
-from calib.solve.validation.groups import groups
+from calib.solve.validation.free_shape import free_shape
 from calib.solve.validation.other_lens import other_lenses, undescribed
 from calib.solve.validation.projection_uncertainty import UncertaintyMap
-from calib.solve.validation.steadiness import changes_of_optics, changes_of_place, focal_scatter, unseen_change
+from calib.solve.validation.square_pixels import not_square
+from calib.solve.validation.unlike_shots.changes import unseen
+from calib.solve.validation.unlike_shots.contradictions import Contradiction, outliers
+from calib.solve.validation.unlike_shots.findings import unlike_shots
+from calib.solve.validation.unlike_shots.steadiness import unseen_change
 from calib.solve.validation.weak_directions import weak_directions
 
 #: Largest ratio of observed to predicted difference of the halves; exceeded by chance in about 1 % of the cases.
@@ -86,12 +85,13 @@ def assess(
         if target != source
     }
     shape, free = shape_errors(solution, distance, needed_px), free_shape(solution)
-    unlike = _unlike(free, shape, needed_px)
+    unlike = unlike_shots(free, shape, needed_px)
     reasons, contradicting = [*unlike.reasons], unlike.contradicting
     reasons += exchanged(solution.cameras)
     reasons += weak_directions(solution, distance)
     reasons += outliers(solution, {one.shot for one in contradicting})
     reasons += undescribed(solution, needed_px)
+    reasons += not_square(solution)
     try:
         agreements = cross_validate(solution, distance, note, half)
         reasons += _disagreeing(agreements, needed_px)
@@ -104,44 +104,9 @@ def assess(
     reasons += [str(one) for one in shape if not one.is_misprint]  # why the halves may differ
     reasons = [*other_lenses(solution), *unlike.causes, *reasons] if reasons else []
     kept = [name for name, sensor in solution.task.sensors.items() if sensor.fixed_intrinsics]
-    praise = _praise(agreements, images, known, distance) + changes.unseen(unseen_change(free)) + _given(kept)
+    praise = _praise(agreements, images, known, distance) + unseen(unseen_change(free)) + _given(kept)
     verdict = f"Do not trust it yet: {reasons[0]}" if reasons else praise
     return Assessment(not reasons, verdict, reasons, contradicting, agreements, images, pairs, distance)
-
-
-class _Unlike(NamedTuple):
-    """Reasons to doubt that all shots show one board and one rig, shots that contradict, and likely causes."""
-
-    reasons: Sequence[str]
-    contradicting: Sequence[Contradiction]
-    causes: Sequence[str]
-
-
-def _unlike(free: FreeShape, shape: Sequence[ShapeError], needed_px: float) -> _Unlike:
-    """Looks whether all shots show one board and one rig."""
-    solution = free.solution
-    if wrong := distance_errors(solution, needed_px):
-        return _Unlike([*map(str, wrong)], [], [])  # they pull everything else along
-    moved = changes_of_place(free, needed_px)
-    # What happened to a sensor looks as if its image changed, and a wrong board as if every shot had another lens.
-    changed = [] if moved else changes_of_optics(free, needed_px)
-    confirmed = [changes.is_confirmed(solution, one) for one in changed]
-    refocused = [one for one, is_so in zip(changed, confirmed) if is_so]
-    contradicting = [] if moved else contradictions(solution, free.misses)
-    scattered = [] if moved else _scattered(solution, contradicting, SCATTERS_PX)
-    if scattered:
-        contradicting = []  # without a rest, nothing contradicts it
-    misprinted = [str(one) for one in shape if one.is_misprint]
-    lasting = moved or refocused or misprinted or scattered
-    mixed = [] if lasting or contradicting or shape else groups(free, needed_px)
-    focus = {} if lasting or contradicting or mixed else focal_scatter(free, needed_px)
-    cause = [] if lasting or solution.task.planes else _scattered(solution, contradicting, 0.0)  # or wrong distances
-    reasons = [changes.of_place(one) for one in moved]
-    reasons += [changes.of_optics(one, len(solution.task.sensors)) for one in refocused]
-    reasons += [*misprinted, *map(str, mixed), *(changes.of_focus(*each) for each in focus.items())]
-    reasons += [*map(str, scattered), *_contradicting(contradicting)]
-    reasons += [changes.unexplained(one) for one, is_so in zip(changed, confirmed) if not is_so]
-    return _Unlike(reasons, contradicting, [*map(str, cause)])
 
 
 def _excess(of: str, agreements: Sequence[Agreement]) -> float:
@@ -209,28 +174,3 @@ def _narrow(solution: Solution, images: dict[str, UncertaintyMap]) -> list[str]:
         for of, field in images.items()
         if field.inside.mean() < MIN_SEEN
     ]
-
-
-def _contradicting(found: Sequence[Contradiction]) -> list[str]:
-    if not found:
-        return []
-    count = f"{len(found)} shots contradict" if len(found) > 1 else "one shot contradicts"
-    return [
-        f"{count} the others: {'; '.join(map(str, found))}. Look at the pictures, and leave out what is wrong: "
-        f"--skip {','.join(str(shot) for shot in sorted(one.shot for one in found))}"
-    ]
-
-
-def _scattered(solution: Solution, contradicting: Sequence[Contradiction], least_px: float) -> list[Scatter]:
-    found = scatter(solution, least_px)
-    if found and contradicting:  # a few wrong shots spoil the others until they are left out
-        found = _scatter_without({one.shot for one in contradicting}, solution, least_px)
-    return found
-
-
-def _scatter_without(shots: Collection[int], solution: Solution, least_px: float) -> list[Scatter]:
-    rest = solution.task.of_shots([shot for shot in solution.task.shots if shot not in shots])
-    try:
-        return scatter(calibrate(rest), least_px)
-    except ValueError:  # nor can the rest be calibrated
-        return scatter(solution, least_px)

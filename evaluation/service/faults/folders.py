@@ -8,12 +8,12 @@ import time
 from absmsg.v1.health_pb2 import Health
 
 from evaluation.service.faults.fault import PATIENCE_S, Elsewhere, Fault, Made
-from evaluation.service.faults.running import RunningRig, mount
+from evaluation.service.faults.running import RunningRig, mount, start_on_disk
 from evaluation.service.live.proc import is_running
 
 #: For how long the recorder cannot record, after it has said so [s].
 FAULT_S = 2.0
-#: Size of the file system that becomes full [MB]: none of which health says that it is full within the hour.
+#: Size of a file system of its own, in memory or in a sparse file: too large to be full within the hour [MB].
 ROOM_MB = 100_000
 #: What is left of it then, less than `record.minimum_free_bytes`.
 LEFT_BYTES = 15_000_000
@@ -87,15 +87,31 @@ def replaced(rig: RunningRig) -> Made:
     return Made(begin_ns, rig.now_ns(), broken or ("the recorder lives" if is_running(recorder) else ""))
 
 
+def frozen(rig: RunningRig) -> Made:
+    """The disk answers no more (fsfreeze), and goes on."""
+    begin_ns = rig.now_ns()
+    subprocess.run(["fsfreeze", "--freeze", str(rig.takes)], check=True)
+    try:
+        broken = _await_words(rig, begin_ns, "the disk has not answered")
+    finally:
+        subprocess.run(["fsfreeze", "--unfreeze", str(rig.takes)], check=True)
+    return Made(begin_ns, rig.now_ns(), broken)
+
+
 def _await_failure(rig: RunningRig, since_ns: int) -> str:
     """Waits until health says RECORD_FAILED, and `FAULT_S` more; words if it never does."""
+    return _await_words(rig, since_ns, "RECORD_FAILED")
+
+
+def _await_words(rig: RunningRig, since_ns: int, words: str) -> str:
+    """Waits until the recorder's health is not OK with some words, and `FAULT_S` more; other words if it never is."""
     while rig.now_ns() < since_ns + PATIENCE_S * 1e9:
         said = [one for t_ns, one in rig.listener.health[-50:] if t_ns > since_ns and one.component == "record"]
-        if any(one.level == Health.LEVEL_ERROR and "RECORD_FAILED" in one.message for one in said):
+        if any(one.level != Health.LEVEL_OK and words in one.message for one in said):
             time.sleep(FAULT_S)
             return ""
         time.sleep(0.02)
-    return "health never said RECORD_FAILED"
+    return f"health never said {words}"
 
 
 _TRACKS = "tracking goes on; RECORD_FAILED, and recording again when it can"
@@ -113,15 +129,17 @@ FAULTS = (
         recording_s=1.5,
         restarted=frozenset({"record"}),
     ),
+    Fault(
+        "the disk does not answer (fsfreeze)",
+        "tracking goes on; in health within 2 s; nothing is lost that memory holds",
+        frozen,
+        room_mb=ROOM_MB,
+        start=start_on_disk,
+    ),
     Elsewhere(
         "the disk is slower than the cameras",
         "nobody waits; every drop is counted",
         "tests/abs_service/recording/disk/test_recorder_disk.py",
-    ),
-    Elsewhere(
-        "the disk does not answer",
-        "tracking goes on; in health within 2 s; what memory does not hold is counted; `run` starts and ends in time",
-        "tests/abs_service/recording/disk/test_stall.py",
     ),
     Elsewhere(
         "a folder with 100,000 recordings",

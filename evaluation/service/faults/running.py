@@ -25,6 +25,8 @@ NAME = "faults"
 START_S = 180.0
 #: A process without health for this long is killed; the default of ten seconds only takes longer [s].
 STALL_S = 4.0
+#: Those of `abs-service run` that report their health.
+COMPONENTS = frozenset({"run", "capture", f"track/{TRACKER}", "record"})
 
 
 class Processes(Protocol):
@@ -177,8 +179,14 @@ def table(device: str) -> dict[str, Any]:
 @contextmanager
 def start_run(folder: Path, device: str, room_mb: int) -> Iterator[RunningRig]:
     """`abs-service run` of the demo rig; arguments as in `fault.Fault`."""
-    components = frozenset({"run", "capture", f"track/{TRACKER}", "record"})
-    with _room(folder / "takes", room_mb), RunningRig(folder, table(device), Service, components) as rig:
+    with _room(folder / "takes", room_mb), RunningRig(folder, table(device), Service, COMPONENTS) as rig:
+        yield rig
+
+
+@contextmanager
+def start_on_disk(folder: Path, device: str, room_mb: int) -> Iterator[RunningRig]:
+    """The same, whose recordings lie on a disk in a file."""
+    with _disk(folder / "takes", room_mb), RunningRig(folder, table(device), Service, COMPONENTS) as rig:
         yield rig
 
 
@@ -198,6 +206,29 @@ def _room(folder: Path, megabytes: int) -> Iterator[None]:
         yield
     finally:
         subprocess.run(["umount", str(folder)], check=True)
+
+
+@contextmanager
+def _disk(folder: Path, megabytes: int) -> Iterator[None]:
+    """A disk in a file beside a folder, mounted there.
+
+    Raises:
+        UnavailableError: this user may not mount one, or there is no mkfs.ext4(8).
+    """
+    image = folder.with_suffix(".img")
+    folder.mkdir()
+    with image.open("wb") as file:
+        file.truncate(megabytes * 1_000_000)
+    try:
+        subprocess.run(["mkfs.ext4", "-q", str(image)], check=True)
+    except (FileNotFoundError, subprocess.CalledProcessError) as error:
+        raise UnavailableError(f"no file system can be made in a file: {error}") from error
+    mount("-o", "loop", str(image), str(folder))
+    try:
+        yield
+    finally:
+        subprocess.run(["umount", str(folder)], check=True)
+        image.unlink()
 
 
 def mount(*arguments: str) -> None:

@@ -9,7 +9,7 @@ from calib.calibration_check.changes import PairChange, pair_changes
 from calib.calibration_check.stored import Stored, Views
 from calib.solve.bundle.adjustment import NotSolvedError
 from calib.solve.bundle.parameters.state import SensorState
-from calib.solve.validation.contradictions import Contradiction, contradictions
+from calib.solve.validation.unlike_shots.contradictions import Contradiction, contradictions
 from tests.calib.solve.board_views import look, random_boards, three_heads
 
 

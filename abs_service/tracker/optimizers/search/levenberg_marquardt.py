@@ -12,6 +12,10 @@ NAME = "levenberg_marquardt"
 FIRST_DAMPING = 0.1
 GROWTH = 10.0
 
+#: A refused step is tried shorter only if it promised more than so many tolerances. Which pixels vertices fall on moves
+#: the cost of a frame by some nats, so that nothing less tells a step that is too long from one that is not.
+REFUSED = 3.0
+
 
 def descend(problem: Problem, start: NDArray[np.float64], iterations: int, tolerance: float, budget: Budget) -> Search:
     """Descends from start (dim,), one linearisation per accepted step.
@@ -23,7 +27,8 @@ def descend(problem: Problem, start: NDArray[np.float64], iterations: int, toler
         problem: the cost.
         start: initial parameters (dim,).
         iterations: maximum number of accepted steps.
-        tolerance: a step is the last one if the decrease predicted for it, or for the step after it, is smaller [nats].
+        tolerance: a step is the last one if the decrease predicted for it, or for the step after it, is smaller [nats];
+            a refused one, if it is smaller than `REFUSED` tolerances.
         budget: evaluations and time; at least one step is tried.
     """
     theta, cost = start, float((yield start[None])[0])
@@ -36,7 +41,8 @@ def descend(problem: Problem, start: NDArray[np.float64], iterations: int, toler
         if better:
             theta, cost, damping, steps = theta + step, cost_after, damping / GROWTH, steps + 1
             budget.generations += 1
-        ends = decrease < tolerance or (better and decrease**2 < tolerance * before)
+        least = tolerance if better else REFUSED * tolerance
+        ends = decrease < least or (better and decrease**2 < tolerance * before)
         stop = Stop.CONVERGED if ends else budget.exhausted()
         before = decrease if better and not damping else 0.0
         if not better:

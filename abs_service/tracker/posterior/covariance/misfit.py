@@ -5,7 +5,8 @@ can do balances the residuals, and outliers have no part in it. Where it misses 
 to the same side; noise and an outlier of the sensor stand alone. So the signed distances are averaged over each vertex
 and its neighbours. What the squares of these means have beyond three of their deviations by noise, averaged once more,
 is added to the covariance of the vertices in all directions. With a noisy sensor a ring of neighbours shows little, and
-all of them together more: the mean square of what no single ring tells from noise is added if all tell it.
+all of them together more: the mean square of what no single ring tells from noise is added if all of a frame tell it.
+What a frame does not tell, the mean over the last frames does: else the covariance would collapse in single ones.
 
 Across the surface, this ends with the frame in which distances agree again. Along it, the mesh may have moved while
 most of it missed, as over wrinkles that wander, and distances of which more agree again do not show it. So there the
@@ -21,8 +22,8 @@ from abs_service.tracker.terms.sensor_fit import INLIER_DEVIATIONS
 #: Share of the vertices that miss the measurements above which the mesh may slide, and below which it fits again.
 MAJORITY, HARDLY_ANY = 0.5, 0.1
 
-#: Weight of a new frame in the running mean along the surface: if its misfit is larger, as that of a single frame may
-#: be, and if it is smaller, so that half is left after 14 frames.
+#: Weight of a new frame in the running means: of the misfit along the surface if that of the frame, which may be alone,
+#: is larger, and of what a single frame does not tell; and if it is smaller, so that half is left after 14 frames.
 RISE, FALL = 0.2, 0.05
 
 
@@ -31,7 +32,7 @@ class Misfit:
 
     def __init__(self, mesh: Mesh):
         self._common = CommonDistance(mesh)
-        self._along = 0.0
+        self._along = self._unnoticed = 0.0
 
     def update(
         self, distance: NDArray[np.float64], deviation: NDArray[np.float64]
@@ -42,8 +43,9 @@ class Misfit:
             distance: signed distances of the vertices from their measurements (n,) [m].
             deviation: of independent noise of these (n,) [m].
         """
-        excess, unnoticed = self._common.excess_and_unnoticed(distance, deviation**2)
-        across = self._common.mean @ excess + unnoticed
+        excess, unnoticed, is_certain = self._common.excess_and_unnoticed(distance, deviation**2)
+        self._unnoticed += RISE * (unnoticed - self._unnoticed)
+        across = self._common.mean @ excess + max(self._unnoticed, unnoticed if is_certain else 0.0)
         missing = np.count_nonzero(excess) / len(excess)
         of_most = float(across.mean()) if missing > MAJORITY else 0.0
         kept = self._along if missing > HARDLY_ANY else 0.0
@@ -75,11 +77,8 @@ class CommonDistance:
 
     def excess_and_unnoticed(
         self, distance: NDArray[np.float64], variance: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], float]:
-        """`excess`, and the mean square [m²] of the mean distances up to it, less noise.
-
-        The latter is 0 unless beyond its own deviations.
-        """
+    ) -> tuple[NDArray[np.float64], float, bool]:
+        """`excess`, and the mean square [m²] of the means up to it, less noise; True if beyond its deviations."""
         squares, noise = self._squares(distance, variance)
         within = np.minimum(squares, INLIER_DEVIATIONS**2 * noise)
         expected = float(noise.mean())
@@ -87,7 +86,7 @@ class CommonDistance:
         independent = len(distance) / self._vertices_of_ring
         common = float(within.mean()) - expected
         is_certain = common > INLIER_DEVIATIONS * expected * np.sqrt(2 / independent)
-        return _beyond(squares, noise), common if is_certain else 0.0
+        return _beyond(squares, noise), common, bool(is_certain)
 
     def _squares(
         self, distance: NDArray[np.float64], variance: NDArray[np.float64]

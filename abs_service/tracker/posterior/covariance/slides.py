@@ -12,10 +12,12 @@ from numpy.typing import NDArray
 from abs_service.tracker.models.base import DeformationModel
 from abs_service.tracker.posterior.optimum import Optimum
 from abs_service.tracker.terms.linearization import Part, PointLinearization
+from calib.jit import kernel
 
-#: Error of the directions [rad] in which residuals of an outline tell of motion, root mean square, and those of points:
-#: a surface that bends follows another one beneath it that is so much inclined.
-EDGE_ERROR, POINT_ERROR = 0.1, 0.3
+#: Error of the directions [rad], root mean square, in which residuals tell of motion: of outlines; of images, since
+#: a print may hardly change along a direction; of distances, since a surface that bends follows another one beneath
+#: it that is so much inclined.
+EDGE_ERROR, PRINT_ERROR, NORMAL_ERROR = 0.1, 0.2, 0.3
 
 #: A model moves rigidly if so many of its vertices lack no more than this share of such motions, in squares.
 _PROBES, _SMALL_SHARE = 60, 1e-3
@@ -43,23 +45,39 @@ class SlideObservability:
         is_exact = model.mesh.is_complete and len(model.rest) == _RIGID
         self._is_free = bool(np.mean(left**2) < _SMALL_SHARE * np.mean(motions**2)) and not is_exact
 
-    def deviation(self, optimum: Optimum) -> float:
+    def deviations(self, optimum: Optimum) -> tuple[float, float]:
         """Standard deviation [m] of the vertices, root mean square, along the slide that is held least; 0 without any.
+
+        The second is that without the outline, infinite for a model that does not slide.
 
         Args:
             optimum: the estimate of a frame; its priors do not count.
         """
         if not self._is_free:
-            return 0.0
+            return 0.0, np.inf
         vertices = optimum.vertices.astype(np.float64)
         frame = _frame(vertices)
         known, feigned = np.zeros((2, len(optimum.sensed), 6, 6))
         for k, part in enumerate(optimum.sensed):
             known[k], feigned[k] = _information(part, *frame)
-            feigned[k] *= (POINT_ERROR if isinstance(part, PointLinearization) else EDGE_ERROR) ** 2
-        slides = _slides(known.sum(axis=0), _motions(vertices, *frame))
-        held = np.maximum(_along(slides, known - feigned), 0.0).sum(axis=0)
-        return float(1 / np.sqrt(_LEAST + held.min()))
+            feigned[k] *= _direction_error(part) ** 2
+        inside = [isinstance(part, PointLinearization) for part in optimum.sensed]
+        of_one = _of_one(vertices, *frame)
+        return _least_held(known, feigned, of_one), _least_held(known[inside], feigned[inside], of_one)
+
+
+def _least_held(known: NDArray[np.float64], feigned: NDArray[np.float64], of_one: NDArray[np.float64]) -> float:
+    """Deviation [m] along the slide that is held least, by information of parts, known and feigned (parts, 6, 6)."""
+    slides = _slides(known.sum(axis=0), of_one)
+    held = np.maximum(_along(slides, known - feigned), 0.0).sum(axis=0)
+    return float(1 / np.sqrt(_LEAST + held.min()))
+
+
+def _direction_error(part: Part) -> float:
+    """Error of the directions in which residuals tell of motion [rad]."""
+    if isinstance(part, PointLinearization):
+        return PRINT_ERROR if part.center.size else NORMAL_ERROR
+    return EDGE_ERROR
 
 
 def _frame(vertices: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
@@ -71,21 +89,76 @@ def _frame(vertices: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
 def _information(
     part: Part, center: NDArray[np.float64], size: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Information of residuals on rigid motions, and what it were in the direction of most, each (6, 6)."""
-    if not len(part.rows):
-        return np.zeros((6, 6)), np.zeros((6, 6))
-    motions = _motions(part.places, center, size)
-    known = (part.rows[:, None] @ motions)[:, 0]
-    weighted = (motions * np.linalg.norm(part.rows, axis=1)[:, None, None]).reshape(-1, 6)
-    return known.T @ known, weighted.T @ weighted
+    """Information of residuals on rigid motions, and what it were in the direction of most, each (6, 6).
+
+    A gradient in an image lies across the line of sight, however steeply that meets the surface, and is off within the
+    image only.
+    """
+    known, most = np.zeros((2, 6, 6))
+    if len(part.rows):
+        places = np.ascontiguousarray(part.places, np.float64)
+        sight = np.zeros_like(places)
+        if isinstance(part, PointLinearization) and part.center.size:  # of an image
+            sight = places - part.center
+            sight /= np.sqrt(np.einsum("mi,mi->m", sight, sight))[:, None]
+        add_information(part.rows, places, sight, center, size, known, most)
+    return known, most
 
 
-def _slides(known: NDArray[np.float64], motions: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Motions (6, 6), columns, that information (6, 6) tells apart; each moves the vertices by 1, root mean square."""
-    flat = motions.reshape(-1, 6)
-    moved = flat.T @ flat / len(motions)
-    inverse = np.linalg.inv(np.linalg.cholesky(moved + 1e-9 * np.eye(6)))
-    return np.asarray(inverse.T @ np.linalg.eigh(inverse @ known @ inverse.T)[1], np.float64)
+@kernel
+def add_information(
+    rows: NDArray[np.float64],
+    places: NDArray[np.float64],
+    sight: NDArray[np.float64],
+    center: NDArray[np.float64],
+    size: float,
+    known: NDArray[np.float64],
+    most: NDArray[np.float64],
+) -> None:
+    """Adds up (row M)ᵀ(row M) and |row|² Mᵀ(1 − s sᵀ)M, of the motions M (3, 6) of every place; see `_motions`.
+
+    Args:
+        rows, places: derivatives [1/m] of residuals with respect to their places [m], each (m, 3).
+        sight: directions s (m, 3) in which an error of the row's direction does not lie, of length 1; or 0.
+        center, size: of the motions (3,) [m] and [m].
+        known, most: the sums (6, 6), zeros before.
+    """
+    seen, unseen, along = np.empty(6), np.empty(6), np.zeros((3, 6))
+    along[0, 0] = along[1, 1] = along[2, 2] = 1.0
+    for m in range(rows.shape[0]):
+        a, b, c = rows[m, 0], rows[m, 1], rows[m, 2]
+        x, y, z = (
+            (places[m, 0] - center[0]) / size,
+            (places[m, 1] - center[1]) / size,
+            (places[m, 2] - center[2]) / size,
+        )
+        seen[0], seen[1], seen[2], seen[3], seen[4], seen[5] = a, b, c, y * c - z * b, z * a - x * c, x * b - y * a
+        along[0, 4], along[0, 5], along[1, 3], along[1, 5], along[2, 3], along[2, 4] = z, -y, -z, x, y, -x
+        square = a * a + b * b + c * c
+        for i in range(6):
+            unseen[i] = sight[m, 0] * along[0, i] + sight[m, 1] * along[1, i] + sight[m, 2] * along[2, i]
+        for i in range(6):
+            for j in range(6):
+                known[i, j] += seen[i] * seen[j]
+                moved = along[0, i] * along[0, j] + along[1, i] * along[1, j] + along[2, i] * along[2, j]
+                most[i, j] += square * (moved - unseen[i] * unseen[j])
+
+
+def _of_one(vertices: NDArray[np.float64], center: NDArray[np.float64], size: float) -> NDArray[np.float64]:
+    """Motions (6, 6), rows, each of which moves vertices (n, 3) [m] by 1, root mean square.
+
+    Args:
+        vertices: of the surface.
+        center, size: their `_frame`, about which no turn shifts them on average.
+    """
+    places, moved = (vertices - center) / size, np.eye(6)
+    moved[3:, 3:] -= places.T @ places / len(places)
+    return np.asarray(np.linalg.inv(np.linalg.cholesky(moved + 1e-9 * np.eye(6))), np.float64)
+
+
+def _slides(known: NDArray[np.float64], of_one: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Motions (6, 6), columns, that information (6, 6) tells apart, of those that move the vertices by 1."""
+    return np.asarray(of_one.T @ np.linalg.eigh(of_one @ known @ of_one.T)[1], np.float64)
 
 
 def _along(slides: NDArray[np.float64], information: NDArray[np.float64]) -> NDArray[np.float64]:

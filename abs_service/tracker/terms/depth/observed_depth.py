@@ -44,7 +44,8 @@ class ObservedDepth:
         fluctuation: of the sensor's distances, for later frames.
         scale: of the noise model's deviations in this frame, from the fluctuation in earlier ones.
         is_surprised: nothing in the image agrees with the prediction.
-        residuals: those known, by what was synthesised: fit, misfit and learning ask for the same.
+        residuals: those known, by what was synthesised: descent, fit and misfit ask for the same.
+        misfits: those known, by surface: covariance and learning ask for the same.
     """
 
     sensor: str
@@ -60,6 +61,7 @@ class ObservedDepth:
     scale: float
     is_surprised: bool
     residuals: dict[Synthesis, Residuals] = field(default_factory=dict)
+    misfits: dict[Surface, NDArray[np.float64]] = field(default_factory=dict)
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
         """−Σ_v log φ (population,) plus the cost of the outline."""
@@ -136,6 +138,11 @@ class ObservedDepth:
         In free space it is that from the object, without noise. Zero where nothing is measured, and everywhere if the
         samples of the synthesis are not the vertices.
         """
+        if surface not in self.misfits:
+            self.misfits[surface] = self._misfit(surface)
+        return self.misfits[surface]
+
+    def _misfit(self, surface: Surface) -> NDArray[np.float64]:
         seen = self.view.synthesize(surface)
         if seen.pixel.shape[1] != surface.vertices.shape[2]:
             return np.zeros((2, 1))

@@ -31,9 +31,9 @@ class PixelClasses:
     def at(self, pixel: NDArray[np.integer]) -> "PixelClasses":
         """Those of samples at indices (m,) into the flattened image, see `Synthesis`."""
         lost, covered, beyond, doubtful = (
-            image.ravel()[pixel] for image in (self.lost, self.covered, self.beyond, self.doubtful)
+            image.take(pixel) for image in (self.lost, self.covered, self.beyond, self.doubtful)
         )
-        return PixelClasses(lost, covered, beyond, doubtful, self.free_m.ravel()[pixel])
+        return PixelClasses(lost, covered, beyond, doubtful, self.free_m.take(pixel))
 
     @property
     def unknown(self) -> NDArray[np.bool_]:

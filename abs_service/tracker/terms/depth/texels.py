@@ -4,7 +4,7 @@ A texel is what `calib.noise.texture.write_texture` writes, or a constant cost w
 """
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -147,7 +147,7 @@ class TexelsOnDemand:
         """Corrects the distances in the window, and renders nothing yet."""
         self._texture, self._window = self._image.move(image.shape, window), window
         self._scaled = Scaled(self._noise, scale)
-        self._distance, self._amplitude = image.within(window)
+        self._distance, self._amplitude = (np.ascontiguousarray(part, np.float32) for part in image.within(window))
         corrected = corrected_distances(self._noise, self._distance, self._amplitude, corner(window))
         self._done, self._complete = np.zeros(corrected.shape, np.bool_), []
         none, outlier = np.zeros(corrected.shape, np.bool_), float(self._image.beyond[6])
@@ -176,21 +176,41 @@ class TexelsOnDemand:
 
     def _render(self, pixel: NDArray[np.int32]) -> None:
         """Renders the pixels of a single candidate (1, m), or the window for a population (population, m)."""
-        is_single, place = len(pixel) == 1, corner(self._window)
-        wanted = np.empty((2, pixel.size if is_single else self._done.size), np.int64)
-        rest = place, self._costs, self._done, self._texture, wanted
-        count = _take(pixel[0], *rest) if is_single else _take_all(*rest)
+        is_single = len(pixel) == 1
+        pixels = pixel[0] if is_single else self._of_window()
+        shape = 2, pixels.size
+        wanted = Wanted(self._distance, self._amplitude, np.empty(shape, np.int64), np.empty(shape))
+        count = _take(pixels, corner(self._window), self._costs, self._done, self._texture, wanted)
         if count:
-            row, column = wanted[:, :count]
-            measured, amplitude = (part[row, column].astype(np.float64) for part in (self._distance, self._amplitude))
-            write_pixels(self._scaled, measured, amplitude, (row + place[0], column + place[1]), self._texture)
+            (row, column), (measured, amplitude) = wanted.places[:, :count], wanted.values[:, :count]
+            write_pixels(self._scaled, measured, amplitude, (row, column), self._texture)
         if is_single:
             self._complete.append(pixel)
+
+    def _of_window(self) -> NDArray[np.int32]:
+        """Indices (m,) of all pixels of the window into the flattened texture."""
+        every = np.arange(self._texture.shape[0] * self._texture.shape[1], dtype=np.int32)
+        return within(every.reshape(self._texture.shape[:2]), self._window).ravel()
 
     @property
     def shape(self) -> tuple[int, int]:
         """Height and width of the view."""
         return self._texture.shape[0] - 2, self._texture.shape[1] - 2
+
+
+class Wanted(NamedTuple):
+    """Pixels whose texels are to be rendered.
+
+    Attributes:
+        distance, amplitude: measured ones in the window (rows, columns).
+        places: rows and columns of the pixels in the image (2, …).
+        values: their distances [m] and amplitudes (2, …).
+    """
+
+    distance: NDArray[np.float32]
+    amplitude: NDArray[np.float32]
+    places: NDArray[np.int64]
+    values: NDArray[np.float64]
 
 
 @kernel
@@ -200,7 +220,7 @@ def _take(
     costs: ConstantCosts,
     done: NDArray[np.bool_],
     texture: NDArray[np.float32],
-    wanted: NDArray[np.int64],
+    wanted: Wanted,
 ) -> int:
     """Writes the constant texels of pixels that are not done; the number of those with a usable distance.
 
@@ -210,7 +230,7 @@ def _take(
         costs: of pixels without a usable distance.
         done: pixels (rows, columns) that are rendered; those that are taken become so.
         texture: (height + 2, width + 2, 8).
-        wanted: rows and columns (2, …) in the window of those with a usable distance.
+        wanted: those with a usable distance are written into it.
     """
     (top, left), count, stride = corner, 0, texture.shape[1]
     for m in range(pixels.size):
@@ -220,26 +240,8 @@ def _take(
         if inside and not done[row, column]:
             done[row, column] = True
             if not settle(row, column, costs, texture[top + row + 1, left + column + 1]):
-                wanted[0, count], wanted[1, count] = row, column
+                wanted.places[0, count], wanted.places[1, count] = top + row, left + column
+                wanted.values[0, count] = wanted.distance[row, column]
+                wanted.values[1, count] = wanted.amplitude[row, column]
                 count += 1
-    return count
-
-
-@kernel
-def _take_all(
-    corner: tuple[int, int],
-    costs: ConstantCosts,
-    done: NDArray[np.bool_],
-    texture: NDArray[np.float32],
-    wanted: NDArray[np.int64],
-) -> int:
-    """`_take` for all pixels of the window."""
-    (top, left), count = corner, 0
-    for row in range(done.shape[0]):
-        for column in range(done.shape[1]):
-            if not done[row, column]:
-                done[row, column] = True
-                if not settle(row, column, costs, texture[top + row + 1, left + column + 1]):
-                    wanted[0, count], wanted[1, count] = row, column
-                    count += 1
     return count

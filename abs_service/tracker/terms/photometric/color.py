@@ -8,11 +8,12 @@ from numpy.typing import NDArray
 from abs_service.pairing.images import ColorImage, Image, Window
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import ObservedView, Resampling, Synthesis, Synthesizer
-from abs_service.tracker.synthesis.window import NOTHING_HAS, Bordered
 from abs_service.tracker.terms.base import NO_OCCLUDERS, Bounds, Prediction, facing
 from abs_service.tracker.terms.gradients import noiseless_color_rows
 from abs_service.tracker.terms.linearization import Part, PointLinearization
 from abs_service.tracker.terms.patches import Patches
+from abs_service.tracker.terms.photometric.color_cost import color_cost, color_residuals
+from abs_service.tracker.terms.photometric.copied_pixels import CopiedPixels
 from abs_service.tracker.terms.photometric.illumination import Exposed
 from abs_service.tracker.terms.photometric.matching import Measured, costs_of, matched
 from abs_service.tracker.terms.photometric.occlusion import occluded_pixels
@@ -23,7 +24,6 @@ from abs_service.tracker.terms.photometric.texture_registration_noise import (
 )
 from abs_service.tracker.terms.sensor_fit import SensorFit, summarize
 from abs_service.tracker.terms.vertex_counts import VertexMasks
-from calib.jit import kernel, prange
 from calib.noise.base import LOG_SQRT_2PI
 from calib.noise.images.color import GaussianColor
 
@@ -51,7 +51,7 @@ class ColorTerm:
         self._constant = bounds.inlier + 3 * (np.log(noise.sigma) + LOG_SQRT_2PI)
         self._registration_noise = registration_noise
         self._levels = np.zeros((0, 0, 3), np.uint8)
-        self._bordered = Bordered(np.full(3, np.nan, np.float32), np.full(3, NOTHING_HAS, np.float32))
+        self._pixels = CopiedPixels()
 
     def observe(self, image: Image, prediction: Prediction) -> "ObservedColor":
         """Sets the colour image; NaN, as in the border, means no measurement, and infinity an occluder."""
@@ -60,16 +60,15 @@ class ColorTerm:
         predicted, occluders = prediction.surface, prediction.occluders
         window = self._synthesizer.window(self.sensor, predicted, prediction.reach_m)
         picture = self._picture(image.rgb, window, prediction.resampling)
-        texture = self._bordered.move(picture.shape[:2], window).reshape(-1, 3)
-        self._bordered.inside[:] = picture[window]
+        self._pixels.observe(picture, window)
         view = self._view.observe(predicted)
         seen = view.synthesize(predicted)
         self._bias.observe(picture, seen.interpolation.spread(predicted.vertices[0].T))
         widening = self._registration_noise.widening(view.attribute_gradients(seen), self._sigma)
         inverse = np.float32(1) / (self._sigma * widening.factor)
-        illumination = Exposed().adapt(texture[seen.pixel[0]], seen.attributes[0].T)
+        illumination = Exposed().adapt(self._pixels.at(seen.pixel)[seen.pixel[0]], seen.attributes[0].T)
         if len(occluders):
-            self._bordered.inside[occluded_pixels(self._view.camera, occluders)[window]] = np.inf
+            self._pixels.cover(occluded_pixels(self._view.camera, occluders))
         return ObservedColor(
             sensor=self.sensor,
             view=view,
@@ -77,7 +76,7 @@ class ColorTerm:
             illumination=illumination,
             bias=self._bias,
             image=picture,
-            texture=texture,
+            pixels=self._pixels,
             inverse=np.repeat(inverse, 3 // widening.factor.shape[1], axis=1),
             normalizer=(self._constant + 3 * widening.log.mean(axis=1)).astype(np.float32),
         )
@@ -113,7 +112,7 @@ class ObservedColor:
         illumination: exposure of the image.
         bias: of the registration of edges.
         image: colours (height, width, 3) in the view's camera.
-        texture: the same with a border of one pixel, flattened (pixels, 3).
+        pixels: the same with a border of one pixel, as samples read them.
         inverse: inverse deviations (n or 1, 3) of the samples' colours.
         normalizer: cost (n or 1,) of a colour that agrees exactly.
     """
@@ -124,7 +123,7 @@ class ObservedColor:
     illumination: Exposed
     bias: RegistrationBias
     image: NDArray[np.float32] | NDArray[np.uint8]
-    texture: NDArray[np.float32]
+    pixels: CopiedPixels
     inverse: NDArray[np.float32]
     normalizer: NDArray[np.float32]
 
@@ -144,42 +143,41 @@ class ObservedColor:
     def _cost_of(self, seen: Synthesis) -> NDArray[np.float64]:
         """Cost (population,) of what is synthesised."""
         out = np.empty(len(seen.pixel))
-        _color_cost(seen.pixel, seen.attributes, *self._measured, out)
+        color_cost(seen.pixel, seen.attributes, *self._measured(seen.pixel), out)
         return seen.interpolation.balance(out, self.bounds.unseen)
 
-    @property
-    def _measured(self) -> Measured:
-        return self.texture, self.inverse, self.normalizer, self.bounds.outlier, self.bounds.unseen
+    def _measured(self, pixel: NDArray[np.int32]) -> Measured:
+        return self.pixels.at(pixel), self.inverse, self.normalizer, self.bounds.outlier, self.bounds.unseen
 
     def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> list[Part]:
         """Normalised residuals of the inliers, three channels each, and their derivatives with respect to theta."""
         seen = self._synthesize(surface)
-        residual, measured = self._residuals(seen)
-        use = measured & (self.normalizer + 0.5 * np.sum(residual**2, axis=1) < self.bounds.outlier)
+        residual, square = self._residuals(seen)
+        use = (self.normalizer + 0.5 * square < self.bounds.outlier).nonzero()[0]
         vertices = seen.interpolation.spread(surface.vertices[0].T)
         inverse = np.broadcast_to(self.inverse, residual.shape)[use]
         rows = noiseless_color_rows(self.image, self.view.camera, vertices[use], inverse).reshape(-1, 3)
-        points = np.repeat(np.flatnonzero(use), residual.shape[1])
+        points = np.repeat(use, residual.shape[1])
         samples = seen.interpolation.follow(sparse_jacobian)
         bias = self.bias.derivatives(vertices, rows, points)
-        return [PointLinearization(residual[use].ravel(), rows, points, samples, vertices, bias)]
+        return [
+            PointLinearization(residual[use].ravel(), rows, points, samples, vertices, bias, self.view.camera.center)
+        ]
 
     def fit(self, surface: Surface) -> SensorFit:
         """Agreement of the sensor with a population of one."""
         seen = self._synthesize(surface)
-        residual, measured = self._residuals(seen)
+        square = self._residuals(seen)[1]
         pixel, known = seen.pixel[0], np.isfinite(seen.attributes[0]).all(axis=0)
-        hidden = np.isinf(self.texture[pixel, 0])
-        masks = VertexMasks.of(
-            pixel, facing(seen, surface, self.view.camera.center), np.zeros_like(hidden), hidden, ~known
-        )
-        mean = -float(self._cost_of(seen)[0]) / len(residual)
-        size = np.sqrt(np.mean(residual**2, axis=1))
-        return summarize(self.sensor, masks, measured, size, mean, channels=3)
+        hidden = np.isinf(self.pixels.at(seen.pixel)[pixel, 0])
+        front = facing(seen, surface, self.view.camera.center)
+        masks = VertexMasks.of(pixel, front, np.zeros_like(hidden), hidden, ~known)
+        mean = -float(self._cost_of(seen)[0]) / len(square)
+        return summarize(self.sensor, masks, square < np.inf, np.sqrt(square / 3), mean, channels=3)
 
     def match(self, surface: Surface, sparse_jacobian: SparseJacobian, patches: Patches) -> PointLinearization:
         """See `ObservedTerm`."""
-        seen, costs = self._synthesize(surface), costs_of(_color_cost, self._measured)
+        seen, costs = self._synthesize(surface), costs_of(color_cost, self._measured)
         return matched(self.view.camera, surface, sparse_jacobian, seen, patches, self.image.shape, costs)
 
     def misfit(self, surface: Surface) -> NDArray[np.float64]:
@@ -189,45 +187,9 @@ class ObservedColor:
     def learn(self, surface: Surface) -> None:
         """Learns nothing."""
 
-    def _residuals(self, seen: Synthesis) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-        """Normalised residuals (n, 3) and mask of the measured samples (n,)."""
-        colors = seen.attributes[0].T.astype(np.float64)
-        residual = (self.texture[seen.pixel[0]] - colors) * self.inverse
-        measured = (seen.pixel[0] > 0) & np.all(np.isfinite(residual), axis=1)
-        return np.where(np.reshape(measured, (-1, 1)), residual, np.inf), np.asarray(measured)
-
-
-@kernel
-def _color_cost(
-    pixel: NDArray[np.int32],
-    colors: NDArray[np.float32],
-    texture: NDArray[np.float32],
-    inverse: NDArray[np.float32],
-    normalizer: NDArray[np.float32],
-    outlier: float,
-    uniform: float,
-    out: NDArray[np.float64],
-) -> None:
-    """Sum over samples of min(normaliser + ½e², outlier), of as many samples as have noise of their own, or of all.
-
-    Samples with an unknown colour (NaN) cost `uniform`, occluded ones (∞) the mean of an inlier.
-    """
-    half, most, unknown, average = np.float32(0.5), np.float32(outlier), np.float32(uniform), np.float32(1.5)
-    farthest = np.float32(1e30)  # np.isfinite does not survive reordered sums
-    shared = inverse.shape[0] == 1
-    # No branches on what is measured, see `depth_cost._cost_of`.
-    for k in prange(pixel.shape[0]):
-        total, pixels, expected = 0.0, pixel[k], colors[np.intp(k) % colors.shape[0]]
-        for v in range(np.uintp(pixels.size)):
-            i = pixels[v]
-            measured = texture[np.uintp(max(i, 0))]
-            row = np.uintp(0) if shared else v
-            red = (measured[0] - expected[0, v]) * inverse[row, 0]
-            green = (measured[1] - expected[1, v]) * inverse[row, 1]
-            blue = (measured[2] - expected[2, v]) * inverse[row, 2]
-            square = red * red + green * green + blue * blue
-            explained = min(normalizer[row] + half * square, most)
-            cost = average + normalizer[row] if square > farthest else explained
-            cost = unknown if np.isnan(square) else cost
-            total += cost if i >= 0 else np.float32(0)
-        out[k] = total
+    def _residuals(self, seen: Synthesis) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Normalised residuals (n, 3), and the sums of their squares (n,); infinite where nothing is measured."""
+        n = seen.pixel.shape[1]
+        residual, square = np.empty((n, 3)), np.empty(n)
+        color_residuals(seen.pixel[0], seen.attributes[0], self.pixels.at(seen.pixel), self.inverse, residual, square)
+        return residual, square

@@ -36,13 +36,13 @@ _SHIFTS = np.stack([part.ravel() for part in np.meshgrid(_STEPS, _STEPS)], axis=
 _STILL = len(_SHIFTS) // 2
 
 
-def costs_of(kernel: Callable[..., None], measured: Measured) -> Costs:
+def costs_of(kernel: Callable[..., None], measured: Callable[[NDArray[np.int32]], Measured]) -> Costs:
     """Costs by a kernel of (pixel, attributes, *measured, result) that sums over as many samples as it is given."""
-    texture, scale, normalizer, outlier, unseen = measured
 
     def costs(
         pixel: NDArray[np.int32], attributes: NDArray[np.float32], samples: NDArray[np.intp]
     ) -> NDArray[np.float64]:
+        texture, scale, normalizer, outlier, unseen = measured(pixel)
         out, own = np.empty(len(pixel)), samples % len(scale)
         kernel(pixel, attributes, texture, scale[own], normalizer[own], outlier, unseen, out)
         return out
@@ -78,17 +78,29 @@ def _shifts(seen: Synthesis, shape: tuple[int, int], of_samples: NDArray[np.intp
         of_samples: patch (m,) of every sample.
         costs: of samples at other pixels.
     """
-    pixel, result = seen.pixel[0], np.full((len(of_samples), 2), np.nan)
-    for patch in range(int(of_samples.max()) + 1):
-        samples = np.flatnonzero((of_samples == patch) & (pixel > 0))
-        if len(samples):
-            some = samples[:: -(-len(samples) // MOST)]
-            attributes, places = np.ascontiguousarray(seen.attributes[:, :, some]), pixel[some]
-            both = np.concatenate([attributes, np.full_like(attributes, np.inf)])
-            still, explained = costs(np.stack([places, places]), both, some)
-            if still - explained > SIGNIFICANT:
-                result[samples] = _best(costs(_shifted(places, shape), attributes, some))
+    result, some = np.full((len(of_samples), 2), np.nan), _some_of_each(of_samples, seen.pixel[0] > 0)
+    if not len(some):
+        return result
+    attributes, places = np.ascontiguousarray(seen.attributes[:, :, some]), seen.pixel[0, some]
+    is_own = of_samples[some] == np.arange(int(of_samples.max()) + 1)[:, None]
+    own = np.where(is_own, places, np.int32(-1))  # a patch for a candidate: there are no samples of the others
+    still, explained = costs(own, attributes, some), costs(own, np.full_like(attributes, np.inf), some)
+    for patch in (still - explained > SIGNIFICANT).nonzero()[0]:
+        of_patch = is_own[patch]
+        alone = np.ascontiguousarray(attributes[:, :, of_patch])
+        result[of_samples == patch] = _best(costs(_shifted(places[of_patch], shape), alone, some[of_patch]))
+    result[seen.pixel[0] <= 0] = np.nan
     return result
+
+
+def _some_of_each(of_samples: NDArray[np.intp], in_sight: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """Indices (k,) of no more than `MOST` samples in sight (m,) of every patch, evenly spaced in their order."""
+    samples = in_sight.nonzero()[0]
+    samples = samples[of_samples[samples].argsort(kind="stable")]
+    patch = of_samples[samples]
+    count = np.bincount(patch)
+    place = np.arange(len(samples)) - (count.cumsum() - count)[patch]  # within its patch
+    return samples[place % -(-count // MOST)[patch] == 0]
 
 
 def _best(costs: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -101,7 +101,7 @@ class ObservedChannel:
         rows = shortened(rows, float(noise))
         samples, points = seen.interpolation.follow(sparse_jacobian), np.flatnonzero(use)
         bias = self.bias.derivatives(vertices, rows, points)
-        return [PointLinearization(residual[use], rows, points, samples, vertices, bias)]
+        return [PointLinearization(residual[use], rows, points, samples, vertices, bias, self.view.camera.center)]
 
     def fit(self, surface: Surface) -> SensorFit:
         """Agreement of the sensor with a population of one."""
@@ -117,7 +117,7 @@ class ObservedChannel:
 
     def match(self, surface: Surface, sparse_jacobian: SparseJacobian, patches: Patches) -> PointLinearization:
         """See `ObservedTerm`."""
-        seen, costs = self._synthesize(surface), costs_of(channel_cost, self._measured)
+        seen, costs = self._synthesize(surface), costs_of(channel_cost, lambda _: self._measured)
         return matched(self.view.camera, surface, sparse_jacobian, seen, patches, self.image.shape, costs)
 
     def misfit(self, surface: Surface) -> NDArray[np.float64]:

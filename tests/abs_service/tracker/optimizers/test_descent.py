@@ -80,6 +80,17 @@ def test_a_step_that_promises_little_and_does_not_keep_it_is_not_taken():
     np.testing.assert_array_equal(found.theta, 0)
 
 
+def test_a_refused_step_is_tried_shorter_only_if_it_promised_much():
+    def residuals(x: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.column_stack([x - TARGET, np.where(np.abs(x).max(axis=1) > 0.1, 9.0, 0.0)])
+
+    steep, promise = Known(3, residuals, lambda _: 0.0), 0.5 * float(TARGET @ TARGET)
+    for share, evaluations in ((0.99, 2), (1.01, 3)):
+        spent = budget(3)
+        descend(steep, np.zeros(3), 5, promise / (share * levenberg_marquardt.REFUSED), spent)
+        assert spent.evaluations == evaluations
+
+
 def test_where_it_is_best_already_it_stays():
     spent = budget()
     found = descend(linear(TARGET, np.ones(3)), TARGET, 5, 1e-6, spent)

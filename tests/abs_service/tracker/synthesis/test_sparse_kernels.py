@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 
 from abs_service.tracker.synthesis.projection import Projection
+from abs_service.tracker.synthesis.sparse import HIDING_M, hide
 from calib import pose
 from calib.camera import Camera
 from calib.lenses.lens import Lens
@@ -128,3 +129,15 @@ def test_the_image_ends_half_a_pixel_beyond_its_outer_centres():
     vertices = np.column_stack([columns / 100, np.zeros(7), np.ones(7)])
     surface = as_surface((vertices, np.tile([0, 0, -1.0], (7, 1))))
     assert seen(camera, surface).pixel[0].tolist() == [0, 7, 7, 8, 10, 0, 0]
+
+
+@given(seeds)
+def test_vertices_that_face_away_or_lie_behind_the_mesh_are_hidden(seed):
+    generator, count, center = np.random.default_rng(seed), 50, np.array([0.1, 0.2, -0.1])
+    vertices, normals = generator.standard_normal((2, 3, count)).astype(np.float32)
+    distance = generator.uniform(0.5, 1, count).astype(np.float32)
+    front = (distance + generator.uniform(-2, 2, count) * HIDING_M).astype(np.float32)
+    pixel, hidden = generator.integers(-1, 3, count).astype(np.int32), np.empty(count, np.bool_)
+    hide(vertices, normals, center, front, distance, pixel, hidden)
+    facing = np.sum(normals * (vertices - center[:, None]), axis=0) < 0
+    np.testing.assert_array_equal(hidden, ~facing | ((pixel > 0) & (front < distance - np.float32(HIDING_M))))

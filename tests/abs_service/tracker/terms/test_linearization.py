@@ -21,7 +21,13 @@ from abs_service.tracker.terms.base import Bounds, Prediction
 from abs_service.tracker.terms.depth.depth import DepthTerm
 from abs_service.tracker.terms.depth.observed_depth import ObservedDepth
 from abs_service.tracker.terms.gradients import depth_rows
-from abs_service.tracker.terms.linearization import Linearization, PointLinearization, add_squares, stack
+from abs_service.tracker.terms.linearization import (
+    Linearization,
+    PointLinearization,
+    add_gradients,
+    add_squares,
+    stack,
+)
 from calib.camera import Camera
 from calib.noise.gaussian_polynomial import GaussianPolynomial
 from calib.rig import Rig, Sensor
@@ -91,16 +97,28 @@ def test_residuals_of_points_are_those_of_their_dense_jacobian(seed, count):
     np.testing.assert_allclose(linear.moved(step).residual, dense.moved(step).residual, rtol=0, atol=1e-12)
     by_cluster = [linear.residual[clusters == c] @ dense.jacobian[clusters == c] for c in range(3)]
     for part in (linear, dense):
-        gradient, scores = np.ones(7), np.ones((3, 7))
-        part.add_gradient(gradient)
+        scores = np.ones((3, 7))
         part.add_scores(clusters, scores)
-        np.testing.assert_allclose(gradient, 1 + dense.jacobian.T @ linear.residual, rtol=0, atol=1e-12)
         np.testing.assert_allclose(scores, 1 + np.array(by_cluster), rtol=0, atol=1e-12)
     found, leverage = leverages(half + half.T, [linear, dense])
     np.testing.assert_allclose(
         found, np.einsum("md,de,me->m", dense.jacobian, half + half.T, dense.jacobian), atol=1e-11
     )
     np.testing.assert_allclose(found, leverage, rtol=0, atol=1e-11)
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(0, 20), st.integers(0, 20))
+def test_gradients_of_sensors_are_added_up(seed, count, other):
+    generator = np.random.default_rng(seed)
+    one, two = drawn(generator, count), drawn(generator, other)
+    parts = [one, replace(two, sparse_jacobian=one.sparse_jacobian), two]
+    gradient = np.ones(7)
+    add_gradients(parts, gradient)
+    expected = sum((part.jacobian.T @ part.residual for part in parts), np.ones(7))
+    np.testing.assert_allclose(gradient, expected, rtol=0, atol=1e-12)
+    dense = Linearization(one.residual, one.jacobian)
+    dense.add_gradient(gradient)
+    np.testing.assert_allclose(gradient, expected + one.jacobian.T @ one.residual, rtol=0, atol=1e-12)
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(0, 20), st.integers(0, 20))

@@ -5,9 +5,10 @@ import pytest
 
 from calib.solve.solution import Solution
 from calib.solve.validation import verdict
-from calib.solve.validation.changes import is_confirmed, unseen
 from calib.solve.validation.free_shape import free_shape
-from calib.solve.validation.steadiness import Change, changes_of_optics
+from calib.solve.validation.unlike_shots import findings
+from calib.solve.validation.unlike_shots.changes import is_confirmed, unseen
+from calib.solve.validation.unlike_shots.steadiness import Change, changes_of_optics
 from tests.calib.solve.validation.test_steadiness import solved, views, zoomed
 
 #: As was said of a fisheye that did not change, and of which four images at the border missed by 0.9 px.
@@ -22,7 +23,7 @@ def test_a_zoom_is_confirmed_and_a_step_of_any_size_is_not() -> None:
 
 
 def test_shots_that_disagree_otherwise_are_named_without_a_size(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(verdict, "changes_of_optics", lambda free, needed_px: [ABSURD])
+    monkeypatch.setattr(findings, "changes_of_optics", lambda free, needed_px: [ABSURD])
     said = verdict.assess(_unchanged(), 1.0, 1.0)
     assert not said.trusted
     assert said.verdict.startswith(

@@ -15,7 +15,8 @@ from calib.solve.diagnoses import unlike_the_rest
 from calib.solve.solution import Solution
 from calib.solve.start.extrinsics_graph import ContradictionError
 from calib.solve.start.start import start
-from calib.solve.validation.contradictions import contradictions, scatter
+from calib.solve.validation.unlike_shots.contradictions import contradictions
+from calib.solve.validation.unlike_shots.scatter import scatter
 from calib.solve.validation.verdict import assess
 from tests.calib.solve import board_views
 from tests.calib.solve.board_views import Head

@@ -12,7 +12,7 @@ from calib.solve.bundle.tasks import SensorTask, Task
 from calib.solve.calibrate import calibrate
 from calib.solve.solution import Solution
 from calib.solve.validation.free_shape import free_shape
-from calib.solve.validation.groups import groups
+from calib.solve.validation.unlike_shots.groups import groups
 from calib.solve.validation.verdict import assess
 from tests.calib.solve import board_views
 from tests.calib.solve.validation.test_steadiness import SIZE, views
@@ -72,8 +72,8 @@ def test_zoomed_images_are_named_with_their_focal_length() -> None:
 
 def test_the_verdict_names_them_and_how_to_leave_them_out() -> None:
     verdict = assess(solved(turned), 1.0, 1.0).verdict
-    assert verdict.startswith("Do not trust it yet: color: shots 2,3,7,")
-    assert verdict.endswith("leave one out: --skip 2,3,7,11,12,16,20,21")
+    assert verdict.startswith("Do not trust it yet: color: shots 2-3,7,")
+    assert verdict.endswith("leave one out: --skip 2-3,7,11-12,16,20-21")
 
 
 def test_of_several_sensors_one_may_have_turned() -> None:

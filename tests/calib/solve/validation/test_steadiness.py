@@ -13,7 +13,12 @@ from calib.solve.bundle.tasks import SensorTask, Task
 from calib.solve.calibrate import calibrate
 from calib.solve.solution import Solution
 from calib.solve.validation.free_shape import free_shape
-from calib.solve.validation.steadiness import changes_of_optics, changes_of_place, focal_scatter, unseen_change
+from calib.solve.validation.unlike_shots.steadiness import (
+    changes_of_optics,
+    changes_of_place,
+    focal_scatter,
+    unseen_change,
+)
 from calib.solve.validation.verdict import assess
 from tests.calib.solve import board_views
 

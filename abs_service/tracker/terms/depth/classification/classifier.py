@@ -9,6 +9,7 @@ from abs_service.pairing.images import Window
 from abs_service.tracker.detection.dropouts import dropouts
 from abs_service.tracker.terms.depth.classification.background import Background
 from abs_service.tracker.terms.depth.classification.beyond_view import BeyondView
+from abs_service.tracker.terms.depth.classification.fixed_edges import FixedEdges
 from abs_service.tracker.terms.depth.classification.interruption import interruptions
 from abs_service.tracker.terms.depth.classification.nearest_range import NearestRange
 from abs_service.tracker.terms.depth.classification.separation import separates, separating_step
@@ -32,7 +33,7 @@ class Classifier:
     def __init__(self, camera: Camera) -> None:
         self._focal = camera.fx
         self._background, self._beyond_view = Background(), BeyondView()
-        self._nearest_range = NearestRange(camera)
+        self._nearest_range, self._fixed_edges = NearestRange(camera), FixedEdges()
         self._begun, self._is_interrupted, self._step = False, True, LARGEST_STEP_M
 
     def classify(
@@ -48,7 +49,8 @@ class Classifier:
         """
         missing, silhouette = np.isnan(distance), np.isfinite(expected)
         beyond, single = self._beyond_view.observe(missing, silhouette, window), dropouts(missing)
-        beyond = beyond | self._nearest_range.observe(distance, missing & ~(single | beyond), silhouette, window)
+        beyond |= self._nearest_range.observe(distance, missing & ~(single | beyond), silhouette, window)
+        beyond |= self._fixed_edges.observe(missing, missing & ~(single | beyond), silhouette, window)
         if not self._begun:
             self._step = separating_step(distance, silhouette)
         # A flat thing that is lifted ends as others do, and its surface may be steep then.

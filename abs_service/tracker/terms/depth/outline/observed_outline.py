@@ -111,15 +111,15 @@ class ObservedRimOutline:
         return max(off_m, moved * typical_m)
 
     def _hanging(self, outer: NDArray[np.float64], inner: NDArray[np.float64]) -> float:
-        """Distance [m] by which covered edges, with vertices (m, 3) [m], hang over the outline at least.
+        """∞ if covered edges, with vertices (m, 3) [m], hang over the outline on most of a side of the image, else 0.
 
-        0 unless most of a side of the image do: then the mesh has slid, and nothing tells how far.
+        Then the mesh has slid, and nothing tells how far: how long the object is beyond them is not known.
         """
         places, before = (project_with_jacobian(self.image.camera, points)[0] for points in (outer, inner))
         away, sides = self.image.inside(places), by_side(places - before)
         over, known = (np.count_nonzero(sides & part, axis=1) for part in (away < -self.off_px, ~np.isnan(away)))
         has_slid = np.any((over >= MIN_HANGING) & (2 * over > known))
-        return float(self.off_px * self._pixel_m(outer).mean()) if has_slid else 0.0
+        return np.inf if has_slid else 0.0
 
     def _pixel_m(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Size (k,) of a pixel at points (k, 3) [m]."""

@@ -16,7 +16,7 @@ from abs_service.tracker.terms.depth.classification.outline_distance import inwa
 from abs_service.tracker.terms.depth.classification.visibility import Visibility
 from abs_service.tracker.terms.depth.outline.observed_outline import ObservedRimOutline
 from abs_service.tracker.terms.depth.outline.raggedness import Raggedness
-from abs_service.tracker.terms.depth.outline.rim import Edges, OutlineImage, Rim, is_behind
+from abs_service.tracker.terms.depth.outline.rim import Edges, OutlineImage, Rim, is_behind, read
 from abs_service.tracker.terms.depth.outline.rim_classes import RimClass, classify_rim
 from abs_service.tracker.terms.depth.outline.rim_cost import FARTHEST, rim_cost
 from abs_service.tracker.terms.depth.outline.rim_gap import exact_gap
@@ -29,6 +29,9 @@ UNJUDGED_DEVIATIONS = 3.0
 
 #: A free edge is off the outline if it is farther from it than so many pixels, and than the bound of its cost.
 OFF_PX = 3.0
+
+#: Where the field of view turns out to end so many pixels beside a free edge, it cuts the object there [px].
+BESIDE_PX = 2.0
 
 
 class RimOutline:
@@ -55,6 +58,7 @@ class RimOutline:
         self._kernel = rim_cost(camera.lens)
         self._rim = rim
         self._edges = Edges(rim.outer, rim.inner, np.zeros(len(rim.outer), np.float32))
+        self._first, self._was_cut = np.zeros((len(rim.outer), 2)), np.zeros(len(rim.outer), np.bool_)
         self._raggedness = Raggedness(deviation, ragged)
         self._min_off_px = max(OFF_PX, FARTHEST * deviation)
         self._begun, self._is_round = False, False
@@ -75,7 +79,8 @@ class RimOutline:
         image = OutlineImage(self._camera, self._projection, away, first)
         if not self._begun:
             self._classify(image, predicted, distance)
-        free = np.flatnonzero(self.classes == RimClass.FREE)
+        is_cut = self._find_cut(predicted, seen.beyond, window)
+        free = np.flatnonzero((self.classes == RimClass.FREE) & ~is_cut)
         ends = self._edges.some(free).ends(predicted)
         edges = self._edges.some(free[~is_behind(self._camera, ends, expected, window)])
         points, places, of_edges = image.locate(edges, predicted)
@@ -86,12 +91,12 @@ class RimOutline:
         self._raggedness.update(of_edges, directions, places)  # counts from the next frame on
         doubtful = np.zeros(distance.shape, np.bool_)
         doubtful[part] = (seen.free_m[part] > 0) & (away > -UNJUDGED_DEVIATIONS * deviation)
-        covered = np.flatnonzero((self.classes == RimClass.OCCLUDED) | (self.classes == RimClass.BORDER))
+        covered = (self.classes == RimClass.OCCLUDED) | (self.classes == RimClass.BORDER) | is_cut
         return ObservedRimOutline(
             image=image,
             edges=edges,
             hidden=len(free) - len(edges.outer),
-            covered=self._edges.some(covered),
+            covered=self._edges.some(np.flatnonzero(covered)),
             along=rim_directions(places, directions),
             is_round=self._is_round,
             deviation=deviation,
@@ -108,3 +113,27 @@ class RimOutline:
         outer, inner = self._edges.ends(predicted), self._edges.starts(predicted)
         gap = exact_gap(self._camera, outer, outer - inner, gap, image.look)
         self._edges = Edges(self._rim.outer, self._rim.inner, gap)
+        self._first = self._beside(predicted)
+
+    def _beside(self, surface: Surface) -> NDArray[np.float64]:
+        """Places (k, 2) in the image of a population of one, `BESIDE_PX` outside the edges."""
+        places = self._camera.project(self._edges.points(surface)[0].T.astype(np.float64))
+        directions = self._edges.directions(self._camera, surface, places)
+        length = np.linalg.norm(directions, axis=1, keepdims=True)
+        return places + BESIDE_PX * directions / np.maximum(length, np.finfo(float).tiny)
+
+    def _find_cut(self, surface: Surface, beyond: NDArray[np.bool_], window: Window) -> NDArray[np.bool_]:
+        """True for edges (k,) where the field of view ends, at the first image's or at a population of one.
+
+        Args:
+            surface: the predicted mesh.
+            beyond: pixels (rows, columns) in a window that lie beyond the field of view; none outside it is known.
+            window: of the image.
+        """
+        if not (beyond.any() or self._was_cut.any()):
+            return self._was_cut
+        first, last = np.array(corner(window)[::-1], np.float32), (self._camera.width, self._camera.height)
+        image = beyond.astype(np.float32)
+        at_first, now = (read(image, first, places, last) for places in (self._first, self._beside(surface)))
+        self._was_cut = np.where(np.isfinite(at_first), at_first > 0, self._was_cut)
+        return self._was_cut | (now > 0)

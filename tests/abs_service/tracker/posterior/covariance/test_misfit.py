@@ -58,6 +58,19 @@ def test_what_no_ring_tells_from_noise_all_of_them_do(seed):
     assert shown == pytest.approx(np.mean(wave**2), rel=0.4)
 
 
+def test_what_a_single_frame_does_not_tell_the_mean_over_frames_does():
+    """A misfit of half the noise of a ring: without the frames before, its covariance would come and go."""
+    generator, wave = np.random.default_rng(3), 2.5e-4 * np.sin(np.linspace(0, 12, 21))
+    misfit, shown, noise = Misfit(MESH), np.zeros(40), np.zeros(40)
+    by_noise = Misfit(MESH)
+    for k in range(40):
+        drawn = generator.normal(0, SIGMA)
+        shown[k] = np.mean(misfit.update(drawn + np.repeat(wave, 31), SIGMA)[0])
+        noise[k] = np.mean(by_noise.update(drawn, SIGMA)[0])
+    assert np.all(shown[10:] > 0.3 * np.mean(wave**2))
+    assert np.mean(noise) < 0.3 * np.mean(wave**2)
+
+
 def frames(*shares: float) -> NDArray[np.float64]:
     """Variances across the surface and along it (frames, 2) [m²], means over the mesh of which such shares are off."""
     misfit, by_place = Misfit(MESH), np.arange(N) / N

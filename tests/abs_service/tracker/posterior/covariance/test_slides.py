@@ -2,11 +2,13 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import abs_service as a
 from abs_service.tracker.detection.strip.strip_detection import Strip
 from abs_service.tracker.models.gravity import Gravity
-from abs_service.tracker.posterior.covariance.slides import SlideObservability
+from abs_service.tracker.posterior.covariance.slides import SlideObservability, add_information
 from abs_service.tracker.posterior.curvature import Quadratic
 from abs_service.tracker.posterior.linearized_cost import LinearizedCost
 from abs_service.tracker.posterior.optimum import Optimum
@@ -30,6 +32,25 @@ def test_a_board_whose_ends_are_out_of_sight_is_held_by_nothing(half_length_m: f
     assert found == [expected] * 3
 
 
+def test_a_print_that_is_seen_obliquely_holds_a_mat_on_a_table():
+    """It lies at 70°: a slide along the table goes along the line of sight for the most part. It is as fine across."""
+    generator, rays = np.random.default_rng(0), CAMERA.unproject(np.ones((CAMERA.height, CAMERA.width)))
+    rays = rays / rays[..., 2:]
+    z = 0.8 / (1 - np.tan(np.deg2rad(70)) * np.minimum(-rays[..., 1], 0.2))
+    x, y = rays[..., 0] * z, (z - 0.8) / np.sin(np.deg2rad(70))
+    on = (np.abs(x) < 0.12) & (np.abs(y) < 0.15)
+    print_px = 362 * np.stack([x, y * np.cos(np.deg2rad(70))], axis=-1)[..., None, None, :]
+    waves, phases = generator.uniform(-0.35, 0.35, (3, 8, 2)), generator.uniform(0, 6, (3, 8))
+    paint = 128 + 20 * np.sin(np.sum(print_px * waves, axis=-1) + phases).sum(axis=-1)
+    tracker, found = a.Tracker(CAMERA, a.Nurbs(), color=CAMERA), []
+    for k in range(3):
+        noise = generator.standard_normal((4, *x.shape))
+        image = np.clip(paint + 2 * np.moveaxis(noise[:3], 0, -1), 0, 255).astype(np.uint8)
+        distance = z * np.linalg.norm(rays, axis=-1) + 0.001 * noise[3]
+        found.append(tracker.track(distance, time_s=k / 30, mask=on, image=image))
+    assert [one.status for one in found] == ["TRACKING"] * 3, found[-1].reasons
+
+
 @pytest.mark.parametrize(("is_free", "expected_m"), [(True, 1.0), (False, 0.0)])
 def test_a_strip_whose_gripper_is_fixed_does_not_slide(is_free: bool, expected_m: float):
     """Without any measurement, a free one may be anywhere."""
@@ -39,4 +60,21 @@ def test_a_strip_whose_gripper_is_fixed_does_not_slide(is_free: bool, expected_m
     theta, size = model.rest, len(model.rest)
     nothing = LinearizedCost(theta, Quadratic(theta, np.eye(size)), np.eye(size), [], model.sparse_jacobian(theta))
     optimum = Optimum(theta, model.deform(theta[None]), nothing, [], np.eye(size))
-    assert SlideObservability(model).deviation(optimum) == pytest.approx(expected_m)
+    assert SlideObservability(model).deviations(optimum)[0] == pytest.approx(expected_m)
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 50))
+def test_information_on_rigid_motions_matches_numpy(seed: int, count: int):
+    generator, center, size = np.random.default_rng(seed), np.array([0.1, -0.2, 0.9]), 0.15
+    rows, places = generator.standard_normal((2, count, 3))
+    known, most = np.zeros((2, 6, 6))
+    sight = generator.standard_normal((count, 3)) * generator.integers(0, 2, (count, 1))  # none for some
+    sight /= np.maximum(np.linalg.norm(sight, axis=1, keepdims=True), 1e-9)
+    add_information(rows, places, sight, center, size, known, most)
+    turns = np.cross(np.eye(3), ((places - center) / size)[:, None])  # turn × place, of every axis
+    motions = np.concatenate([np.tile(np.eye(3), (count, 1, 1)), turns], axis=1).transpose(0, 2, 1)
+    seen = np.einsum("mi,mik->mk", rows, motions)
+    np.testing.assert_allclose(known, seen.T @ seen, atol=1e-9)
+    weighted = motions * np.linalg.norm(rows, axis=1)[:, None, None]
+    in_sight = weighted - np.einsum("mi,mj,mjk->mik", sight, sight, weighted)
+    np.testing.assert_allclose(most, np.einsum("mik,mil->kl", in_sight, in_sight), atol=1e-9)

@@ -10,8 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from calib.solve.regrouping.two_groups import numbered, two_groups
+from calib.solve.solution import Solution
 from calib.solve.validation.free_shape import Along, FreeShape, Members, along, disagreement, once, without
-from calib.solve.validation.steadiness import HARMLESS, from_middle_px, of_focal, optics
+from calib.solve.validation.unlike_shots.steadiness import HARMLESS, from_middle_px, of_focal, optics
 
 #: Minimum number of distinct poses, as any few fall into two groups, and of those in the smaller group.
 POSES, MIN_MEMBERS = 12, 3
@@ -41,29 +43,30 @@ class Groups:
         shots: those of the smaller group.
         shift: of its principal point from that of the others (2,) [px], or, relative, of its focal length (1,).
         alone: True if there is no other sensor, so that a turn of this one is one of all boards.
+        advice: what to do.
     """
 
     sensor: str
     shots: tuple[int, ...]
     shift: Array
     alone: bool
+    advice: str
 
     def __str__(self) -> str:
         """One sentence for people."""
-        shots = ",".join(map(str, self.shots))
-        advice = f"Look at both groups, and leave one out: --skip {shots}"
+        shots = numbered(self.shots)
         if len(self.shift) == 1:
             return (
                 f"{self.sensor}: shots {shots} have a focal length of their own, {self.shift[0]:+.1%} from that of the "
                 "others: were these images zoomed, refocused, cropped or resized? Switch autofocus, zoom and image "
-                f"stabilisation off. {advice}"
+                f"stabilisation off. {self.advice}"
             )
         across, down = self.shift.tolist()
         turned = "" if self.alone else ", or did a sensor turn, or the board move between the images of a shot"
         return (
             f"{self.sensor}: shots {shots} have a principal point of their own, ({across:+.1f}, {down:+.1f}) px from "
             "that of the others: are these images of two cameras, or were some turned by 180°, mirrored, cropped, "
-            f"stretched or stabilised, or taken in motion{turned}? {advice}"
+            f"stretched or stabilised, or taken in motion{turned}? {self.advice}"
         )
 
 
@@ -84,9 +87,17 @@ def groups(free: FreeShape, needed_px: float) -> list[Groups]:
             shot for shot, is_chosen in zip(free.solution.adjustment.layout.shots, chosen, strict=True) if is_chosen
         ]
         # Scores are derivatives of what is predicted minus what is measured.
-        alone = len(free.solution.task.sensors) == 1
-        found.append(Groups(name, tuple(sorted(shots)), -split.change, alone))
+        found.append(_settled(free.solution, name, tuple(sorted(shots)), -split.change))
     return found
+
+
+def _settled(solution: Solution, name: str, shots: tuple[int, ...], shift: Array) -> Groups:
+    """Groups after each shot went to the one that explains it better; the smaller one is named."""
+    advice, alone = f"Look at both groups, and leave one out: --skip {numbered(shots)}", len(solution.task.sensors) == 1
+    for two in two_groups(solution.task, solution.cameras, [shots]):
+        is_other = 2 * len({*shots} & {*two.smaller}) < len(two.smaller)
+        shots, shift, advice = two.smaller, -shift if is_other else shift, two.advice
+    return Groups(name, shots, shift, alone, advice)
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Shots that contradict the rest of a solution, and images of a shot that were not taken at the same moment.
+"""Shots that contradict the rest of a solution.
 
 In a rig all sensors share one pose of the board per shot. If two images of a shot show the board in different places,
 because they were paired wrongly or the board moved between them, each fits alone and both together do not.
@@ -14,9 +14,9 @@ import numpy as np
 from calib import pose
 from calib.board.views import CornerView
 from calib.pose import Pose
+from calib.solve.regrouping.two_groups import unexplained
 from calib.solve.solution import Solution
 from calib.solve.start.board_poses import PoseCandidate, pose_candidates
-from calib.solve.start.start import fit_camera
 
 #: Corners of a view that contradict: their median residual in deviations. Normal errors have 1.18, …
 _DEVIATIONS = 3.0
@@ -29,9 +29,8 @@ _OUTLIERS = 0.5
 _MAX_OUTLIERS = 0.1
 #: Above this fraction of contradicting shots there is no rest that they contradict.
 _MAX_SHARE = 1 / 3
-#: Images of a shot that fit this many times better alone are of different moments. If they miss by this much together,
-#: that is an objection of its own; by less, it may be why the shots disagree.
-_BETTER, SCATTERS_PX = 3.0, 0.5
+#: Images of a shot that fit this many times better alone are of different moments.
+_BETTER = 3.0
 #: Exchanged images put the board in the same place again to this share of what they are apart.
 _SAME = 0.2
 
@@ -70,29 +69,6 @@ class Contradiction:
         return f"shot {self.shot}: {said}"
 
 
-@dataclass(frozen=True)
-class Scatter:
-    """Images that fit alone and not together, in most shots.
-
-    Attributes:
-        sensors: that saw the board together.
-        apart_px: median over the shots of the worse view's residual, with one board in each shot [px].
-        alone_px: median residual of a view, with a camera and boards of its own [px].
-    """
-
-    sensors: tuple[str, ...]
-    apart_px: float
-    alone_px: float
-
-    def __str__(self) -> str:
-        """The finding, and what to do."""
-        return (
-            f"{' and '.join(self.sensors)}: each fits its own corners to {self.alone_px:.2g} px, but together they "
-            f"miss by {self.apart_px:.2g} px in most shots: the images of a shot were not taken at the same moment, or "
-            "a sensor was moved or zoomed between them; hold the board still in every shot, or synchronise the sensors"
-        )
-
-
 class _Seen(NamedTuple):
     """Pose of the board by one image, and how far its corners miss [px]."""
 
@@ -114,38 +90,20 @@ def contradictions(solution: Solution, left: Mapping[tuple[str, int], float] = {
     return sorted(found, key=lambda one: -one.miss / one.median)
 
 
-def scatter(solution: Solution, least_px: float = SCATTERS_PX) -> list[Scatter]:
-    """Evidence that images of most shots were taken at different moments: empty, or one `Scatter`.
+def completed(solution: Solution, found: Sequence[Contradiction]) -> list[Contradiction]:
+    """Shots that the others contradict once all of these are left out: some hid behind them, some suffered from them.
 
     Args:
         solution: from all shots.
-        least_px: what they miss by together, to be named [px].
+        found: by `contradictions`.
     """
-    together = [shot for shot in solution.task.shots if len(_seeing(solution, shot)) > 1]
-    corners = [view for view in solution.views if view.of == "corners" and view.shot in together]
-    worst = [max(view.rms for view in corners if view.shot == shot) for shot in together]
-    joint = float(np.median(worst)) if worst else 0.0
-    if not worst or joint < least_px:
+    if not found:
         return []
-    alone = [fitted for name in solution.task.sensors for fitted in _alone(solution, name, together)]
-    if not alone or joint < _BETTER * float(np.median(alone)):
-        return []
-    return [Scatter(tuple(dict.fromkeys(view.sensor for view in corners)), joint, float(np.median(alone)))]
-
-
-def _seeing(solution: Solution, shot: int) -> list[str]:
-    return [view.sensor for view in solution.task.corners if view.shot == shot]
-
-
-def _alone(solution: Solution, name: str, shots: Sequence[int]) -> list[float]:
-    """Residuals of a sensor's views [px] with a camera and boards of its own."""
-    views = [view for view in solution.task.corners if view.sensor == name]
-    if not views:
-        return []
-    sensor, camera = solution.task.sensors[name], solution.cameras[name]
-    if not sensor.fixed_intrinsics:
-        camera = fit_camera(name, sensor, views, camera)
-    return [found[0].rms_px for view in views if view.shot in shots and (found := pose_candidates(camera, view))]
+    far = unexplained(solution.task, solution.cameras, {one.shot for one in found})
+    boards = _boards(solution)
+    known = [one for one in found if one.shot in far or one.of != "corners"]
+    hidden = [_hidden(solution, shot, far[shot], boards) for shot in {*far} - {one.shot for one in found}]
+    return [*known, *hidden] or [*found]
 
 
 def _of_shot(
@@ -170,6 +128,13 @@ def _of_shot(
         if is_bad and (worst is None or view.rms / median > worst.miss / worst.median):
             worst = Contradiction(shot, (view.sensor,), view.rms, median, view.of)
     return None if worst is None else _with_partner(worst, boards)
+
+
+def _hidden(solution: Solution, shot: int, miss: float, boards: Mapping[tuple[str, int], _Seen]) -> Contradiction:
+    """A shot whose corners miss by this much [px] once others are left out."""
+    worst = max((one for one in solution.views if (one.shot, one.of) == (shot, "corners")), key=lambda one: one.rms)
+    median = float(np.median([one.rms for one in solution.views if (one.sensor, one.of) == (worst.sensor, worst.of)]))
+    return _with_partner(Contradiction(shot, (worst.sensor,), miss, median, "corners"), boards)
 
 
 def _with_partner(found: Contradiction, boards: Mapping[tuple[str, int], _Seen]) -> Contradiction:

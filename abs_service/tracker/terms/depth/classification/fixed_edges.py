@@ -1,0 +1,175 @@
+"""Edges that stay where they are in the image while the rest of the outline does not: there the field of view ends.
+
+An object alone before a background without return seems to end where the sensor's view does. One image does not tell
+the two apart. Over time they differ: the end of an object moves in the image, and its outermost pixels come and go with
+the noise; the end of a view is the same pixel for pixel in every image.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.pairing.images import Window, limits
+from abs_service.tracker.synthesis.window import corner
+from abs_service.tracker.terms.depth.classification.neighbourhood import grown
+
+#: Pixels this near to the predicted mesh may be on the object's outline: a mesh ends up to a cell inside.
+NEAR_PX = 16
+#: A view ends within this share of the image's width or height from its sides. The corners that the hexagon of an Azure
+#: Kinect leaves out are 0.24 wide; a part of a long edge farther inside may be fixed for another reason.
+MARGIN = 0.15
+#: A place of the outline is fixed if it is the same in an image and so many later ones.
+LATER_IMAGES = 4
+#: An edge is fixed where so large a share of the outline in a cell of the image is [px], for so many pixels in a row.
+#: Dropouts of 2 % change a tenth of a fixed one. Of a sheet that hands bend before a real Kinect v1, far from the sides
+#: of its image, an edge was so in 5 of 116 such series of images.
+CELL_PX, MIN_SHARE, MIN_LENGTH, LARGEST_GAP = 16, 0.8, 24, 8
+#: If no more than this share of the rest of the outline changes, all of it stands still, and nothing can be told.
+MIN_ELSEWHERE = 0.25
+#: So many returns farther than this beyond an edge, in all images so far, show that the sensor sees there [px].
+MIN_RETURNS, BEYOND_PX = 10, 2.0
+#: The first pixels beyond an edge lie so near to the line through them, or beyond it.
+HALF_PX = 0.75
+Coordinates = NDArray[np.intp]
+
+#: Steps (row, column) from a pixel to its neighbours towards the left, right, upper and lower side of the image.
+_STEPS = ((0, -1), (0, 1), (-1, 0), (1, 0))
+
+
+class Edge(NamedTuple):
+    """End of a field of view.
+
+    Attributes:
+        beyond: pixels (height, width) near a side of the image that are beyond it.
+        far: those of them that are beyond it by more than `BEYOND_PX`.
+    """
+
+    beyond: NDArray[np.bool_]
+    far: NDArray[np.bool_]
+
+
+class FixedEdges:
+    """Pixels beyond fixed edges, learnt from the depth images so far."""
+
+    def __init__(self) -> None:
+        self._last = self._next = np.zeros((0, 2), np.intp)
+        self._side, self._is_fixed = np.zeros(0, np.intp), np.zeros(0, np.bool_)
+        self._edges: list[Edge] = []
+        self._returned = np.zeros((0, 0), np.bool_)
+        self._later = LATER_IMAGES
+
+    def observe(
+        self, missing: NDArray[np.bool_], areas: NDArray[np.bool_], expected: NDArray[np.bool_], window: Window
+    ) -> NDArray[np.bool_]:
+        """Missing returns (rows, columns) beyond fixed edges.
+
+        Args:
+            missing: pixels without return (rows, columns) in the window.
+            areas: those of them that are no dropouts.
+            expected: silhouette of the predicted mesh there.
+            window: of the image; the first one has to be the whole image.
+        """
+        if not self._returned.size:
+            self._returned = ~missing
+        self._returned[window] |= ~missing
+        self._edges = [edge for edge in self._edges if not self._is_refuted(edge)]
+        self._compare(missing, window)
+        self._later += 1
+        if self._later >= LATER_IMAGES:
+            self._learn()
+            self._begin(areas, expected, window)
+        beyond = np.zeros(missing.shape, np.bool_)
+        for edge in self._edges:
+            beyond |= missing & edge.beyond[window]
+        return beyond
+
+    def _begin(self, areas: NDArray[np.bool_], expected: NDArray[np.bool_], window: Window) -> None:
+        """Takes the outline of this image for that with which later ones are compared."""
+        last, beside, self._side = _outline(areas, grown(expected, NEAR_PX))
+        self._last, self._next = last + corner(window), beside + corner(window)
+        self._is_fixed, self._later = np.ones(len(last), np.bool_), 0
+
+    def _compare(self, missing: NDArray[np.bool_], window: Window) -> None:
+        """Finds the places at which the outline is another one, or out of the window."""
+        top, bottom, left, right = limits(window, self._shape)
+        low, high = np.minimum(self._last, self._next), np.maximum(self._last, self._next)
+        self._is_fixed &= (low >= (top, left)).all(axis=1) & (high < (bottom, right)).all(axis=1)
+        known = np.flatnonzero(self._is_fixed)
+        last, beside = (tuple((at[known] - (top, left)).T) for at in (self._last, self._next))
+        self._is_fixed[known] = ~missing[last] & missing[beside]
+
+    def _learn(self) -> None:
+        """Finds the edges that are fixed, if the rest of the outline is not."""
+        is_fixed = self._is_fixed
+        if np.count_nonzero(is_fixed) < MIN_LENGTH:
+            return
+        columns = self._shape[1] // CELL_PX + 1
+        cell = self._last[:, 0] // CELL_PX * columns + self._last[:, 1] // CELL_PX
+        all_of_it, fixed = np.bincount(cell), np.bincount(cell, is_fixed)
+        lines_up = is_fixed & (fixed >= MIN_SHARE * all_of_it)[cell]
+        if np.count_nonzero(~is_fixed) <= MIN_ELSEWHERE * np.count_nonzero(~lines_up):
+            return
+        for side in range(len(_STEPS)):
+            known = np.any([beyond[tuple(self._next.T)] for beyond, _ in self._edges] or [np.False_], axis=0)
+            use = np.flatnonzero(lines_up & (self._side == side) & ~known)
+            found = [_beyond(self._shape, side, run) for run in _runs(self._next[use], side, self._shape)]
+            self._edges += [edge for edge in found if not self._is_refuted(edge)]
+
+    @property
+    def _shape(self) -> tuple[int, int]:
+        return self._returned.shape[0], self._returned.shape[1]
+
+    def _is_refuted(self, edge: Edge) -> bool:
+        """True if there has been a return beyond an edge."""
+        return bool(np.count_nonzero(self._returned & edge.far) >= MIN_RETURNS)
+
+
+def _outline(
+    areas: NDArray[np.bool_], near: NDArray[np.bool_]
+) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
+    """Pixels (k, 2) at which returns end, the next ones (k, 2), and the sides of the image (k,) that these are towards.
+
+    Args:
+        areas: missing returns (height, width).
+        near: where they are looked for.
+    """
+    last, padded = np.argwhere(near & grown(areas, 1) & ~areas), np.pad(areas, 1)
+    steps = np.array(_STEPS)
+    beside = last[:, None] + steps
+    which, sides = np.nonzero(padded[tuple((beside + 1).transpose(2, 0, 1))])
+    return last[which], beside[which, sides], sides
+
+
+def _from_side(
+    at: tuple[Coordinates, Coordinates], side: int, shape: tuple[int, int]
+) -> tuple[Coordinates, Coordinates]:
+    """Distances from a side of an image, and places along it, of pixels at rows and columns [px]."""
+    (rows, columns), (height, width) = at, shape
+    return ((columns, rows), (width - 1 - columns, rows), (rows, columns), (height - 1 - rows, columns))[side]
+
+
+def _runs(places: NDArray[np.intp], side: int, shape: tuple[int, int]) -> list[NDArray[np.intp]]:
+    """Connected ones of places (k, 2) near a side of an image, as (distance from the side, along it) (2, n)."""
+    found = np.stack(_from_side((places[:, 0], places[:, 1]), side, shape))
+    found = found[:, found[0] < _margin(side, shape)]
+    found = found[:, np.argsort(found[1], kind="stable")]
+    runs = np.split(found, np.flatnonzero(np.diff(found[1]) > LARGEST_GAP) + 1, axis=1)
+    return [run for run in runs if len(np.unique(run[1])) >= MIN_LENGTH]
+
+
+def _beyond(shape: tuple[int, int], side: int, run: NDArray[np.intp]) -> Edge:
+    """The end of a view at the straight line through a run (2, n) of places near a side of an image (height, width).
+
+    A field of view is convex, so all that is beyond a straight piece of its end is outside it.
+    """
+    slope, offset = np.polyfit(run[1], run[0], 1)
+    rows, columns = np.ogrid[: shape[0], : shape[1]]
+    away, along = _from_side((rows, columns), side, shape)
+    by, near = slope * along + offset - away, away < _margin(side, shape)
+    return Edge((by > -HALF_PX) & near, (by > BEYOND_PX) & near)
+
+
+def _margin(side: int, shape: tuple[int, int]) -> float:
+    """Distance from a side within which a view may end [px]."""
+    return MARGIN * (shape[1] if _STEPS[side][1] else shape[0])

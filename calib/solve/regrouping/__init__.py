@@ -1,0 +1,1 @@
+"""Shots in two groups that contradict each other: which shot belongs to which."""

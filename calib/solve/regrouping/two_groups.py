@@ -1,0 +1,131 @@
+"""Two groups of shots, by two means: each is solved anew, and each shot goes to the one that explains it better."""
+
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.camera import Camera
+from calib.solve.bundle.tasks import Task
+from calib.solve.regrouping.refits import corners_alone, fitted, misses, with_held_lenses
+
+#: Minimum number of shots in a group, and largest number of times that all shots are assigned.
+_MEMBERS, _STEPS = 3, 8
+
+#: A group is one if its shots miss by at most this many times what the shots of the other miss by.
+_ALIKE = 2.0
+
+#: Shots that miss by this many times the median of those that are left, and by this much [px], are not explained.
+_FAR, _FAR_PX = 3.0, 0.5
+
+#: From this ratio of their sizes on, neither of two groups is the exception.
+_EQUAL = 0.6
+
+
+@dataclass(frozen=True)
+class TwoGroups:
+    """Two groups of shots, each of which has cameras that explain it.
+
+    Attributes:
+        smaller, larger: their shots.
+        alone_px: median over the shots of how far corners miss with the cameras of their own group [px].
+        other_px: and with those of the other group.
+    """
+
+    smaller: tuple[int, ...]
+    larger: tuple[int, ...]
+    alone_px: float
+    other_px: float
+
+    @property
+    def advice(self) -> str:
+        """Advice: shots to leave out; of groups that are about as large, either."""
+        smaller = numbered(self.smaller)
+        if len(self.smaller) <= _EQUAL * len(self.larger):
+            return f"Look at both groups, and leave one out: --skip {smaller}"
+        return (
+            "One of both groups is wrong, and nothing says which: look at both, and leave one out, "
+            f"--skip {smaller} or --skip {numbered(self.larger)}"
+        )
+
+    def __str__(self) -> str:
+        """The finding, and what to do."""
+        return (
+            f"two groups of shots contradict each other: {numbered(self.smaller)} and {numbered(self.larger)}. With "
+            f"cameras of its own each misses by {self.alone_px:.2g} px, with those of the other by {self.other_px:.2g} "
+            "px: was a sensor moved, turned or zoomed between them, or are their images paired otherwise? "
+            f"{self.advice}"
+        )
+
+
+def numbered(shots: Collection[int]) -> str:
+    """Shots as `--skip` takes them: 3,7-9."""
+    first = sorted(shot for shot in shots if shot - 1 not in shots)
+    last = sorted(shot for shot in shots if shot + 1 not in shots)
+    return ",".join(str(a) if a == b else f"{a}-{b}" for a, b in zip(first, last, strict=True))
+
+
+def two_groups(task: Task, cameras: Mapping[str, Camera], guesses: Iterable[Collection[int]]) -> list[TwoGroups]:
+    """Two groups that explain all shots best, from guesses of the shots of one of them; empty if none do.
+
+    Args:
+        task: with all shots.
+        cameras: whose lenses are held.
+        guesses: any; the first that most shots agree with need not be the best.
+    """
+    held = with_held_lenses(corners_alone(task, cameras))
+    found = [one for guess in guesses for one in _settled(held, np.isin(held.shots, [*guess]))]
+    return sorted(found, key=lambda one: one.alone_px)[:1]
+
+
+def _settled(held: Task, members: NDArray[np.bool_]) -> list[TwoGroups]:
+    for _ in range(_STEPS):
+        if not _MEMBERS <= members.sum() <= len(members) - _MEMBERS:
+            return []
+        try:
+            off = np.stack([misses(held, fitted(held, _part(held, part))) for part in (~members, members)])
+        except ValueError:  # nothing explains one of them
+            return []
+        before, members = members, off[1] < off[0]
+        if np.array_equal(before, members):
+            return _judged(held, members, off)
+    return []
+
+
+def _judged(held: Task, members: NDArray[np.bool_], off: NDArray[np.float64]) -> list[TwoGroups]:
+    """The groups, if both are explained alike, by what shots miss by with the cameras of both (2, shots) [px]."""
+    own, other = off.min(axis=0), off.max(axis=0)
+    typical = sorted(float(np.median(own[part])) for part in (members, ~members))
+    if typical[1] > _ALIKE * typical[0]:
+        return []
+    smaller, larger = sorted((tuple(_part(held, part)) for part in (members, ~members)), key=len)
+    return [TwoGroups(smaller, larger, float(np.median(own)), float(np.median(other)))]
+
+
+def _part(held: Task, members: NDArray[np.bool_]) -> Sequence[int]:
+    return np.compress(members, held.shots).tolist()
+
+
+def unexplained(task: Task, cameras: Mapping[str, Camera], odd: Collection[int]) -> dict[int, float]:
+    """Shots that cameras fitted without them do not explain, with what their corners miss by [px].
+
+    Args:
+        task: with all shots.
+        cameras: to begin with.
+        odd: these shots, about.
+    """
+    corners = corners_alone(task, cameras)
+    far, found = {*odd}, dict.fromkeys(odd, 0.0)
+    for _ in range(_STEPS):
+        rest = [shot for shot in corners.shots if shot not in far]
+        try:
+            off = dict(zip(corners.shots, misses(corners, fitted(corners, rest)).tolist(), strict=True))
+        except ValueError:  # nothing explains the rest
+            return found
+        least = max(_FAR * float(np.median([off[shot] for shot in rest])), _FAR_PX)
+        before, found = far, {shot: miss for shot, miss in off.items() if miss > least}
+        far = {*found}
+        if far == before:
+            break
+    return found

@@ -1,0 +1,92 @@
+"""Findings on shots that do not show the same board and rig as the others, the most likely cause first."""
+
+from collections.abc import Collection, Sequence
+from typing import NamedTuple
+
+from calib.solve.calibrate import calibrate
+from calib.solve.regrouping.guesses import by_residuals
+from calib.solve.regrouping.two_groups import TwoGroups, numbered, two_groups
+from calib.solve.solution import Solution
+from calib.solve.validation.board_shape import ShapeError
+from calib.solve.validation.distance_errors import distance_errors
+from calib.solve.validation.free_shape import FreeShape
+from calib.solve.validation.unlike_shots import changes
+from calib.solve.validation.unlike_shots.contradictions import Contradiction, completed, contradictions
+from calib.solve.validation.unlike_shots.groups import groups
+from calib.solve.validation.unlike_shots.scatter import SCATTERS_PX, Scatter, scatter, typical_alone
+from calib.solve.validation.unlike_shots.steadiness import changes_of_optics, changes_of_place, focal_scatter
+
+#: Two groups are the explanation if corners then miss by at most this many times what they do in each image alone.
+_EXPLAINED = 1.5
+
+
+class Unlike(NamedTuple):
+    """Reasons to doubt that all shots show one board and one rig, shots that contradict, and likely causes."""
+
+    reasons: Sequence[str]
+    contradicting: Sequence[Contradiction]
+    causes: Sequence[str]
+
+
+def unlike_shots(free: FreeShape, shape: Sequence[ShapeError], needed_px: float) -> Unlike:
+    """Looks whether all shots show one board and one rig."""
+    solution = free.solution
+    if wrong := distance_errors(solution, needed_px):
+        return Unlike([*map(str, wrong)], [], [])  # they pull everything else along
+    moved = changes_of_place(free, needed_px)
+    # What happened to a sensor looks as if its image changed, and a wrong board as if every shot had another lens.
+    changed = [] if moved else changes_of_optics(free, needed_px)
+    confirmed = [changes.is_confirmed(solution, one) for one in changed]
+    refocused = [one for one, is_so in zip(changed, confirmed) if is_so]
+    contradicting = [] if moved else contradictions(solution, free.misses)
+    scattered = [] if moved else _scattered(solution, contradicting, SCATTERS_PX)
+    two = [] if refocused else _two(solution, contradicting, scattered)
+    if two or scattered:
+        contradicting, scattered = [], [] if two else scattered  # without a rest, nothing contradicts it
+    contradicting = completed(solution, contradicting)
+    misprinted = [str(one) for one in shape if one.is_misprint]
+    lasting = moved or refocused or misprinted or scattered or two
+    mixed = [] if lasting or contradicting or shape else groups(free, needed_px)
+    focus = {} if lasting or contradicting or mixed else focal_scatter(free, needed_px)
+    cause = [] if lasting or solution.task.planes else _scattered(solution, contradicting, 0.0)  # or wrong distances
+    reasons = [changes.of_place(one) for one in moved]
+    reasons += [changes.of_optics(one, len(solution.task.sensors)) for one in refocused]
+    reasons += [*misprinted, *map(str, mixed), *(changes.of_focus(*each) for each in focus.items())]
+    reasons += [*map(str, [*two, *scattered]), *_contradicting(contradicting)]
+    reasons += [changes.unexplained(one) for one, is_so in zip(changed, confirmed) if not is_so]
+    return Unlike(reasons, contradicting, [*map(str, cause)])
+
+
+def _two(solution: Solution, contradicting: Sequence[Contradiction], scattered: Sequence[Scatter]) -> list[TwoGroups]:
+    """Two groups that explain shots which contradict each other, if there are any."""
+    free_running = any(sensor.free_running for sensor in solution.task.sensors.values())
+    if free_running or not (contradicting or scattered):
+        return []
+    guesses = [by_residuals(solution), {one.shot for one in contradicting}]
+    found = two_groups(solution.task, solution.cameras, guesses)
+    return [one for one in found if one.alone_px < _EXPLAINED * typical_alone(solution)]
+
+
+def _contradicting(found: Sequence[Contradiction]) -> list[str]:
+    if not found:
+        return []
+    count = f"{len(found)} shots contradict" if len(found) > 1 else "one shot contradicts"
+    return [
+        f"{count} the others: {'; '.join(map(str, found))}. Look at the pictures, and leave out what is wrong: "
+        f"--skip {numbered({one.shot for one in found})}"
+    ]
+
+
+def _scattered(solution: Solution, contradicting: Sequence[Contradiction], least_px: float) -> list[Scatter]:
+    found = scatter(solution, least_px)
+    if found and contradicting:  # a few wrong shots spoil the others until they are left out
+        found = _scatter_without({one.shot for one in contradicting}, solution, least_px)
+    return found
+
+
+def _scatter_without(shots: Collection[int], solution: Solution, least_px: float) -> list[Scatter]:
+    rest = solution.task.of_shots([shot for shot in solution.task.shots if shot not in shots])
+    try:
+        return scatter(calibrate(rest), least_px)
+    except ValueError:  # nor can the rest be calibrated
+        return scatter(solution, least_px)

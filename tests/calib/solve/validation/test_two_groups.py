@@ -1,0 +1,76 @@
+"""Of two groups of shots that contradict each other each shot is found; the smaller group is named, or both."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from calib.solve.bundle.adjustment import NotSolvedError
+from calib.solve.regrouping.guesses import by_residuals
+from calib.solve.regrouping.two_groups import TwoGroups, numbered, two_groups, unexplained
+from calib.solve.solution import Solution
+from calib.solve.validation.free_shape import free_shape
+from calib.solve.validation.unlike_shots.contradictions import completed, contradictions
+from calib.solve.validation.unlike_shots.findings import unlike_shots
+from tests.calib.solve.validation.test_contradictions import BOARDS, moved, solved
+
+FEW, HALF = (2, 3, 7, 11, 16), (0, 2, 3, 5, 7, 11, 12, 14, 16, 19)
+
+
+@cache
+def bumped(shots: tuple[int, ...], by: float = 0.006) -> Solution:
+    """The colour camera stands elsewhere in these shots."""
+    return solved({shot: moved(T_rb, (by, 0, 0)) if shot in shots else T_rb for shot, T_rb in BOARDS.items()})
+
+
+def reasons(solution: Solution) -> list[str]:
+    return [*unlike_shots(free_shape(solution), [], 1.0).reasons]
+
+
+@pytest.mark.parametrize("shots", [FEW, HALF])
+def test_each_shot_goes_to_its_group(shots: tuple[int, ...]) -> None:
+    solution = bumped(shots)
+    wrong_guess = {*shots[2:], *(each + 1 for each in shots[2:])} & {*BOARDS}
+    for guess in (by_residuals(solution), wrong_guess):
+        (found,) = two_groups(solution.task, solution.cameras, [guess])
+        assert {*shots} in ({*found.smaller}, {*found.larger})
+        assert found.alone_px < 0.3 < found.other_px
+
+
+def test_the_smaller_group_is_named() -> None:
+    (said,) = reasons(bumped(FEW))
+    assert said.startswith("two groups of shots contradict each other: 2-3,7,11,16 and 0-1,4-6")
+    assert said.endswith("leave one out: --skip 2-3,7,11,16")
+
+
+def test_of_equal_groups_none_is_called_the_wrong_one() -> None:
+    (said,) = reasons(bumped(HALF))
+    assert "One of both groups is wrong, and nothing says which" in said
+    assert f"--skip {numbered(HALF)}" in said
+    assert f"--skip {numbered({*BOARDS} - {*HALF})}" in said
+
+
+def test_groups_that_have_no_minimum_together_are_told_from_the_start() -> None:
+    with pytest.raises(NotSolvedError, match=r"Two groups of shots contradict each other: .* or --skip "):
+        bumped(HALF, 0.2)
+
+
+def test_shots_of_one_rig_are_not_two_groups() -> None:
+    solution = bumped(())
+    found = two_groups(solution.task, solution.cameras, [HALF])
+    assert all(one.other_px < 1.2 * one.alone_px for one in found)
+    assert reasons(solution) == []
+
+
+def test_a_shot_that_others_hid_is_named_with_them() -> None:
+    random = np.random.default_rng(3)
+    wrong = {shot: moved(BOARDS[shot], tuple(random.normal(0, 0.03, 3))) for shot in (4, 9, 15)}
+    solution = solved({**BOARDS, **wrong})
+    found = contradictions(solution)
+    assert {one.shot for one in completed(solution, found[:1])} == {4, 9, 15}
+    assert {*unexplained(solution.task, solution.cameras, {4, 9})} == {4, 9, 15}
+
+
+def test_shots_are_written_as_skip_reads_them() -> None:
+    assert numbered({9, 3, 8, 7, 12}) == "3,7-9,12"
+    assert TwoGroups((1, 2), (0, 3, 4, 5), 0.1, 2.0).advice.endswith("--skip 1-2")
