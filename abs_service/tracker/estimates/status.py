@@ -201,12 +201,10 @@ _ABSENT = {
 def _placed(fits: Sequence[SensorFit], shape: ShapeQuality, innovation: float, limits: Settings) -> Iterator[str]:
     """Reasons by where the mesh lies."""
     if is_misplaced(fits, shape, limits):
-        off_m = rim_distance(fits)
-        off = f"{off_m * 1e3:.0f} mm" if np.isfinite(off_m) else "an unknown distance"
-        yield (
-            f"{rim_share(fits):.0%} of the free edges lie off the object's outline, by "
-            f"{off} together or across a slide: " + (_SLID if hangs_over(fits) else _GOES_ON)
-        )
+        off_m, why = rim_distance(fits), _SLID if hangs_over(fits) else _GOES_ON
+        by = f"{off_m * 1e3:.0f} mm" if np.isfinite(off_m) else "an unknown distance"
+        off = f"{rim_share(fits):.0%} of the free edges lie off the object's outline"
+        yield f"{off}, by {by} together or across a slide: {why}"
     if any(fit.is_surprised for fit in fits) and not any(np.isfinite(fit.remainder.share) for fit in fits):
         yield (
             "nothing was where the object was expected, so neither its outline nor what lies beside it is judged – "
