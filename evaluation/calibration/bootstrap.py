@@ -1,4 +1,7 @@
-"""Bootstrap over the shots of a calibration: how far its parameters scatter when other shots had been taken."""
+"""Bootstrap over the shots of a calibration: how far its parameters scatter when other shots had been taken.
+
+All draws show the same board, so what its bend does to the parameters is in none of their differences.
+"""
 
 from dataclasses import replace
 
@@ -33,6 +36,13 @@ def deviations(solution: Solution, count: int, generator: np.random.Generator) -
             continue
     low, high = np.percentile(found, (15.87, 84.13), axis=0)
     return (high - low) / 2
+
+
+def ratios(solution: Solution, count: int, generator: np.random.Generator) -> dict[str, float]:
+    """Such deviations over those that the disagreement of the poses states, by the names of the parameters."""
+    found = deviations(solution, count, generator)
+    stated = np.sqrt(np.diag(solution.adjustment.between_poses))
+    return {each.name: ratio for each, ratio in zip(solution.parameters, (found / stated).tolist(), strict=False)}
 
 
 def _solved(solution: Solution, drawn: list[int]) -> Solution:

@@ -93,15 +93,19 @@ class Adjustment:
 
     @cached_property
     def covariance(self) -> NDArray[np.float64]:
-        """Covariance of increments of the parameters (size, size), from how far the poses of the board disagree.
+        """Covariance of increments of the parameters (size, size).
 
-        What a bend of the board does to all of them alike is added.
+        From how far the poses of the board disagree, and what a bend of the board does to all of them alike.
         """
         if self.layout.board_start == 0:
             return self.independent
-        sensors = uncertainty.pose_covariance(self.pose_information, self.noise)
-        sensors = sensors + bend_covariance(self.equations, self.residuals)
+        sensors = self.between_poses + bend_covariance(self.equations, self.residuals)
         return uncertainty.with_boards(self.independent, sensors)
+
+    @cached_property
+    def between_poses(self) -> NDArray[np.float64]:
+        """Covariance of the sensors' parameters (k, k), from how far the poses of the board disagree."""
+        return uncertainty.pose_covariance(self.pose_information, self.noise)
 
     @cached_property
     def pose_information(self) -> uncertainty.PoseInformation:

@@ -18,9 +18,7 @@ DRAWS = 100
 
 def ratios(task: Task) -> dict[str, float]:
     """Bootstrap over stated deviation by parameter."""
-    solution = calibrate(task)
-    found = bootstrap.deviations(solution, DRAWS, np.random.default_rng(0))
-    return {each.name: deviation / each.sigma for each, deviation in zip(solution.parameters, found, strict=False)}
+    return bootstrap.ratios(calibrate(task), DRAWS, np.random.default_rng(0))
 
 
 @pytest.mark.slow
