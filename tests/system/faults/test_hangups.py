@@ -13,6 +13,14 @@ from tests.system.running import START_S, RigListener, wait_until
 pytestmark = [pytest.mark.slow, pytest.mark.realtime]
 
 
+@pytest.fixture(autouse=True)
+def default_hangup():
+    """SIGHUP as a shell leaves it to programs; they inherit that it is ignored, as under `nohup`."""
+    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    yield
+    signal.signal(signal.SIGHUP, before)
+
+
 def test_a_service_reads_its_file_again_and_none_of_its_processes_ends(rig_file, endpoint, launch):
     process = launch("run", rig_file, "--no-record", "--json", stdout=subprocess.DEVNULL, start_new_session=True)
     wait_until(lambda: children(process.pid), 10, "a fork server")
