@@ -1,5 +1,6 @@
 """Interfaces of synthesis: samples of deformed meshes in a sensor's image, and images in the same geometry."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -56,6 +57,21 @@ class Synthesis:
     distance: NDArray[np.float32]
     attributes: NDArray[np.float32]
     interpolation: Interpolation
+
+
+def once(known: dict[Surface, Synthesis], surface: Surface, synthesize: Callable[[Surface], Synthesis]) -> Synthesis:
+    """The synthesis of a population; that of a surface by itself is kept, since costs, fits and derivatives ask for it.
+
+    Args:
+        known: what is kept, in one frame.
+        surface: the population.
+        synthesize: makes what is not known.
+    """
+    if len(surface.vertices) > 1:
+        return synthesize(surface)
+    if surface not in known:
+        known[surface] = synthesize(surface)
+    return known[surface]
 
 
 class ObservedView(Protocol):

@@ -12,7 +12,7 @@ from abs_service.pairing.images import Window
 from abs_service.pairing.observation import Observation
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import SparseJacobian, Surface
-from abs_service.tracker.synthesis.base import AS_MEASURED, Resampling, Synthesis, View
+from abs_service.tracker.synthesis.base import AS_MEASURED, Resampling, Synthesis, View, once
 from abs_service.tracker.synthesis.projection import Projection, in_sight
 from abs_service.tracker.synthesis.rasterization.raster import Raster
 from abs_service.tracker.synthesis.rasterization.texturing import lattice, paint
@@ -94,15 +94,17 @@ class DenseView:
         """Counts the pixels of the predicted mesh; the z-buffer resolves self-occlusion per candidate."""
         samples, share = self._rasterize(predicted)
         expected = float(samples.covered[0]) / max(float(share[0]), MIN_SHARE)
-        return ObservedDenseView(self.camera, lambda surface: self._synthesize(surface, expected))
+        seen = self._painted(samples, share, expected)
+        return ObservedDenseView(
+            self.camera, lambda surface: self._painted(*self._rasterize(surface), expected), {predicted: seen}
+        )
 
     def render(self, surface: Surface) -> NDArray[np.float32]:
         """Radial distances (height, width) [m] of a population of one in the camera's image; infinite off the mesh."""
         return self._raster.render(surface.vertices[0])
 
-    def _synthesize(self, surface: Surface, expected: float) -> Synthesis:
-        """Synthesises a population; `expected` is the number of pixels of the predicted mesh."""
-        samples, share = self._rasterize(surface)
+    def _painted(self, samples: Samples, share: NDArray[np.float64], expected: float) -> Synthesis:
+        """The synthesis of a rasterised population; `expected` is the number of pixels of the predicted mesh."""
         attributes = paint(self._attributes, self._detail, samples)
         return Synthesis(samples.pixel, samples.distance, attributes, InFaces(self._faces, samples, share, expected))
 
@@ -119,23 +121,20 @@ class ObservedDenseView:
     Args:
         camera: the camera.
         synthesize: synthesises a population.
+        single: what was synthesised of populations of one, see `once`.
     """
 
-    def __init__(self, camera: Camera, synthesize: Callable[[Surface], Synthesis]):
+    def __init__(self, camera: Camera, synthesize: Callable[[Surface], Synthesis], single: dict[Surface, Synthesis]):
         self.camera = camera
         self._synthesize = synthesize
-        self._single: dict[Surface, Synthesis] = {}
+        self._single = single
 
     def synthesize(self, surface: Surface) -> Synthesis:
         """Synthesises a population, a surface by itself once.
 
         Samples beyond a candidate's number of covered pixels have pixel −1.
         """
-        if len(surface.vertices) > 1:
-            return self._synthesize(surface)
-        if surface not in self._single:
-            self._single[surface] = self._synthesize(surface)
-        return self._single[surface]
+        return once(self._single, surface, self._synthesize)
 
     def attribute_gradients(self, seen: Synthesis) -> NDArray[np.float32]:
         """NaN: gradients of the image are more accurate than those of the lattice."""

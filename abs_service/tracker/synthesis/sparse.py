@@ -19,7 +19,7 @@ from abs_service.tracker.synthesis.attribute_gradients import (
     half_pixel,
     surroundings,
 )
-from abs_service.tracker.synthesis.base import AS_MEASURED, Resampling, Synthesis, View
+from abs_service.tracker.synthesis.base import AS_MEASURED, Resampling, Synthesis, View, once
 from abs_service.tracker.synthesis.projection import Optics, Projection
 from abs_service.tracker.synthesis.rasterization.raster import Raster
 from abs_service.tracker.synthesis.window import around
@@ -138,7 +138,7 @@ class ObservedSparseView:
         attributes: of the vertices (channels, n).
         gradients: of the attributes in the image.
         hidden: vertices (n,) that are no samples.
-        single: what was synthesised of populations of one: costs, fits and derivatives ask for the same.
+        single: what was synthesised of populations of one, see `once`.
     """
 
     camera: Camera
@@ -150,11 +150,7 @@ class ObservedSparseView:
 
     def synthesize(self, surface: Surface) -> Synthesis:
         """Synthesises a population of deformed meshes; a surface by itself once."""
-        if len(surface.vertices) > 1:
-            return self._synthesize(surface)
-        if surface not in self.single:
-            self.single[surface] = self._synthesize(surface)
-        return self.single[surface]
+        return once(self.single, surface, self._synthesize)
 
     def _synthesize(self, surface: Surface) -> Synthesis:
         population, _, n = surface.vertices.shape

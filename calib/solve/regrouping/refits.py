@@ -82,8 +82,8 @@ def _best(cameras: Mapping[str, Camera], views: Sequence[CornerView], T_rb: Pose
     off = _off(cameras, views, T_rb)
     for _ in range(_STEPS):
         step = -np.linalg.lstsq(_jacobian(cameras, views, T_rb), off.ravel())[0]
-        tried = [(turned(T_rb, step / 2**halves), _off(cameras, views, turned(T_rb, step / 2**halves)))
-                 for halves in range(_HALVES)]  # fmt: skip
+        places = [turned(T_rb, step / 2**halves) for halves in range(_HALVES)]
+        tried = [(place, _off(cameras, views, place)) for place in places]
         moved, after = min(tried, key=lambda each: _rms(each[1]))
         if _rms(after) > 0.999 * _rms(off):
             break

@@ -8,7 +8,7 @@ import time
 from absmsg.v1.health_pb2 import Health
 
 from evaluation.service.faults.fault import PATIENCE_S, Elsewhere, Fault, Made
-from evaluation.service.faults.running import RunningRig, mount, start_on_disk
+from evaluation.service.faults.running import RunningRig, mount, mounted, start_on_disk
 from evaluation.service.live.proc import is_running
 
 #: For how long the recorder cannot record, after it has said so [s].
@@ -42,11 +42,8 @@ def refused(rig: RunningRig) -> Made:
 def read_only(rig: RunningRig) -> Made:
     """Something read-only is mounted over the folder, and unmounted."""
     begin_ns = rig.now_ns()
-    mount("-t", "tmpfs", "-o", "ro,size=1m", "tmpfs", str(rig.takes))
-    try:
+    with mounted(rig.takes, "-t", "tmpfs", "-o", "ro,size=1m", "tmpfs"):
         broken = _await_failure(rig, begin_ns)
-    finally:
-        subprocess.run(["umount", str(rig.takes)], check=True)
     return Made(begin_ns, rig.now_ns(), broken)
 
 

@@ -5,7 +5,7 @@ import signal
 import subprocess
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext, suppress
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -186,49 +186,47 @@ def start_run(folder: Path, device: str, room_mb: int) -> Iterator[RunningRig]:
 @contextmanager
 def start_on_disk(folder: Path, device: str, room_mb: int) -> Iterator[RunningRig]:
     """The same, whose recordings lie on a disk in a file."""
-    with _disk(folder / "takes", room_mb), RunningRig(folder, table(device), Service, COMPONENTS) as rig:
+    with disk(folder / "takes", room_mb), RunningRig(folder, table(device), Service, COMPONENTS) as rig:
         yield rig
 
 
-@contextmanager
-def _room(folder: Path, megabytes: int) -> Iterator[None]:
-    """A file system of its own, in memory, at a folder; none for 0.
-
-    Raises:
-        UnavailableError: this user may not mount one.
-    """
-    if not megabytes:
-        yield
-        return
-    folder.mkdir()
-    mount("-t", "tmpfs", "-o", f"size={megabytes}m", "tmpfs", str(folder))
-    try:
-        yield
-    finally:
-        subprocess.run(["umount", str(folder)], check=True)
+def _room(folder: Path, megabytes: int) -> AbstractContextManager[None]:
+    """A file system of its own, in memory, at a folder; none for 0. See `mounted`."""
+    return mounted(folder, "-t", "tmpfs", "-o", f"size={megabytes}m", "tmpfs") if megabytes else nullcontext()
 
 
 @contextmanager
-def _disk(folder: Path, megabytes: int) -> Iterator[None]:
-    """A disk in a file beside a folder, mounted there.
+def disk(folder: Path, megabytes: int) -> Iterator[None]:
+    """A disk in a sparse file beside a folder, mounted there.
 
     Raises:
         UnavailableError: this user may not mount one, or there is no mkfs.ext4(8).
     """
     image = folder.with_suffix(".img")
-    folder.mkdir()
     with image.open("wb") as file:
         file.truncate(megabytes * 1_000_000)
     try:
         subprocess.run(["mkfs.ext4", "-q", str(image)], check=True)
     except (FileNotFoundError, subprocess.CalledProcessError) as error:
         raise UnavailableError(f"no file system can be made in a file: {error}") from error
-    mount("-o", "loop", str(image), str(folder))
+    with mounted(folder, "-o", "loop", str(image)):
+        yield
+    image.unlink()
+
+
+@contextmanager
+def mounted(folder: Path, *arguments: str) -> Iterator[None]:
+    """A file system at a folder, by arguments of mount(8); a process that it has stopped may still be in it at the end.
+
+    Raises:
+        UnavailableError: it is refused; the message is mount's own.
+    """
+    folder.mkdir(exist_ok=True)
+    mount(*arguments, str(folder))
     try:
         yield
     finally:
-        subprocess.run(["umount", str(folder)], check=True)
-        image.unlink()
+        subprocess.run(["umount", "--lazy", str(folder)], check=True)
 
 
 def mount(*arguments: str) -> None:

@@ -3,9 +3,12 @@
 import signal
 import subprocess
 import time
+from contextlib import ExitStack
 
 import pytest
 
+from evaluation.experiment import UnavailableError
+from evaluation.service.faults.running import disk
 from evaluation.service.live.proc import children
 from tests.system.running import START_S, RigListener, abs_service, kill, wait_until, write_rig
 
@@ -15,21 +18,17 @@ pytestmark = [pytest.mark.slow, pytest.mark.realtime]
 @pytest.fixture
 def freeze(tmp_path):
     """Lets the disk at `takes` stand still, or go on."""
-    image, takes = tmp_path / "disk.img", tmp_path / "takes"
-    takes.mkdir()
-    with image.open("wb") as file:
-        file.truncate(300 << 20)
-    try:
-        subprocess.run(["mkfs.ext4", "-q", image], check=True)
-        subprocess.run(["mount", "-o", "loop", image, takes], check=True, capture_output=True)
-    except (FileNotFoundError, PermissionError, subprocess.CalledProcessError) as error:
-        pytest.skip(f"no disk in a file can be mounted: {error}")
+    takes = tmp_path / "takes"
 
     def freeze(frozen):
         subprocess.run(["fsfreeze", "--freeze" if frozen else "--unfreeze", takes], check=True, timeout=60)
 
-    yield freeze
-    subprocess.run(["umount", "--lazy", takes], check=True)
+    with ExitStack() as stack:
+        try:
+            stack.enter_context(disk(takes, 300))
+        except UnavailableError as error:
+            pytest.skip(f"no disk in a file can be mounted: {error}")
+        yield freeze
 
 
 @pytest.fixture

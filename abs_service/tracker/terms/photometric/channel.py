@@ -71,7 +71,7 @@ class ChannelTerm:
         view = self._view.observe(predicted)
         seen = view.synthesize(predicted)
         if not is_mosaic:
-            self._bias.observe(picture[..., VALUE, None], seen.interpolation.spread(predicted.vertices[0].T))
+            self._bias.observe(picture[..., VALUE, None], seen, predicted)
         observed = ObservedChannel(
             sensor=self.sensor,
             view=view,

@@ -63,7 +63,7 @@ class ColorTerm:
         self._pixels.observe(picture, window)
         view = self._view.observe(predicted)
         seen = view.synthesize(predicted)
-        self._bias.observe(picture, seen.interpolation.spread(predicted.vertices[0].T))
+        self._bias.observe(picture, seen, predicted)
         widening = self._registration_noise.widening(view.attribute_gradients(seen), self._sigma)
         inverse = np.float32(1) / (self._sigma * widening.factor)
         illumination = Exposed().adapt(self._pixels.at(seen.pixel)[seen.pixel[0]], seen.attributes[0].T)

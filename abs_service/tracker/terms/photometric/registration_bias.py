@@ -11,6 +11,8 @@ J. R. Braasch, M. A. Sutton, Optical Engineering 39, 2000). No residual shows it
 import numpy as np
 from numpy.typing import NDArray
 
+from abs_service.tracker.models.base import Surface
+from abs_service.tracker.synthesis.base import Synthesis
 from abs_service.tracker.terms.image_noise import noise_deviation
 from calib.camera import Camera
 
@@ -33,9 +35,10 @@ class RegistrationBias:
         self._camera = camera
         self._deviation_px, self._begun = 0.0, False
 
-    def observe(self, image: NDArray[np.float32] | NDArray[np.uint8], vertices: NDArray[np.floating]) -> None:
-        """Measures the bias in the first image (height, width, channels), where vertices (m, 3) [m] are in it."""
+    def observe(self, image: NDArray[np.float32] | NDArray[np.uint8], seen: Synthesis, predicted: Surface) -> None:
+        """Measures the bias in the first image (height, width, channels), where the predicted mesh is seen in it."""
         if not self._begun:
+            vertices = seen.interpolation.spread(predicted.vertices[0].T)
             self._deviation_px = deviation_px(image, self._camera.project(vertices))
             self._begun = True
 

@@ -5,9 +5,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from abs_service.tracker.models.base import Surface
+from abs_service.tracker.synthesis.base import Synthesis
 from abs_service.tracker.terms.photometric.registration_bias import MAX_PX, RegistrationBias, deviation_px
 from calib import pose
 from calib.camera import Camera
+from tests.abs_service.tracker.scenes import as_surface, seen
 
 ROWS, COLUMNS = np.mgrid[:120, :160].astype(np.float64)
 
@@ -31,6 +34,11 @@ def slope(x: np.ndarray) -> np.ndarray:
 def edges(angle: float) -> np.ndarray:
     """Image of the stripes, turned by an angle (height, width, 1)."""
     return stripes(COLUMNS * np.cos(angle) + ROWS * np.sin(angle))[..., None].astype(np.float32)
+
+
+def at(camera: Camera, vertices: np.ndarray) -> tuple[Synthesis, Surface]:
+    surface = as_surface((vertices, vertices))
+    return seen(camera, surface), surface
 
 
 def test_edges_along_the_pixels_move_a_print_and_slanted_ones_do_not():
@@ -79,7 +87,7 @@ def test_the_derivatives_are_those_of_a_shift_of_the_image():
     camera = Camera(160, 120, 150.0, 140.0, 80.0, 60.0, T_rs=pose.look_at((0.1, 0.2, -0.3), (0.0, 0.0, 1.0)))
     bias = RegistrationBias(camera)
     vertices = np.random.default_rng(1).uniform((-0.2, -0.2, 0.8), (0.2, 0.2, 1.2), (9, 3)).astype(np.float32)
-    bias.observe(edges(0.0), vertices)
+    bias.observe(edges(0.0), *at(camera, vertices))
     points, gradient = np.array([3, 3, 7]), np.array([[5.0, 1.0], [-2.0, 4.0], [0.5, 0.0]])
     rows = np.einsum("mi,mij->mj", gradient, camera.projection_jacobian(vertices[points]))
     expected = gradient * deviation_px(edges(0.0), camera.project(vertices))
@@ -92,8 +100,8 @@ def test_the_first_image_tells_how_large_it_is():
     vertices = np.concatenate([(PLACES - (80.0, 60.0)) / 150.0, np.ones((len(PLACES), 1))], axis=1)
     row = np.array([[1.0, 1.0, 0.0]])
     assert not bias.derivatives(vertices, row, point).any()
-    bias.observe(edges(0.0), vertices)
+    bias.observe(edges(0.0), *at(camera, vertices))
     first = bias.derivatives(vertices, row, point)
-    bias.observe(edges(0.5), vertices)
+    bias.observe(edges(0.5), *at(camera, vertices))
     np.testing.assert_array_equal(bias.derivatives(vertices, row, point), first)
     assert first == pytest.approx(deviation_px(edges(0.0), PLACES) / 150.0)
