@@ -8,6 +8,9 @@ from calib.board.corners.to_8bit import Grey
 
 #: Newton steps; each at least halves the error.
 _STEPS = 5
+#: Least curvature of a corner, relative to the median of all. Noise on a blank is a saddle, too: at most 0.05 of a
+#: corner's curvature at a noise of 8 grey levels.
+_LEAST_CURVATURE = 0.15
 
 
 def refine(levels: Grey, pixels: NDArray[np.float64], radius: int) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
@@ -15,8 +18,8 @@ def refine(levels: Grey, pixels: NDArray[np.float64], radius: int) -> tuple[NDAr
 
     L. Lucchese and S. K. Mitra, Using saddle points for subpixel feature detection in camera calibration targets,
     APCCAS 2002. On rendered boards the errors are a third of those of OpenCV's refinement. What has no saddle within
-    `radius` is no corner: the middle of an edge, a blank, or a place that was computed from markers far away. Nor is
-    it one, if a part of that neighbourhood is beyond the border.
+    `radius`, or a far flatter one than other corners, is no corner: the middle of an edge, a blank, or a place that
+    was computed from markers far away. Nor is it one, if a part of that neighbourhood is beyond the border.
 
     Args:
         levels: the image.
@@ -29,7 +32,7 @@ def refine(levels: Grey, pixels: NDArray[np.float64], radius: int) -> tuple[NDAr
     basis = np.stack([u * u, u * v, v * v, u, v, np.ones_like(u)], axis=1) * weight[:, None]
     fit = np.linalg.pinv(basis)
     spline, at = _around(levels, pixels, radius)
-    first, is_saddle = at, np.ones(len(at), np.bool_)
+    first, curvature, is_saddle = at, np.zeros(len(at)), np.ones(len(at), np.bool_)
     for _ in range(_STEPS):
         brightness = map_coordinates(spline, [at[:, 1:] + v, at[:, :1] + u], order=3, mode="nearest", prefilter=False)
         uu, uv, vv, du, dv, _ = fit @ (brightness * weight).T
@@ -42,7 +45,9 @@ def refine(levels: Grey, pixels: NDArray[np.float64], radius: int) -> tuple[NDAr
     corners = pixels + moved
     last = np.array(levels.shape[::-1]) - 1
     is_inside = np.all((corners >= radius) & (corners <= last - radius), axis=1)
-    return corners, is_saddle & is_inside & (np.linalg.norm(moved, axis=1) < radius)
+    strength = np.sqrt(np.maximum(-curvature, 0))
+    is_strong = strength > _LEAST_CURVATURE * np.median(strength)
+    return corners, is_strong & is_inside & (np.linalg.norm(moved, axis=1) < radius)
 
 
 def _around(levels: Grey, pixels: NDArray[np.float64], radius: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
