@@ -6,7 +6,6 @@ import re
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
-
 #: The last port that there is.
 LAST_PORT = 65535
 
