@@ -117,10 +117,8 @@ class DeviceSupervisor:
             lock.release()
 
     def check(self) -> None:
-        """Reports a driver that hangs: only a new process helps, which would interrupt other devices, too.
-
-        The end of the thread, as for want of memory, is fatal: nobody would open the device again.
-        """
+        """Reports a driver that hangs: only a new process helps, which would interrupt other devices, too."""
+        # As for want of memory. Nobody would open the device again.
         if not (self._thread.is_alive() or self.finished or self.fatal_error or self._stop.is_set()):
             self.fatal_error = RuntimeError(f"{self._name} is not supervised any more: its thread has ended")
         silent_s = (self._clock() - self._returned_ns) * 1e-9
