@@ -35,8 +35,8 @@ def free_port(first: int) -> int:
     viser looks for it as well, but never returns if there is none.
 
     Raises:
-        OptionError: there is none.
-        OSError: the host lacks what is needed to look.
+        OptionError: there is none, or this host has no loopback address of IPv4.
+        OSError: it lacks open files, say.
     """
     for port in range(first, LAST_PORT + 1):
         with socket.socket() as probe:
@@ -45,6 +45,8 @@ def free_port(first: int) -> int:
                 probe.bind((HOST, port))
                 probe.listen()
             except OSError as error:
+                if error.errno == errno.EADDRNOTAVAIL:
+                    raise OptionError(f"--port {port}: cannot listen at {HOST}: {error.strerror}") from None
                 if error.errno not in (errno.EADDRINUSE, errno.EACCES):
                     raise
                 continue

@@ -71,6 +71,13 @@ def test_a_port_above_which_none_is_free_is_named(monkeypatch):
         assert pages.free_port(port) > port
 
 
+def test_a_host_without_the_address_of_the_page_is_told(monkeypatch):
+    pages = pytest.importorskip("abs_service.commands.running.pages")
+    monkeypatch.setattr(pages, "HOST", "192.0.2.1")  # of documentation, RFC 5737
+    with pytest.raises(OptionError, match=r"--port 8080: cannot listen at 192\.0\.2\.1: Cannot assign"):
+        pages.free_port(8080)
+
+
 @pytest.mark.parametrize("command", ["view", "run"])
 def test_without_viser_the_extra_is_named(monkeypatch, capsys, command):
     monkeypatch.setattr(view, "find_spec", lambda _: None)
