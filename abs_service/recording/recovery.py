@@ -130,6 +130,18 @@ def remove_interrupted(directory: Path) -> None:
                 path.unlink()
 
 
+def is_in_use(source: Path) -> bool:
+    """True if a process of this host is writing or recovering a recording."""
+    try:
+        with limited.opened(source) as stream:
+            fcntl.flock(stream, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    except OSError:
+        pass
+    return False
+
+
 def set_aside(source: Path) -> Path:
     """Renames `x.mcap.active` to `x.mcap.broken`, which no recorder finishes; returns the new path.
 
