@@ -54,5 +54,5 @@ class Expiry:
             self._next_ns = self._clock() + PERIOD_NS
         if not self._listens:
             self._own = self._found
-        told, own, found = warning(self._own), self._own, self._found
-        return f"{told}; {RENEWED}" if told and own and found and found.ends > own.ends else told
+        text, own, found = warning(self._own), self._own, self._found
+        return f"{text}; {RENEWED}" if text and own and found and found.ends > own.ends else text
