@@ -1,6 +1,7 @@
 """Queries the rigs at an endpoint: the health of every component, and components that send none."""
 
 import time
+from collections.abc import Callable, Iterable, Mapping
 
 import zenoh
 from absmsg.v1.health_pb2 import Health
@@ -20,15 +21,20 @@ _POLL_S = 0.02
 
 #: Health by rig and component; None of a component that is there and sent none in time.
 RigHealth = dict[str, dict[str, Health | None]]
+#: Components that have to speak, too, by the health of those that are known.
+Expected = Callable[[Mapping[str, Health | None]], Iterable[str]]
 
 
-def ask(endpoint: str, rig: str = "*", security: NoSecurity | MutualTls = NO_SECURITY) -> RigHealth:
+def ask(
+    endpoint: str, rig: str = "*", security: NoSecurity | MutualTls = NO_SECURITY, expected: Expected = lambda _: ()
+) -> RigHealth:
     """Listens until every component has published its health, but no longer than `PATIENCE_S`.
 
     Args:
         endpoint: where `abs-service run` listens.
         rig: name of the rig; `*` for every rig there.
         security: of its bus.
+        expected: see `Expected`.
 
     Raises:
         BusError: the endpoint is malformed, or nothing answers there within `CONNECT_MS`.
@@ -44,15 +50,18 @@ def ask(endpoint: str, rig: str = "*", security: NoSecurity | MutualTls = NO_SEC
             if reply.ok is not None:
                 name, component = _rig_and_component(reply.ok)
                 health.setdefault(name, {})[component] = None
-        while time.monotonic() < deadline_s and not _complete(health):
+        while time.monotonic() < deadline_s and not _complete(health, expected):
             while (sample := subscriber.try_recv()) is not None:
                 _take(sample, health)
             time.sleep(_POLL_S)
     return health
 
 
-def _complete(health: RigHealth) -> bool:
-    return bool(health) and all(None not in components.values() for components in health.values())
+def _complete(health: RigHealth, expected: Expected) -> bool:
+    return bool(health) and all(
+        None not in components.values() and set(expected(components)) <= components.keys()
+        for components in health.values()
+    )
 
 
 def _take(sample: zenoh.Sample, health: RigHealth) -> None:

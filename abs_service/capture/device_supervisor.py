@@ -118,6 +118,9 @@ class DeviceSupervisor:
 
     def check(self) -> None:
         """Reports a driver that hangs: only a new process helps, which would interrupt other devices, too."""
+        # As for want of memory. Nobody would open the device again.
+        if not (self._thread.is_alive() or self.finished or self.fatal_error or self._stop.is_set()):
+            self.fatal_error = RuntimeError(f"{self._name} is not supervised any more: its thread has ended")
         silent_s = (self._clock() - self._returned_ns) * 1e-9
         hangs = silent_s > HANG_S and not (self.finished or self.fatal_error)
         remedy = f"its driver has not returned for {silent_s:.0f} s; end `capture`, which `run` starts again"

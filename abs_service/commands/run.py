@@ -25,6 +25,7 @@ from abs_service.bus.session import SessionMode
 from abs_service.bus.stamps import WallClock
 from abs_service.commands.parts import rig_process
 from abs_service.commands.parts.log import logs
+from abs_service.commands.parts.options import port, whole
 from abs_service.commands.parts.rig_in_memory import RigInMemory, in_memory
 from abs_service.commands.running import outcome, settled_file, view
 from abs_service.display.terminal import choice
@@ -41,6 +42,8 @@ from abs_service.supervision.run_session import Renewal, RunSession
 from abs_service.supervision.supervisor import Limits, Supervisor
 from abs_service.wire.commands import RefusedError
 
+#: Type of --seed, with the limits of a simulated device.
+SEED = whole(2**32 - 1, "a whole number")
 #: Receives the lines of a child's output, with its name.
 PassOn = Callable[[str, str], None]
 
@@ -59,9 +62,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--no-record", action="store_true", help="keep nothing on disk")
     parser.add_argument("--out", metavar="DIR", type=Path, help="folder of the recordings instead of record.directory")
     parser.add_argument("--rig", metavar="NAME", help="name on the wire instead of the configuration's")
-    parser.add_argument("--seed", metavar="N", type=int, help="seed of all simulated devices")
+    parser.add_argument("--seed", metavar="N", type=SEED, help="seed of all simulated devices")
     parser.add_argument("--view", action="store_true", help="serve a page that shows the rig, as `abs-service view`")
-    parser.add_argument("--view-port", metavar="N", type=int, help=f"--view at this port (default: {view.PORT})")
+    parser.add_argument("--view-port", metavar="N", type=port, help=f"--view at this port (default: {view.PORT})")
     parser.add_argument("--view-only", action="store_true", help="--view without anything that acts on the rig")
     parser.add_argument("--json", action="store_true", help="print one JSON object per estimate instead of a table")
 
@@ -164,10 +167,10 @@ def renewal(file: RigInMemory, arguments: argparse.Namespace, page: Sequence[str
 
 def page_options(arguments: argparse.Namespace) -> list[str] | None:
     """Options of `abs-service view` for the page of `run`; None if it serves none."""
-    port, only = arguments.view_port, arguments.view_only
-    if not (arguments.view or only or port is not None):
+    number, only = arguments.view_port, arguments.view_only
+    if not (arguments.view or only or number is not None):
         return None
-    return [*(["--port", str(port)] if port is not None else []), *(["--view-only"] if only else [])]
+    return [*(["--port", str(number)] if number is not None else []), *(["--view-only"] if only else [])]
 
 
 def with_seed(uri: str, seed: int) -> str:

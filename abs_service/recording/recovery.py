@@ -64,10 +64,11 @@ def recover(source: Path, directory: Path | None = None) -> RecoveryReport:
 
     `x.mcap.active` becomes `x.mcap`, and itself `x.mcap.broken` unless all of it was saved. Of any other file, `x.mcap`
     say, the result is `x.recovered.mcap` and the original stays, as it always does with a `directory`. The new file has
-    its name only when it is complete; to recover again after an interruption is safe.
+    its name only when it is complete; to recover again after an interruption is safe. Nothing is overwritten.
 
     Raises:
-        RecoveryError: the file cannot be read, is no MCAP file, or (InUseError) another process is writing it.
+        RecoveryError: the file cannot be read, is no MCAP file, (InUseError) another process is writing it, or there
+            is a file of the new one's name.
         OSError: the new file cannot be written.
     """
     was_active = source.name.endswith(ACTIVE)
@@ -75,6 +76,8 @@ def recover(source: Path, directory: Path | None = None) -> RecoveryReport:
     target = (directory or source.parent) / name
     unfinished = target.with_name(target.name + RECOVERING)
     with _locked(source) as stream:
+        if target.exists():
+            raise RecoveryError(f"{source}: {target} is there already; move it away, or name another folder with --out")
         data = _content(source, stream)
         try:
             with open(unfinished, "wb", opener=private) as output:
@@ -125,6 +128,18 @@ def remove_interrupted(directory: Path) -> None:
             with contextlib.suppress(OSError), limited.opened(path) as stream:
                 fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 path.unlink()
+
+
+def is_in_use(source: Path) -> bool:
+    """True if a process of this host is writing or recovering a recording."""
+    try:
+        with limited.opened(source) as stream:
+            fcntl.flock(stream, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    except OSError:
+        pass
+    return False
 
 
 def set_aside(source: Path) -> Path:

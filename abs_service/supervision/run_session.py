@@ -173,6 +173,7 @@ class RunSession:
             host_clock=self._headers.host_clock,
             refused=self._bus.trouble,
             rivals=self._publishers.trouble,
+            silent={key.partition("/")[0]: one.found for key, one in self._silence_monitors.items() if one.found},
         )
 
     def _listen(self, seconds: float) -> None:

@@ -8,8 +8,10 @@ from abs_service.bus.security.mutual_tls import Certificate, MutualTls, NoSecuri
 
 #: Time before the end of a certificate from which on it is warned of.
 ENDS = timedelta(days=30)
-#: Time between two looks at the files of a client [ns].
+#: Time between two looks at the files [ns].
 PERIOD_NS = 600 * 10**9
+#: What is left to do for a router.
+RENEWED = "a new one is in its place, for which this process has to be started again"
 
 
 def warning(own: Certificate | None) -> str:
@@ -38,15 +40,19 @@ class Expiry:
         self, security: NoSecurity | MutualTls, endpoint: str, listens: bool, clock: Callable[[], int]
     ) -> None:
         self._check, self._listens, self._clock = partial(security.check, endpoint, listens), listens, clock
-        self._own = self._check()
+        self._own = self._found = self._check()
         self._next_ns = clock() + PERIOD_NS
 
     def trouble(self) -> str:
         """The warning, or what is wrong with a client's files by now; "" if nothing is."""
-        if not self._listens and self._clock() >= self._next_ns:
+        if self._clock() >= self._next_ns:
             try:
-                self._own = self._check()
+                self._found = self._check()
             except TlsError as error:
-                return str(error)  # looked at each time, until it is mended
+                if not self._listens:  # a router goes on with those that it has read
+                    return str(error)  # looked at each time, until it is mended
             self._next_ns = self._clock() + PERIOD_NS
-        return warning(self._own)
+        if not self._listens:
+            self._own = self._found
+        text, own, found = warning(self._own), self._own, self._found
+        return f"{text}; {RENEWED}" if text and own and found and found.ends > own.ends else text

@@ -12,7 +12,8 @@ from abs_service.recording.recording_file import ESTIMATES
 def recordings(rig: config.ServiceConfig) -> Retention:
     """Limits of age and size of the recordings."""
     table = rig.record
-    return Retention(table.directory, rig.name, "", table.retain_s or math.inf, table.retain_bytes or math.inf)
+    retained = table.retain_s or math.inf, table.retain_bytes or math.inf
+    return Retention(table.directory, rig.name, "", *retained, table.rotate_s, table.rotate_bytes)
 
 
 def estimates(rig: config.ServiceConfig) -> Retention:

@@ -6,6 +6,9 @@ import re
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
+#: The last port that there is.
+LAST_PORT = 65535
+
 
 class OptionError(Exception):
     """Options that do not go together, or do not fit the files that they name; says which, and what is allowed."""
@@ -25,6 +28,20 @@ def number(minimum: float, maximum: float, what: str) -> Callable[[str], float]:
 
     return read
 
+
+def whole(maximum: int, what: str) -> Callable[[str], int]:
+    """Type of an argument: a whole number from 0 to `maximum`, described by `what` in the message about others."""
+
+    def read(text: str) -> int:
+        if not (text.isascii() and text.isdigit() and len(text) <= len(str(maximum)) and int(text) <= maximum):
+            raise argparse.ArgumentTypeError(f"{text!r} must be {what} from 0 to {maximum}")
+        return int(text)
+
+    return read
+
+
+#: Type of an argument: number of a port; 0 lets the system choose one.
+port = whole(LAST_PORT, "a port")
 
 #: Type of an argument: a number that is neither 0 nor infinite.
 positive = number(math.ulp(0.0), math.nextafter(math.inf, 0.0), "a number above 0")

@@ -4,7 +4,8 @@
   abs-service recover recordings/x.mcap          a damaged file; the result is recordings/x.recovered.mcap
   abs-service recover *.active --out saved       the results go to saved/ and the originals stay
 
-Nothing is thrown away: unless all of a file was saved, it is kept. Exit code 1 if nothing of a file could be saved.
+Nothing is thrown away: unless all of a file was saved, it is kept; and no file that is there is overwritten. Exit code
+1 if nothing of a file could be saved.
 """
 
 import argparse

@@ -28,7 +28,7 @@ from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.commands import run as run_command
 from abs_service.commands.parts import preview_option, progress
 from abs_service.commands.parts.log import logs
-from abs_service.commands.parts.options import OptionError
+from abs_service.commands.parts.options import OptionError, number
 from abs_service.commands.parts.recorded_rig import draw_previews, recorded_rig
 from abs_service.commands.parts.rig_in_memory import in_memory
 from abs_service.commands.recordings.image_copies import image_copies
@@ -39,6 +39,8 @@ from abs_service.tracking.session import TrackingSession
 from drivers.encoding.mcap_file import McapFile
 from drivers.replay import Recording
 
+#: Type of --speed, with the limits of a played recording.
+SPEED = number(0.01, 100.0, "a number from 0.01 to 100")
 #: Time that the processes of a live replay have to get ready before its first frame [s].
 START_S = 6.0
 
@@ -49,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--config", metavar="RIG", type=Path, help="TOML file (default: the one in the recording)")
     parser.add_argument("--out", metavar="PATH", type=Path, help="file to write; with --speed the folder")
     parser.add_argument("--images", action="store_true", help="write the images as well, for `view` and films")
-    parser.add_argument("--speed", metavar="X", type=float, help="play live, X times as fast as it was recorded")
+    parser.add_argument("--speed", metavar="X", type=SPEED, help="play live, X times as fast as it was recorded")
     parser.add_argument("--json", action="store_true", help="print one JSON object per estimate, no progress bar")
     preview_option.add_argument(parser)
 

@@ -11,7 +11,7 @@ Exit code 0: everything works, warnings included; 1: a part reports an error or 
 import argparse
 import json
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +27,7 @@ from abs_service.supervision.children.child import PROCESS, ChildState
 from abs_service.supervision.exit_codes import Exit
 from drivers.contract.text import printable
 
-SILENT = "silent"
+SILENT, STARTS = "silent", "starts"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -43,17 +43,18 @@ def run(arguments: argparse.Namespace) -> int:
     endpoint, name, security = _whom(arguments)
     check_endpoint(endpoint, security)
     try:
-        answers = rig_health.ask(endpoint, name, security)
+        answers = rig_health.ask(endpoint, name, security, _running)
     except BusError as error:
         return _nothing(str(error))
     if not answers:
         which = "no rig" if name == "*" else f'no rig "{name}"'
         return _nothing(f"{which} answers at {endpoint} within {rig_health.PATIENCE_S:g} s")
+    wrong = False
     for rig, components in sorted(answers.items()):
         parts = [_part(component, health) for component, health in components.items()] + _absent(components)
         parts.sort(key=lambda part: part["component"])
+        wrong |= any(part["level"] in ("error", SILENT) for part in parts)
         print(json.dumps({"rig": rig, "parts": parts}, ensure_ascii=False) if arguments.json else _lines(rig, parts))
-    wrong = any(_level(health) in ("error", SILENT) for parts in answers.values() for health in parts.values())
     return Exit.FAILED if wrong else Exit.OK
 
 
@@ -71,17 +72,13 @@ def _nothing(reason: str) -> Exit:
     return Exit.NOTHING
 
 
-def _level(health: Health | None) -> str:
-    return SILENT if health is None else Health.Level.Name(health.level).removeprefix("LEVEL_").lower()
-
-
 def _part(component: str, health: Health | None) -> dict[str, Any]:
     if health is None:
         reason = f"runs, but sent no health for {rig_health.PATIENCE_S:g} s"
         return {"component": component, "level": SILENT, "state": "", "reason": reason}
     return {
         "component": component,
-        "level": _level(health),
+        "level": Health.Level.Name(health.level).removeprefix("LEVEL_").lower(),
         "state": words(component, health),
         "reason": health.message,
         "counters": dict(health.counters),
@@ -91,21 +88,36 @@ def _part(component: str, health: Health | None) -> dict[str, Any]:
 
 
 def _absent(components: Mapping[str, Health | None]) -> list[dict[str, Any]]:
-    """Processes that only `run` reports: they start, start again, or were given up."""
-    run = components.get("run") or Health()
-    reasons = {
-        name.removeprefix(PROCESS): text for name, text in run.labels.items() if name.startswith(PROCESS) and text
-    }
+    """Processes that only `run` reports: they start, start again, were given up, or hang."""
     return [
         {
             "component": name,
-            "level": "error" if text.startswith(ChildState.FAILED) else "warning",
+            "level": _level(text),
             "state": "",
-            "reason": text,
+            "reason": STARTS if text == ChildState.RUNNING else text,
         }
-        for name, text in reasons.items()
+        for name, text in _processes(components)
         if name not in components
     ]
+
+
+def _level(condition: str) -> str:
+    """Level of a process of which nothing is heard, by what `run` says of it."""
+    if condition.startswith(ChildState.FAILED):
+        return "error"
+    # One that has just started cannot speak yet; of one that should, `run` adds a reason.
+    return SILENT if condition.startswith(ChildState.RUNNING) and condition != ChildState.RUNNING else "warning"
+
+
+def _running(components: Mapping[str, Health | None]) -> Iterator[str]:
+    """Those that run, by what `run` says: also what is no part of the rig's work, such as a page."""
+    return (name for name, text in _processes(components) if text == ChildState.RUNNING)
+
+
+def _processes(components: Mapping[str, Health | None]) -> Iterator[tuple[str, str]]:
+    for name, text in (components.get("run") or Health()).labels.items():
+        if name.startswith(PROCESS) and text:
+            yield name.removeprefix(PROCESS), text
 
 
 def _lines(rig: str, parts: list[dict[str, Any]]) -> str:

@@ -14,7 +14,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from abs_service.commands.parts import rig_process
-from abs_service.commands.parts.options import OptionError
+from abs_service.commands.parts.options import OptionError, port
 from abs_service.supervision.exit_codes import Exit
 
 PORT = 8080
@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     rig_process.add_arguments(parser, "TOML file of the rig, or a recording (.mcap)")
     parser.add_argument("others", metavar="CONFIG", nargs="*", type=Path, help="TOML files of other rigs")
     parser.add_argument(
-        "--port", metavar="N", type=int, default=PORT, help=f"port of the page (default: {PORT}), of several the first"
+        "--port", metavar="N", type=port, default=PORT, help=f"port of the page (default: {PORT}), of several the first"
     )
     parser.add_argument("--view-only", action="store_true", help="leave out everything that acts on the rig")
 

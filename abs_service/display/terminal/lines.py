@@ -72,6 +72,9 @@ def line(view: RigView) -> str:
     for name, tracker in view.live.trackers.items():
         if (last := tracker.last) is None:
             continue
+        if silence := view.silent.get(name):
+            parts.append(f"{name} {silence}, {tracker.estimates} estimates")
+            continue
         error = "" if last.error_mm is None else f" error {last.error_mm:.2f} mm, surface {last.surface_mm:.2f} mm,"
         reasons = f" ({'; '.join(last.reasons)})" if last.reasons else ""
         parts.append(f"{name} {last.status}{reasons}{error} {last.solve_ms:.1f} ms, {tracker.estimates} estimates")

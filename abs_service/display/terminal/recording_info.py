@@ -10,6 +10,7 @@ from rich.table import Table
 
 from abs_service.display.terminal import recorded_configuration
 from abs_service.display.terminal.console import TableConsole
+from abs_service.recording.recovery import is_in_use
 from abs_service.recording.summary import Summary, Topic, Track
 from abs_service.supervision.health.rig_view import size
 from drivers.contract.text import printable
@@ -18,7 +19,8 @@ from drivers.contract.text import printable
 def show(summary: Summary) -> None:
     """Prints the tables."""
     console, found = TableConsole(highlight=False, soft_wrap=True), values(summary)
-    state = "" if found["finished"] else ", not finished (`abs-service recover` repairs it)"
+    unfinished = "still recorded" if is_in_use(summary.path) else "not finished (`abs-service recover` repairs it)"
+    state = "" if found["finished"] else f", {unfinished}"
     damage = f", {summary.damaged} damaged parts" if summary.damaged else ""
     time = f"{found['duration_s']:.1f} s from {found['start']}"
     lines = [

@@ -120,6 +120,9 @@ def _trackers(view: RigView) -> RenderableType:
     table = _table("tracker", "status", "error", "surface", "solve", "age", "search", "skipped")
     parts: list[RenderableType] = [table, _shares(view)]
     for name, tracker in view.live.trackers.items():
+        if silence := view.silent.get(name):
+            parts.append(Text(f" {name}: {silence}", style="red"))
+            continue
         table.add_row(f" {name}", *_numbers(tracker))
         if tracker.last is not None:
             parts.append(_theta(name, tracker.last))
@@ -149,7 +152,7 @@ def _shares(view: RigView) -> RenderableType:
     columns = ("agree", "off", "missing", "behind", "itself", "outside", "beyond")
     table = _table("vertices", *columns)
     for name, tracker in view.live.trackers.items():
-        for sensor, shares in tracker.last.shares.items() if tracker.last else ():
+        for sensor, shares in tracker.last.shares.items() if tracker.last and name not in view.silent else ():
             values = (
                 shares.agreeing, shares.disagreeing, shares.no_return, shares.occluder, shares.self_occluded,
                 shares.outside, shares.unexplained,

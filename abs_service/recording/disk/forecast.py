@@ -33,17 +33,20 @@ class Growth:
         rate: of recording [bytes/s].
         used: size of those that may be deleted, together [bytes].
         retain_s, retain_bytes: see `Retention`.
+        file_bytes: size of one file, which is not deleted before it is finished, and not aged before that [bytes].
     """
 
     rate: float
     used: float
     retain_s: float
     retain_bytes: float
+    file_bytes: float = 0.0
 
     @property
     def more(self) -> float:
         """Growth until as much is deleted as is written [bytes]; negative if the files shrink."""
-        return min(self.retain_bytes, self.retain_s * self.rate) - self.used
+        by_age = self.retain_s * self.rate + self.file_bytes
+        return min(max(self.retain_bytes, self.file_bytes), by_age) - self.used
 
     @property
     def kept_s(self) -> float:

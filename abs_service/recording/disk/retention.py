@@ -65,6 +65,7 @@ class Retention:
         kind: suffix of their names after the time: "", or that of the files of estimates.
         retain_s: age at which a recording is deleted [s]; infinite to keep all.
         retain_bytes: size of all recordings together beyond which the oldest are deleted; infinite to keep all.
+        rotate_s, rotate_bytes: age and size at which a file ends, for `growth`; 0: its size is left out of that.
     """
 
     directory: Path
@@ -72,6 +73,8 @@ class Retention:
     kind: str
     retain_s: float
     retain_bytes: float
+    rotate_s: float = 0.0
+    rotate_bytes: float = 0.0
 
     def files(self) -> list[Kept]:
         """The recordings that count, finished or not, oldest first; none if the folder cannot be read."""
@@ -94,7 +97,8 @@ class Retention:
 
     def growth(self, rate: float) -> Growth:
         """Growth of the recordings at a recording rate [bytes/s]."""
-        return Growth(rate, sum(file.size for file in self.files()), self.retain_s, self.retain_bytes)
+        one = min(self.rotate_bytes, self.rotate_s * rate)
+        return Growth(rate, sum(file.size for file in self.files()), self.retain_s, self.retain_bytes, one)
 
     def apply(self, ages: Callable[[Iterable[Kept]], dict[str, int]]) -> tuple[list[Path], list[OSError]]:
         """Deletes the files beyond the limits, by their ages [ns]; returns them, and why others cannot be deleted."""

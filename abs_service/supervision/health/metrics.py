@@ -93,8 +93,8 @@ def rows(view: RigView) -> Iterator[Row]:
         if log.last is None:
             continue
         for status in _STATUSES:
-            labels = tracker | {"status": status}
-            yield "abs_tracker_status", "1 for the status of the last estimate", labels, log.last.status == status
+            labels, present = tracker | {"status": status}, log.last.status == status and name not in view.silent
+            yield "abs_tracker_status", "1 for the status of the last estimate; 0 for all without", labels, present
         yield "abs_solve_seconds", "duration of the last search", tracker, log.last.solve_ms * 1e-3
         if log.last.age_ms is not None:
             age_s = log.last.age_ms * 1e-3

@@ -1,7 +1,7 @@
 """Current state of a running rig, collected from its messages."""
 
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 from absmsg.v1.deformation_state_pb2 import DeformationState
@@ -16,6 +16,10 @@ from abs_service.tracking.log.tracker_log import EstimateReport, TrackerLog, poi
 
 #: The topics that `RigState.take` understands.
 PATTERNS = ("health/**", keys.state("*"), keys.mesh("*"), keys.topology("*"), keys.truth("*"))
+
+
+#: Processes of a component whose counters are kept apart.
+PROCESSES = 16
 
 
 @dataclass(frozen=True)
@@ -42,7 +46,9 @@ class RigState:
         self.received: dict[str, Received] = {}
         self.malformed = 0
         self._removed: frozenset[str] = frozenset()  # components, whose last words come later
-        self._ended: defaultdict[str, Counter[str]] = defaultdict(Counter)  # counters of processes that have ended
+        # Counters by component and process, the one heard last at the end; and those of processes long not heard.
+        self._counted: defaultdict[str, dict[str, Mapping[str, int]]] = defaultdict(dict)
+        self._ended: defaultdict[str, Counter[str]] = defaultdict(Counter)
         self._clock = clock
 
     def follow(self, trackers: Iterable[str]) -> None:
@@ -67,9 +73,7 @@ class RigState:
             health = Health.FromString(sample.payload)
             if health.component in self._removed:
                 return []
-            before = self.health(health.component)
-            if before.header.boot_id != health.header.boot_id:
-                self._ended[health.component].update(before.counters)
+            self._count(health)
             previous = replace(self.received.get(health.component, Received()), previous=None)
             self.received[health.component] = Received(health, self._clock(), previous if previous.t_ns else None)
         elif sample.message == SurfaceTruth.DESCRIPTOR.full_name:
@@ -83,9 +87,13 @@ class RigState:
         return self.received.get(component, Received()).health
 
     def counters(self, component: str) -> Counter[str]:
-        """Counters of a component, of all its processes together: each one that is started again counts from zero."""
+        """Counters of a component, of all its processes together.
+
+        Each one that is started again counts from zero; several may live at once, as recorders of two hosts do.
+        """
         total = Counter(self._ended[component])
-        total.update(self.health(component).counters)
+        for counters in self._counted[component].values():
+            total.update(counters)
         return total
 
     def preparing(self) -> bool:
@@ -104,6 +112,13 @@ class RigState:
     def missing_topologies(self) -> list[str]:
         """Trackers whose topology was lost and has to be queried."""
         return [name for name, tracker in self.trackers.items() if tracker.lacks_topology]
+
+    def _count(self, health: Health) -> None:
+        processes = self._counted[health.component]
+        processes.pop(health.header.boot_id, None)
+        processes[health.header.boot_id] = dict(health.counters)
+        if len(processes) > PROCESSES:
+            self._ended[health.component].update(processes.pop(next(iter(processes))))
 
     def _take_truth(self, truth: SurfaceTruth) -> None:
         points_r = points(truth.points_f32).reshape(truth.rows, truth.columns, 3)

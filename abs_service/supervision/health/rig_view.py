@@ -1,7 +1,7 @@
 """Content of all displays, derived from the health of the components."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol, Self
 
@@ -58,6 +58,7 @@ class RigView:
         host_clock: which host's clock that is, see `drivers.contract.host_clock`; ages on others are not shown.
         refused: messages that this process did not take, in words.
         rivals: topics that another process publishes, too, in words.
+        silent: for how long there has been no estimate, in words, by each tracker of which that is too long.
     """
 
     rig: str
@@ -70,6 +71,7 @@ class RigView:
     host_clock: str
     refused: str = ""
     rivals: str = ""
+    silent: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def streams(self) -> list[Stream]:
@@ -90,9 +92,10 @@ class RigView:
         ]
 
     def gauges(self, component: str) -> Mapping[str, float]:
-        """Present gauges of a component; none if it is silent: those of one that hangs or was given up are no more."""
+        """Present gauges of a component; none if it is silent or has ended: its numbers are no more."""
         received = self.live.received.get(component, Received())
-        return received.health.gauges if self.now_ns - received.t_ns < SILENT_NS else {}
+        ended = any(child.component == component and child.state is not ChildState.RUNNING for child in self.children)
+        return received.health.gauges if not ended and self.now_ns - received.t_ns < SILENT_NS else {}
 
     @property
     def recording(self) -> Recording | None:

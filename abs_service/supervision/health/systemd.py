@@ -101,7 +101,11 @@ def _counts(view: RigView) -> dict[str, int]:
 
 
 def _words(view: RigView) -> str:
-    trackers = [f"{name} {log.last.status}" for name, log in view.live.trackers.items() if log.last is not None]
+    trackers = [
+        f"{name} {'silent' if name in view.silent else log.last.status}"
+        for name, log in view.live.trackers.items()
+        if log.last is not None
+    ]
     troubles = [f"{component}: {message}" for component, _, message in view.troubles]
     states = [view.activity] if view.activity else [*trackers, view.recording.file.name if view.recording else ""]
     return "; ".join(" ".join(part.split()) for part in [*states, *troubles] if part)

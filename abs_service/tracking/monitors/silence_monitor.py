@@ -18,6 +18,9 @@ class SilenceMonitor:
     Args:
         clock: CLOCK_MONOTONIC [ns].
         first_ns: longest time until the first estimate [ns].
+
+    Attributes:
+        found: what `check` has said last.
     """
 
     def __init__(self, clock: Callable[[], int], first_ns: float = FIRST_NS) -> None:
@@ -26,6 +29,7 @@ class SilenceMonitor:
         self._limit_ns = first_ns
         self._periods_ns: deque[int] = deque(maxlen=9)
         self._begun = False
+        self.found = ""
 
     def add(self) -> None:
         """Notes an estimate."""
@@ -43,4 +47,5 @@ class SilenceMonitor:
         if paused_ns > PAUSE_NS:
             self._latest_ns += paused_ns
         silent_ns = now_ns - self._latest_ns
-        return f"no estimate for {silent_ns / 1e9:.0f} s" if silent_ns > self._limit_ns else ""
+        self.found = f"no estimate for {silent_ns / 1e9:.0f} s" if silent_ns > self._limit_ns else ""
+        return self.found

@@ -70,6 +70,21 @@ def go_on():
     event.set()
 
 
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+def test_a_device_whose_thread_has_ended_ends_the_process_that_run_starts_again(monkeypatch):
+    def lacks_memory(*_):
+        raise MemoryError
+
+    supervised = Supervised(failing(DeviceError("unplugged")))
+    monkeypatch.setattr(supervised.health, "count", lacks_memory)
+
+    def is_noticed():
+        supervised.supervisor.check()
+        return "its thread has ended" in str(supervised.supervisor.fatal_error)
+
+    assert eventually(is_noticed)
+
+
 def test_a_command_that_hangs_keeps_neither_the_device_from_reopening_nor_the_next_command_from_an_answer(go_on):
     sinks, hangs = [], threading.Event()
 

@@ -47,6 +47,23 @@ def test_the_summary_counts_all_processes_of_a_component_that_was_started_again(
     assert view(live, directory=tmp_path).summary()[3].endswith("1.0 MB; 2 files, 1000 messages, 6 dropped")
 
 
+def test_two_living_processes_of_a_component_are_counted_once_each(live, tmp_path):
+    other, own = recorder(1_000_000), live.health("record")
+    other.header.boot_id = "another host"
+    for _ in range(5):  # once a second, in turn
+        take_health(live, other)
+        take_health(live, own)
+    assert view(live, directory=tmp_path).summary()[3].endswith("2 files, 1000 messages, 6 dropped")
+
+
+def test_the_processes_of_months_are_counted_and_few_are_kept(live):
+    for number in range(100):
+        again = recorder(1_000_000)
+        again.header.boot_id = f"process {number}"
+        take_health(live, again)
+    assert live.counters("record")["recorded"] == 101 * 500
+
+
 def test_plain_output_is_one_line_a_second(live):
     out = io.StringIO()
     with Output(out.write) as file, PlainDisplay(file, Output(io.StringIO().write)) as display:

@@ -53,6 +53,19 @@ def test_trackers_show_what_they_found_and_how_wrong_it_is(live):
     assert "Θ[48] +0.000 +0.125" in text
 
 
+def test_the_last_estimate_of_a_silent_tracker_is_not_shown_as_the_present_one(live):
+    live.trackers["sheet"].last = report(shares={"tof": SensorShares(0.86, 0.02, 0.07, 0.05, 0.0, 0.0, 0.03, 0.03)})
+    silent = view(live, silent={"sheet": "no estimate for 9 s"})
+    for text in (drawn(silent), line(silent)):
+        assert "sheet: no estimate for 9 s" in text.replace("sheet no", "sheet: no")
+        assert not {"TRACKING", "86%", "2.35"} & set(text.split())
+
+
+def test_a_stream_has_no_rate_once_its_process_has_ended(live):
+    ended = view(live, children=[Child("capture", (), 0, ChildState.BACKOFF, "ended by signal 9")])
+    assert row(drawn(ended), "tof/depth")[1:3] == ["0.0", "Hz"]
+
+
 def test_reasons_are_shown(live):
     live.trackers["sheet"].last = report(status="LOST", reasons=("only 12% of the vertices agree",), error_mm=None)
     assert "sheet: only 12% of the vertices agree" in drawn(view(live))

@@ -173,9 +173,11 @@ def test_a_tracker_that_falls_silent_is_an_error_whatever_the_cause(monkeypatch)
 
     bench.session.run_until(lambda: last().level == Health.LEVEL_ERROR or bench.session.elapsed_s > 30)
     assert last().message == "track/sheet: no estimate for 0 s"
+    assert bench.session.view().silent == {"sheet": "no estimate for 0 s"}
     publisher.put(state)
     bench.session.run_until(lambda: last().level == Health.LEVEL_OK or bench.session.elapsed_s > 60)
     assert last().level == Health.LEVEL_OK
+    assert bench.session.view().silent == {}
 
 
 def test_what_a_new_configuration_concerns_starts_again_and_capture_is_told():

@@ -158,6 +158,21 @@ def test_the_end_of_a_certificate_is_told_while_a_process_runs_until_there_is_a_
     assert client.trouble() == ""
 
 
+def test_a_router_says_that_its_new_certificate_waits_for_its_next_start(lab, monkeypatch):
+    now_ns = 0
+    router = Expiry(tls(lab, "rig"), "tls/localhost:1", True, lambda: now_ns)
+    options = ("--only", "rig", "--host", "localhost", "--authority", str(lab), "--days", "700")
+    assert cli.main(["keys", str(lab / "new"), *options]) == 0
+    for file in ("rig.pem", "rig.key"):
+        shutil.copy(lab / "new" / file, lab / file)
+    now_ns += expiry.PERIOD_NS
+    assert router.trouble() == "", "there is time"
+    monkeypatch.setattr(expiry, "ENDS", timedelta(days=400))
+    told = router.trouble()
+    assert told.startswith('the certificate "rig" ends on 20')
+    assert told.endswith("; a new one is in its place, for which this process has to be started again")
+
+
 def test_a_certificate_that_has_ended_is_told_so():
     yesterday = datetime.now(UTC) - timedelta(days=1)
     assert expiry.warning(Certificate("rig", yesterday)).startswith(

@@ -1,5 +1,6 @@
 """`abs-service info` shows of a recording what was written into it."""
 
+import fcntl
 import json
 import subprocess
 import sys
@@ -71,6 +72,10 @@ def test_a_recording_that_was_cut_short_is_described_up_to_there(tmp_path, capsy
     assert not found["finished"]
     assert main(["info", str(tmp_path / "x.mcap")]) == 0
     assert "not finished (`abs-service recover`" in capsys.readouterr().out
+    with (tmp_path / "x.mcap").open("rb") as recorder:
+        fcntl.flock(recorder, fcntl.LOCK_EX)
+        assert main(["info", str(tmp_path / "x.mcap")]) == 0
+    assert ", still recorded\n" in capsys.readouterr().out
 
 
 def test_people_get_one_line_per_topic(tmp_path, capsys):

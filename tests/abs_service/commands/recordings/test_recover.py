@@ -38,6 +38,25 @@ def test_a_file_of_which_nothing_can_be_saved_is_no_success(tmp_path, capsys):
     assert "b.mcap: 0 messages in 0 chunks saved" in capsys.readouterr().out
 
 
+def test_nothing_that_is_there_is_overwritten(tmp_path, capsys):
+    saved, parser = tmp_path / "saved", argparse.ArgumentParser()
+    command.add_arguments(parser)
+    for rig in ("one", "two"):
+        (tmp_path / rig).mkdir()
+        write(tmp_path / rig / "a.mcap")
+    whole = (tmp_path / "two" / "a.mcap").read_bytes()
+    (tmp_path / "two" / "a.mcap").write_bytes(whole[: len(whole) // 2])
+    names = [str(tmp_path / rig / "a.mcap") for rig in ("one", "two")]
+    assert command.run(parser.parse_args([*names, "--out", str(saved)])) == 2
+    assert f"{names[1]}: {saved}/a.recovered.mcap is there already" in capsys.readouterr().err
+    assert len(read(saved / "a.recovered.mcap")[0]) == 2 * FRAMES
+    unfinished = write(tmp_path / "one" / "a.mcap.active", finish=False)
+    unfinished.write_bytes(unfinished.read_bytes()[:-9000])
+    assert command.run(parser.parse_args([str(unfinished)])) == 2
+    assert unfinished.exists()
+    assert (tmp_path / "one" / "a.mcap").read_bytes() == whole
+
+
 def test_the_command_names_what_a_full_disk_does_not_take(tmp_path, capsys):
     source, saved = write(tmp_path / "a.mcap"), tmp_path / "saved"
     saved.mkdir()

@@ -129,9 +129,12 @@ def test_with_its_images_a_replay_is_a_recording_that_replays_to_the_same(record
     assert thetas(again) == thetas(out) != thetas(replayed[0])
 
 
-def test_images_of_a_live_replay_are_recorded_by_run(recording, capsys):
+def test_a_live_replay_has_its_images_recorded_by_run_and_a_speed_that_can_be(recording, capsys):
     assert cli.main(["replay", str(recording), "--images", "--speed", "1"]) == Exit.USER
     assert "--out FOLDER records the images" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        cli.main(["replay", str(recording), "--speed", "nan"])
+    assert "argument --speed: 'nan' must be a number from 0.01 to 100" in capsys.readouterr().err
 
 
 def test_one_json_object_per_estimate(recording, tmp_path, capsys):

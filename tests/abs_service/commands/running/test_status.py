@@ -89,6 +89,36 @@ def test_a_process_that_was_given_up_has_a_line(rig, endpoint, capsys):
     assert said.out.count("track/sheet") == 1
 
 
+@pytest.mark.parametrize(
+    ("condition", "code", "line"),
+    [
+        ("running: no health for 6 s", 1, "silent   running: no health for 6 s"),
+        ("running", 0, "warning  starts"),
+    ],
+)
+def test_a_process_that_is_not_on_the_bus_hangs_or_starts(rig, endpoint, capsys, condition, code, line):
+    rig["run"].label("process.view", condition)
+    found, said = status(endpoint, capsys)
+    assert (found, f"view         {line}\n" in said.out) == (code, True)
+
+
+def test_a_page_that_speaks_later_than_the_others_is_waited_for(rig, endpoint, open_bus, capsys):
+    rig["run"].label("process.view", "running")
+    page, ended = Health(open_bus(), "view", HeaderFactory("demo", WallClock())), threading.Event()
+
+    def publish_later():
+        ended.wait(0.7)
+        while not ended.wait(0.05):
+            page.publish()
+
+    thread = threading.Thread(target=publish_later)
+    thread.start()
+    code, said = status(endpoint, capsys)
+    ended.set()
+    thread.join()
+    assert (code, "view         ok" in said.out) == (0, True)
+
+
 def test_a_bus_that_capture_hosts_lacks_no_run(open_bus, endpoint, capsys):
     bus = open_bus()
     bus.declare_liveliness("capture")

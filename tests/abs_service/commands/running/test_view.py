@@ -1,5 +1,6 @@
 """`abs-service view`, and `run --view`, without a browser."""
 
+import socket
 import threading
 from contextlib import nullcontext
 from pathlib import Path
@@ -9,6 +10,7 @@ import pytest
 from abs_service import config
 from abs_service.cli import command_parser, main
 from abs_service.commands import run
+from abs_service.commands.parts.options import OptionError
 from abs_service.commands.running import view
 from tests.abs_service.bus.loopback import LoopbackBus
 
@@ -46,6 +48,34 @@ def test_what_cannot_be_shown_is_a_mistake_of_the_user(capsys, arguments, reason
     pytest.importorskip("viser")
     assert main(["view", *arguments]) == 2
     assert reason in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", [["view", "--port"], ["run", "--view-port"], ["run", "--seed"]])
+@pytest.mark.parametrize("number", ["-1", "4294967296", "8e3", "9" * 5000])
+def test_what_cannot_be_a_port_or_a_seed_is_refused_before_anything_starts(capsys, command, number):
+    with pytest.raises(SystemExit):
+        main([*command, number])
+    assert f"argument {command[1]}: " in capsys.readouterr().err
+
+
+def test_a_port_above_which_none_is_free_is_named(monkeypatch):
+    pages = pytest.importorskip("abs_service.commands.running.pages")
+    with socket.socket() as taken:
+        taken.bind((pages.HOST, 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        monkeypatch.setattr(pages, "LAST_PORT", port)
+        with pytest.raises(OptionError, match=f"--port {port}: no port from there to {port} is free"):
+            pages.free_port(port)
+        monkeypatch.undo()
+        assert pages.free_port(port) > port
+
+
+def test_a_host_without_the_address_of_the_page_is_told(monkeypatch):
+    pages = pytest.importorskip("abs_service.commands.running.pages")
+    monkeypatch.setattr(pages, "HOST", "192.0.2.1")  # of documentation, RFC 5737
+    with pytest.raises(OptionError, match=r"--port 8080: cannot listen at 192\.0\.2\.1: Cannot assign"):
+        pages.free_port(8080)
 
 
 @pytest.mark.parametrize("command", ["view", "run"])

@@ -40,6 +40,20 @@ def test_a_forecast(rate, room, used, retain_s, retain_bytes, expected):
 
 
 @pytest.mark.parametrize(
+    ("rotate_bytes", "retain_s", "retain_bytes", "expected"),
+    [
+        (4_000 * MB, 3600.0, math.inf, "the last 60.0 min are kept"),
+        (9_000 * MB, 3600.0, math.inf, "62.2 min on this disk"),  # the file that is an hour old is 200 s long
+        (9_000 * MB, math.inf, 1_000 * MB, "the last 22 s are kept"),
+        (900_000 * MB, math.inf, 1_000 * MB, "62.2 min on this disk"),  # within one file
+    ],
+)
+def test_a_file_that_is_written_is_not_deleted(tmp_path, rotate_bytes, retain_s, retain_bytes, expected):
+    kept = Retention(tmp_path, "demo", "", retain_s, retain_bytes, math.inf, rotate_bytes)
+    assert forecast.text(kept.growth(45 * MB), Growth(0.0, 0, math.inf, math.inf), 168_000 * MB) == expected
+
+
+@pytest.mark.parametrize(
     ("retain_s", "retain_bytes", "expected"),
     [
         (math.inf, math.inf, "2.8 hours on this disk"),  # nothing is deleted: 50 MB/s

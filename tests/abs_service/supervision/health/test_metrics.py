@@ -5,13 +5,14 @@ import sys
 import threading
 import urllib.error
 import urllib.request
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from absmsg.v1.health_pb2 import Health
 
 from abs_service.bus.contract import Sample
-from abs_service.supervision.children.child import Child
+from abs_service.supervision.children.child import Child, ChildState
 from abs_service.supervision.health import metrics
 from abs_service.supervision.health.rig_state import RigState
 from abs_service.supervision.health.rig_view import RigView
@@ -33,7 +34,7 @@ def view(now_ns=NOW_NS, **capture):
     log.estimates = 12
     log.last = EstimateReport("sheet", 1, "", "DEGRADED", (), (), (), None, None, None, 8.0, 20.0, 1, 1, 0)
     log.exposure_ns = {"tof": NOW_NS - S // 4}
-    children = [Child("record", (), 1, restarts=2)]
+    children = [Child("record", (), 1, ChildState.RUNNING, restarts=2)]
     return RigView("demo", "", Path(), live, children, 1.0, now_ns, "")
 
 
@@ -102,6 +103,13 @@ def test_a_process_that_says_nothing_any_more_has_counters_and_an_age_but_no_pre
     assert found["abs_health_age_seconds", "component=capture", "rig=demo"] == 6
     assert found["abs_count_total", "component=capture", "name=published.tof/depth/image", "rig=demo"] == 30
     assert {name for name, *_ in found}.isdisjoint({"abs_gauge", "abs_disk_free_bytes"})
+
+
+def test_a_tracker_without_estimates_has_no_status(read, port):
+    with metrics.served(port) as update:
+        update(replace(view(), silent={"sheet": "no estimate for 9 s"}))
+        found = read()
+    assert {value for (name, *_), value in found.items() if name == "abs_tracker_status"} == {0.0}
 
 
 def test_only_loopback_is_answered_and_nobody_after_the_end(read, port):

@@ -150,6 +150,9 @@ def test_systemd_hears_in_words_what_happens(start):
     manager.notifier.update(RigView("demo", "", Path(), manager.live, (), 0.0, 3 * S, ""))
     said = [message for message in manager.received() if message.startswith("STATUS=")]
     assert said == ["STATUS=sheet DEGRADED; track/sheet: DEGRADED: few vertices"]
+    silent = RigView("demo", "", Path(), manager.live, (), 0.0, 9 * S, "", silent={"sheet": "no estimate for 6 s"})
+    manager.notifier.update(silent)
+    assert manager.received() == ["STATUS=sheet silent; track/sheet: DEGRADED: few vertices"]
     manager.notifier.stopping()
     assert manager.received() == ["STOPPING=1"]
 
