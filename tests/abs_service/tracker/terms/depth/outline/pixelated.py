@@ -51,5 +51,5 @@ def edges(corners: np.ndarray, every: float = 6.0) -> tuple[np.ndarray, np.ndarr
         side = other - one
         share = np.arange(every / 2, np.linalg.norm(side), every) / np.linalg.norm(side)
         places.append(one + share[:, None] * side)
-        directions.append(np.tile([side[1], -side[0]] / np.linalg.norm(side), (len(share), 1)))
+        directions.append(np.tile(side[::-1] * (1, -1) / np.linalg.norm(side), (len(share), 1)))
     return np.concatenate(places), np.concatenate(directions)
