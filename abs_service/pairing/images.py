@@ -72,7 +72,7 @@ class DepthImage:
 
 def limits(window: Window, shape: tuple[int, ...]) -> Limits:
     """Limits of a window in an image of a shape."""
-    (top, bottom, _), (left, right, _) = (axis.indices(size) for axis, size in zip(window, shape))
+    (top, bottom, _), (left, right, _) = window[0].indices(shape[0]), window[1].indices(shape[1])
     return top, bottom, left, right
 
 

@@ -114,8 +114,8 @@ def area_vectors(vertices: NDArray[np.floating], faces: NDArray[np.int32]) -> ND
 
 def unit(vectors: NDArray[Float]) -> NDArray[Float]:
     """Vectors (n, 3) of length 1 in the same directions; those without length stay so."""
-    lengths = np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-12)
-    return np.asarray(vectors / lengths, vectors.dtype)
+    lengths = np.maximum(np.sqrt(np.vecdot(vectors, vectors)), 1e-12)  # half the time of a norm along an axis
+    return np.asarray(vectors / lengths[:, None], vectors.dtype)
 
 
 def edge_lengths(vertices: NDArray[np.floating], edges: NDArray[np.int32]) -> NDArray[np.floating]:

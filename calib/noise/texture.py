@@ -11,6 +11,7 @@ from calib.noise.base import LOG_SQRT_2PI, DepthNoise
 #: Half width of the interval of measured − mean offset − synthesised distance that a texel describes [m]; outside, the
 #: edge value applies.
 WINDOW_M = 0.05
+_NODES_M = np.array([[WINDOW_M], [0.0], [-WINDOW_M]])
 
 #: Smallest distance of a surface [m]; keeps the near end of the interval in front of the camera.
 MIN_DISTANCE_M = 1e-3
@@ -112,7 +113,7 @@ def _render(
     """Writes the texels of so few pixels that the cache holds them."""
     offset = model.mean(measured, a, p)  # may exceed the interval, which is centred on the surface
     center = measured - offset
-    nodes = np.maximum(center + np.array([[WINDOW_M], [0.0], [-WINDOW_M]]), MIN_DISTANCE_M)
+    nodes = np.maximum(center + _NODES_M, MIN_DISTANCE_M)
     deviation = model.deviation(nodes, a, p)
     # NumPy takes logarithms of many numbers at once, the compiler does not.
     with np.errstate(over="ignore"):  # farther than 1 km, single precision has no room for every model's deviation

@@ -84,9 +84,8 @@ def posterior_covariance(quadratic: Quadratic) -> NDArray[np.float64]:
     Raises:
         LinAlgError: the curvature is not positive definite.
     """
-    factor = _cholesky(quadratic.curvature)
-    lower = scipy.linalg.lapack.dpotri(factor, lower=True)[0]  # half the time of a general inverse
-    return np.asarray(lower + np.tril(lower, -1).T, np.float64)
+    inverse = scipy.linalg.lapack.dtrtri(_cholesky(quadratic.curvature), lower=True)[0]  # of the factor
+    return np.asarray(inverse.T @ inverse, np.float64)
 
 
 def _cholesky(curvature: NDArray[np.float64]) -> NDArray[np.float64]:

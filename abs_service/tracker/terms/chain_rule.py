@@ -74,13 +74,13 @@ def add_squares(
     M is CᵀC with as many rows C as its rank, by a Cholesky decomposition with pivots, and DᵀMD the square of CD.
     """
     group, parameters, local = jacobian
-    n, k, half, first = group.size, local.shape[2], local.shape[2] // 2, 0
+    n, k, first = group.size, local.shape[2], 0
     row = np.empty(3)
     while first < n:
         last = first + 1
         while last < n and group[last] == group[first]:
             last += 1
-        left, right, count = np.empty((3 * (last - first), half)), np.empty((3 * (last - first), k - half)), 0
+        rows, count = np.empty((3 * (last - first), k)), 0
         for v in range(first, last):
             rest = squares[v]
             least = _ROUNDING * (rest[0, 0] + rest[1, 1] + rest[2, 2])
@@ -95,37 +95,22 @@ def add_squares(
                     for j in range(3):
                         rest[i, j] -= row[i] * row[j]
                 x, y, z = row
-                for d in range(half):
-                    left[count, d] = x * local[v, 0, d] + y * local[v, 1, d] + z * local[v, 2, d]
-                for d in range(k - half):
-                    right[count, d] = x * local[v, 0, half + d] + y * local[v, 1, half + d] + z * local[v, 2, half + d]
+                for d in range(k):
+                    rows[count, d] = x * local[v, 0, d] + y * local[v, 1, d] + z * local[v, 2, d]
                 count += 1
-        add_products(left[:count], right[:count], parameters[group[first]], total)
+        add_square(rows[:count], parameters[group[first]], total)
         first = last
 
 
 @kernel
-def add_products(
-    left: NDArray[np.float64], right: NDArray[np.float64], own: NDArray[np.int64], total: NDArray[np.float64]
-) -> None:
-    """Adds the square of (left, right) to the rows and columns `own` of a matrix; one block of four is mirrored."""
-    half, rest = left.shape[1], right.shape[1]
-    upper, across, lower = np.empty((half, half)), np.empty((half, rest)), np.empty((rest, rest))
-    np.dot(left.T, left, upper)
-    np.dot(left.T, right, across)
-    np.dot(right.T, right, lower)
-    for i in range(half):
+def add_square(rows: NDArray[np.float64], own: NDArray[np.int64], total: NDArray[np.float64]) -> None:
+    """Adds rowᵀ row, of rows (m, k), to the rows and columns `own` (k,) of a matrix."""
+    square = np.empty((own.size, own.size))
+    np.dot(rows.T, rows, square)
+    for i in range(own.size):
         line = total[own[i]]
-        for j in range(half):
-            line[own[j]] += upper[i, j]
-        for j in range(half, own.size):
-            line[own[j]] += across[i, j - half]
-    for i in range(half, own.size):
-        line = total[own[i]]
-        for j in range(half):
-            line[own[j]] += across[j, i - half]
-        for j in range(half, own.size):
-            line[own[j]] += lower[i - half, j - half]
+        for j in range(own.size):
+            line[own[j]] += square[i, j]
 
 
 @kernel

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.terms.chain_rule import add_products
+from abs_service.tracker.terms.chain_rule import add_square
 from calib.jit import kernel
 
 
@@ -66,14 +66,6 @@ def _add_curvature(
     rows: NDArray[np.float64], parameters: NDArray[np.int64], start: NDArray[np.int64], total: NDArray[np.float64]
 ) -> None:
     """Adds rowᵀ row, of rows (m, k), to a matrix (dim, dim)."""
-    k, half = rows.shape[1], rows.shape[1] // 2
     for g in range(parameters.shape[0]):
-        first, count = start[g], start[g + 1] - start[g]
-        left, right = np.empty((count, half)), np.empty((count, k - half))
-        for m in range(count):
-            for d in range(half):
-                left[m, d] = rows[first + m, d]
-            for d in range(k - half):
-                right[m, d] = rows[first + m, half + d]
-        if count > 0:
-            add_products(left, right, parameters[g], total)
+        if start[g] < start[g + 1]:
+            add_square(rows[start[g] : start[g + 1]], parameters[g], total)

@@ -54,7 +54,7 @@ class Remainder:
     @property
     def gained(self) -> float:
         """Increase of the share since the first image, not below 0; 0 if unknown."""
-        return max(float(np.nan_to_num(self.share - self.at_first)), 0.0)
+        return max(0.0, self.share - self.at_first)  # of NaN and 0.0, the first
 
 
 @dataclass(frozen=True, slots=True)

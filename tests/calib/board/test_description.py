@@ -110,7 +110,7 @@ def test_a_grid_that_begins_with_another_number_is_refused(monkeypatch: pytest.M
 @pytest.mark.parametrize(("name", "tags"), [("DICT_6X6_250", "6x6_50"), ("DICT_APRILTAG_36h11", "apriltag_36h11")])
 def test_single_markers_are_not_taken_for_a_charuco(name: str, tags: str) -> None:
     dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name))
-    image = grey(cv2.aruco.GridBoard((7, 5), 0.03, 0.006, dictionary).generateImage((1024, 736), marginSize=20))
+    image = grey(cv2.aruco.GridBoard((7, 5), 0.03, 0.006, dictionary).generateImage((640, 460), marginSize=12))
     for board in (AprilGrid(7, 5, 0.03, 0.006), Chessboard(7, 5, 0.03), Charuco(7, 5, 0.03, 0.022, "4x4_50")):
         told = f"shows single markers of the dictionary {tags} without a chessboard, which are not supported"
         assert mismatch(board, image) == told

@@ -25,7 +25,7 @@ def single_frame_deviation(optimum: Optimum, prediction: MotionPrediction) -> fl
     """
     alone = _with_widest(optimum, prediction, KEPT_PRIOR)
     derivatives, dimension = optimum.linearized.sparse_jacobian, len(alone)
-    some = np.linspace(0, len(derivatives.local) - 1, PROBES).astype(np.intp)
+    some = np.arange(PROBES) * (len(derivatives.local) - 1) // (PROBES - 1)
     rows = np.zeros((PROBES, dimension, 3))
     own = derivatives.parameters[derivatives.group[some]]
     rows[np.arange(PROBES)[:, None], own] = derivatives.local[some].transpose(0, 2, 1)

@@ -7,6 +7,7 @@ Gelfand and Guibas, Shape segmentation using local slippage analysis, SGP 2004, 
 """
 
 import numpy as np
+import scipy  # its parts are imported when they are first used
 from numpy.typing import NDArray
 
 from abs_service.tracker.models.base import DeformationModel
@@ -62,13 +63,13 @@ class SlideObservability:
             known[k], feigned[k] = _information(part, *frame)
             feigned[k] *= _direction_error(part) ** 2
         inside = [isinstance(part, PointLinearization) for part in optimum.sensed]
-        of_one = _of_one(vertices, *frame)
-        return _least_held(known, feigned, of_one), _least_held(known[inside], feigned[inside], of_one)
+        moved = _moved(vertices, *frame)
+        return _least_held(known, feigned, moved), _least_held(known[inside], feigned[inside], moved)
 
 
-def _least_held(known: NDArray[np.float64], feigned: NDArray[np.float64], of_one: NDArray[np.float64]) -> float:
+def _least_held(known: NDArray[np.float64], feigned: NDArray[np.float64], moved: NDArray[np.float64]) -> float:
     """Deviation [m] along the slide that is held least, by information of parts, known and feigned (parts, 6, 6)."""
-    slides = _slides(known.sum(axis=0), of_one)
+    slides = _slides(known.sum(axis=0), moved)
     held = np.maximum(_along(slides, known - feigned), 0.0).sum(axis=0)
     return float(1 / np.sqrt(_LEAST + held.min()))
 
@@ -144,8 +145,8 @@ def add_information(
                 most[i, j] += square * (moved - unseen[i] * unseen[j])
 
 
-def _of_one(vertices: NDArray[np.float64], center: NDArray[np.float64], size: float) -> NDArray[np.float64]:
-    """Motions (6, 6), rows, each of which moves vertices (n, 3) [m] by 1, root mean square.
+def _moved(vertices: NDArray[np.float64], center: NDArray[np.float64], size: float) -> NDArray[np.float64]:
+    """Mean square (6, 6) by which rigid motions move vertices (n, 3) [m], as a quadratic form.
 
     Args:
         vertices: of the surface.
@@ -153,12 +154,12 @@ def _of_one(vertices: NDArray[np.float64], center: NDArray[np.float64], size: fl
     """
     places, moved = (vertices - center) / size, np.eye(6)
     moved[3:, 3:] -= places.T @ places / len(places)
-    return np.asarray(np.linalg.inv(np.linalg.cholesky(moved + 1e-9 * np.eye(6))), np.float64)
+    return moved + 1e-9 * np.eye(6)
 
 
-def _slides(known: NDArray[np.float64], of_one: NDArray[np.float64]) -> NDArray[np.float64]:
+def _slides(known: NDArray[np.float64], moved: NDArray[np.float64]) -> NDArray[np.float64]:
     """Motions (6, 6), columns, that information (6, 6) tells apart, of those that move the vertices by 1."""
-    return np.asarray(of_one.T @ np.linalg.eigh(of_one @ known @ of_one.T)[1], np.float64)
+    return np.asarray(scipy.linalg.lapack.dsygv(known, moved)[1], np.float64)
 
 
 def _along(slides: NDArray[np.float64], information: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -4,6 +4,7 @@ This rasteriser is separate from `zbuffer`, which also records each pixel's face
 the depth: it takes about half the time, and it interpolates in double precision, so the results differ in the last bit.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -57,11 +58,14 @@ class Raster:
 
     def _around(self, seen: Projected) -> tuple[slice, slice]:
         """Rows and columns in which the vertices of a population of one lie."""
-        low, high = extent(seen)
-        size = np.array(self._ray_length.shape)
-        first = np.clip(np.ceil(low), 0, size).astype(int).tolist()
-        last = np.clip(np.floor(high) + 1, first, size).astype(int).tolist()
-        return np.s_[first[0] : last[0], first[1] : last[1]]
+        low, high = (place.tolist() for place in extent(seen))
+        rows, columns = map(_whole, low, high, self._ray_length.shape)
+        return rows, columns
+
+
+def _whole(low: float, high: float, size: int) -> slice:
+    """Whole numbers from one to another, of those from 0 up to a size."""
+    return slice(math.ceil(min(max(low, 0), size)), math.floor(min(max(high, -1), size - 1)) + 1)
 
 
 class FewPixels(NamedTuple):

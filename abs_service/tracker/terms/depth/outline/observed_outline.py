@@ -67,7 +67,8 @@ class ObservedRimOutline:
         by_place = project_with_jacobian(self.image.camera, points[use].astype(np.float64))[1]
         shown = across_rim(gradients[use], self.along[use])
         shown = without_turn(shown, by_place, points[use]) if self.is_round else shown
-        rows = np.einsum("vi,vij->vj", shown / self.deviation, by_place)
+        right, down = (shown / self.deviation).T[:, :, None]
+        rows = right * by_place[:, 0] + down * by_place[:, 1]
         jacobian = np.zeros((len(use), sparse_jacobian.dimension))
         chain(rows, self.edges.some(use), sparse_jacobian.blocks, jacobian)
         shared = _shared_by_side(jacobian, residual[use], gradients[use])
@@ -115,6 +116,8 @@ class ObservedRimOutline:
 
         Then the mesh has slid, and nothing tells how far: how long the object is beyond them is not known.
         """
+        if not len(outer):
+            return 0.0
         places, before = (project_with_jacobian(self.image.camera, points)[0] for points in (outer, inner))
         away, sides = self.image.inside(places), by_side(places - before)
         over, known = (np.count_nonzero(sides & part, axis=1) for part in (away < -self.off_px, ~np.isnan(away)))
@@ -123,8 +126,8 @@ class ObservedRimOutline:
 
     def _pixel_m(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Size (k,) of a pixel at points (k, 3) [m]."""
-        camera = self.image.camera
-        return np.linalg.norm(points - camera.center, axis=1) / camera.fx
+        away = points - self.image.camera.center
+        return np.sqrt(np.vecdot(away, away)) / self.image.camera.fx
 
 
 def _shared_by_side(

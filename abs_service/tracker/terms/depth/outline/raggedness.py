@@ -54,7 +54,7 @@ class Raggedness:
 
         Args:
             away: distances (k,) of the predicted edges from the outline [px], NaN where unknown.
-            directions: out of the mesh, in the image (k, 2).
+            directions: unit ones out of the mesh, in the image (k, 2).
             places: of the edges in the image (k, 2) [px].
         """
         known = np.flatnonzero(~np.isnan(away))

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.pairing.images import Window
-from abs_service.tracker.mesh import Mesh, edges_of
+from abs_service.tracker.mesh import Mesh, edges_of, unit
 from abs_service.tracker.models.base import JacobianBlocks, Surface
 from abs_service.tracker.synthesis.perspective import project_with_jacobian
 from abs_service.tracker.synthesis.projection import Projection
@@ -83,8 +83,8 @@ class Edges(NamedTuple):
         return points
 
     def directions(self, camera: Camera, surface: Surface, places: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Directions out of the mesh in the image (k, 2), at the edges' places (k, 2) [px]."""
-        return places - project_with_jacobian(camera, self.starts(surface))[0]
+        """Unit directions out of the mesh in the image (k, 2), at the edges' places (k, 2) [px]."""
+        return unit(places - project_with_jacobian(camera, self.starts(surface))[0])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -241,5 +241,6 @@ def extrapolate_rim(vertices: NDArray[np.float32], edges: Edges, points: NDArray
 
 def by_side(directions: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Masks (4, k) of image directions (k, 2) that are nearest to right, down, left and up."""
-    quarter = np.floor(np.arctan2(directions[:, 1], directions[:, 0]) / (np.pi / 2) + 0.5).astype(np.intp) % 4
+    # A whole turn more, so that integers cut to the quarter below.
+    quarter = (np.arctan2(directions[:, 1], directions[:, 0]) * (2 / np.pi) + 4.5).astype(np.intp) % 4
     return quarter == np.arange(4)[:, None]

@@ -36,7 +36,7 @@ def shift_to_outline(look: Look, places: NDArray[np.float64], directions: NDArra
     Args:
         look: reads the outline.
         places: of the edges in the image (k, 2) [px].
-        directions: out of the mesh, in the image (k, 2).
+        directions: unit ones out of the mesh, in the image (k, 2).
     """
     still = np.zeros_like(places)
     values, facing = _read(look, places, directions)
@@ -61,7 +61,7 @@ def _read(
     """Distances (k,) of edges inside the outline [px], and which of them belong to the part that is nearest."""
     values, gradients = look(places)
     outwards = -np.vecdot(gradients, directions)
-    lengths = np.linalg.norm(gradients, axis=1) * np.linalg.norm(directions, axis=1)
+    lengths = np.sqrt(np.vecdot(gradients, gradients))
     return values, (np.abs(values) < REACH_PX) & (outwards > _FACING * lengths) & (lengths > 0)
 
 

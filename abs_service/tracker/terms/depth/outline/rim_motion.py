@@ -60,7 +60,7 @@ def motion(away: NDArray[np.float64], directions: NDArray[np.float64], places: N
 
     Args:
         away: signed distances (k,) of the edges from the outline [px].
-        directions: out of the mesh, in the image (k, 2).
+        directions: unit ones out of the mesh, in the image (k, 2).
         places: of the edges in the image (k, 2) [px].
 
     Returns:
@@ -93,8 +93,13 @@ def without_motion(
 
 
 def shown_by(directions: NDArray[np.float64], arms: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Displacement of edges across the outline (k, 3), by a slide along the columns, one along the rows, and a turn."""
-    right, down = (directions / np.linalg.norm(directions, axis=1, keepdims=True)).T
+    """Displacement of edges across the outline (k, 3), by a slide along the columns, one along the rows, and a turn.
+
+    Args:
+        directions: unit ones across the outline (k, 2).
+        arms: of the edges about the centre of the turn (k, 2).
+    """
+    right, down = directions.T
     return np.stack([right, down, down * arms[:, 0] - right * arms[:, 1]], axis=1)
 
 

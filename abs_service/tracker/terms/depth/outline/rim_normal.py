@@ -9,12 +9,14 @@ the mesh, which several edges tell together.
 import numpy as np
 from numpy.typing import NDArray
 
+from calib.jit import kernel
+
 #: So many edges, the edge included, tell the direction of the outline at one of them; or fewer that face as it does.
-_EDGES, _FEWEST = 7, 3
+EDGES, FEWEST = 7, 3
 
 #: Edges of one side of the mesh: smallest cosine between their directions, more than at a corner. Those of a hexagonal
 #: grid point by up to 30° to the left or to the right of the normal.
-_FACING = 0.4
+FACING = 0.4
 
 
 def rim_directions(places: NDArray[np.float64], directions: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -22,20 +24,11 @@ def rim_directions(places: NDArray[np.float64], directions: NDArray[np.float64])
 
     Args:
         places: of the edges in the image (k, 2) [px].
-        directions: out of the mesh, in the image (k, 2).
+        directions: unit ones out of the mesh, in the image (k, 2).
     """
-    if len(places) < _FEWEST:
-        return np.zeros_like(places)
-    units = directions / np.maximum(np.linalg.norm(directions, axis=1, keepdims=True), np.finfo(float).tiny)
-    x, y = places.T
-    apart = (x[:, None] - x) ** 2 + (y[:, None] - y) ** 2
-    apart[units @ units.T < _FACING] = np.inf
-    nearest = np.argsort(apart, axis=1, kind="stable")[:, :_EDGES]
-    alike = np.isfinite(np.take_along_axis(apart, nearest, axis=1))
-    count = alike.sum(axis=1)
-    x, y = (_centred(part[nearest], alike, count) for part in (x, y))
-    angles = np.arctan2(2 * np.vecdot(x, y), np.vecdot(x, x) - np.vecdot(y, y)) / 2  # of the longer principal axis
-    return np.stack([np.cos(angles), np.sin(angles)], axis=1) * (count >= _FEWEST)[:, None]
+    along = np.empty_like(places)
+    _rim_directions(places, directions, along)
+    return along
 
 
 def across_rim(gradients: NDArray[np.float64], along: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -43,7 +36,29 @@ def across_rim(gradients: NDArray[np.float64], along: NDArray[np.float64]) -> ND
     return gradients - np.vecdot(gradients, along)[:, None] * along
 
 
-def _centred(values: NDArray[np.float64], which: NDArray[np.bool_], count: NDArray[np.intp]) -> NDArray[np.float64]:
-    """Values (k, n) minus the mean of those which count (k, n), of which there are (k,); 0 for the others."""
-    means = np.where(which, values, 0.0).sum(axis=1) / np.maximum(count, 1)
-    return np.where(which, values - means[:, None], 0.0)
+@kernel
+def _rim_directions(places: NDArray[np.float64], directions: NDArray[np.float64], along: NDArray[np.float64]) -> None:
+    """Longer principal axes of the `EDGES` nearest edges that face as each does, into `along`; see `rim_directions`."""
+    nearest, apart = np.empty(EDGES, np.int64), np.empty(EDGES)
+    for k in range(places.shape[0]):
+        count = 0
+        for m in range(places.shape[0]):
+            x, y = places[m, 0] - places[k, 0], places[m, 1] - places[k, 1]
+            square, farthest = x * x + y * y, apart[EDGES - 1] if count == EDGES else np.inf
+            faces = directions[k, 0] * directions[m, 0] + directions[k, 1] * directions[m, 1] >= FACING
+            if not (faces and square < farthest):  # nor where a place is unknown
+                continue
+            count = min(count + 1, EDGES)
+            at = count - 1
+            while at > 0 and square < apart[at - 1]:
+                nearest[at], apart[at] = nearest[at - 1], apart[at - 1]
+                at -= 1
+            nearest[at], apart[at] = m, square
+        x, y, xx, xy, yy = 0.0, 0.0, 0.0, 0.0, 0.0
+        for m in nearest[:count]:
+            x, y = x + (places[m, 0] - places[k, 0]) / count, y + (places[m, 1] - places[k, 1]) / count
+        for m in nearest[:count]:
+            from_x, from_y = places[m, 0] - places[k, 0] - x, places[m, 1] - places[k, 1] - y
+            xx, xy, yy = xx + from_x * from_x, xy + from_x * from_y, yy + from_y * from_y
+        angle, tells = np.arctan2(2 * xy, xx - yy) / 2, 1.0 if count >= FEWEST else 0.0
+        along[k, 0], along[k, 1] = tells * np.cos(angle), tells * np.sin(angle)

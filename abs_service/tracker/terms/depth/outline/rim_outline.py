@@ -118,9 +118,7 @@ class RimOutline:
     def _beside(self, surface: Surface) -> NDArray[np.float64]:
         """Places (k, 2) in the image of a population of one, `BESIDE_PX` outside the edges."""
         places = self._camera.project(self._edges.points(surface)[0].T.astype(np.float64))
-        directions = self._edges.directions(self._camera, surface, places)
-        length = np.linalg.norm(directions, axis=1, keepdims=True)
-        return places + BESIDE_PX * directions / np.maximum(length, np.finfo(float).tiny)
+        return places + BESIDE_PX * self._edges.directions(self._camera, surface, places)
 
     def _find_cut(self, surface: Surface, beyond: NDArray[np.bool_], window: Window) -> NDArray[np.bool_]:
         """True for edges (k,) where the field of view ends, at the first image's or at a population of one.

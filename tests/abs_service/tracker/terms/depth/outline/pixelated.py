@@ -45,11 +45,11 @@ def rectangle(width: float, height: float) -> np.ndarray:
 
 
 def edges(corners: np.ndarray, every: float = 6.0) -> tuple[np.ndarray, np.ndarray]:
-    """Places (k, 2) along the sides of a polygon, clockwise, and directions out of it (k, 2) [px]."""
+    """Places (k, 2) along the sides of a polygon, clockwise [px], and unit directions out of it (k, 2)."""
     places, directions = [], []
     for one, other in zip(corners, np.roll(corners, -1, axis=0), strict=True):
         side = other - one
         share = np.arange(every / 2, np.linalg.norm(side), every) / np.linalg.norm(side)
         places.append(one + share[:, None] * side)
-        directions.append(np.tile([side[1], -side[0]], (len(share), 1)))
+        directions.append(np.tile(side[::-1] * (1, -1) / np.linalg.norm(side), (len(share), 1)))
     return np.concatenate(places), np.concatenate(directions)

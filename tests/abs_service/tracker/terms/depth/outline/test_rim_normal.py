@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import abs_service as a
-from abs_service.tracker.terms.depth.outline.rim_normal import across_rim, rim_directions
+from abs_service.tracker.terms.depth.outline.rim_normal import EDGES, FACING, FEWEST, across_rim, rim_directions
 from tests.abs_service.tracker.terms.depth.outline.pixelated import (
     HEIGHT,
     WIDTH,
@@ -21,7 +23,7 @@ def test_two_long_edges_do_not_hold_a_board_along_itself(angle: float):
     corners = turned(rectangle(260.0, 90.0), angle)
     places, directions = edges(corners)
     along = (corners[1] - corners[0]) / np.linalg.norm(corners[1] - corners[0])
-    long = np.abs(directions @ along) < 0.1 * np.linalg.norm(directions, axis=1)
+    long = np.abs(directions @ along) < 0.1
     # As long as the raster lasts, the mesh lies a little beside the outline.
     gradients = reading(inside_of(corners))(places + 1.5 * along[::-1] * (1, -1))[1]
     across = across_rim(gradients, rim_directions(places, directions))
@@ -34,8 +36,7 @@ def test_two_long_edges_do_not_hold_a_board_along_itself(angle: float):
 def test_corners_and_lonely_edges_keep_their_direction():
     corners = rectangle(120.0, 90.0)
     places, directions = edges(corners)
-    outwards = directions / np.linalg.norm(directions, axis=1, keepdims=True)
-    np.testing.assert_allclose(across_rim(-outwards, rim_directions(places, directions)), -outwards, atol=1e-9)
+    np.testing.assert_allclose(across_rim(-directions, rim_directions(places, directions)), -directions, atol=1e-9)
     assert not rim_directions(places[:2], directions[:2]).any()
 
 
@@ -53,3 +54,23 @@ def test_a_board_whose_ends_are_out_of_the_image_is_held_by_nothing():
         )
     assert found.status == "DEGRADED"
     assert "nothing holds the surface along itself" in "".join(found.reasons)
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 40))
+def test_the_directions_match_numpy(seed: int, count: int):
+    """Edges on pixels, so that some are as far away as others; some places are unknown."""
+    generator = np.random.default_rng(seed)
+    places, angles = generator.integers(0, 30, (count, 2)).astype(np.float64), generator.uniform(0, 6, count)
+    places += 1e-3 * generator.standard_normal(places.shape)
+    places[generator.random(count) < 0.05] = np.nan
+    directions = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    expected = np.zeros_like(places)
+    for k in range(count):
+        apart = np.linalg.norm(places - places[k], axis=1)
+        alike = np.flatnonzero((directions @ directions[k] >= FACING) & np.isfinite(apart))
+        around = places[alike[np.argsort(apart[alike])[:EDGES]]]
+        if len(around) >= FEWEST:
+            expected[k] = np.linalg.eigh(np.cov(around.T))[1][:, 1]
+    found = rim_directions(places, directions)
+    np.testing.assert_allclose(np.abs(np.vecdot(found, expected)), np.vecdot(expected, expected), atol=1e-6)
+    np.testing.assert_allclose(np.vecdot(found, found), np.vecdot(expected, expected), atol=1e-12)
