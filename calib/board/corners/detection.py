@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from calib.board.april_grid import AprilGrid
 from calib.board.corners import description, ellipse, errors, other_discs, quality, saddle
+from calib.board.corners.misplaced import is_in_place
 from calib.board.corners.order import canonical_order
 from calib.board.corners.search import MIN_POINTS, Found, find, is_cut_off
 from calib.board.corners.to_8bit import Grey, Image, grey, tones
@@ -94,8 +95,11 @@ def detect(target: Target, image: Image, largest_saturated: float = MAX_SATURATE
     else:
         pixels, is_corner = saddle.refine(levels, pixels, int(np.clip(round(_REFINED * spacing), 2, 10)))
         ids, pixels = ids[is_corner], pixels[is_corner]
-        if len(ids) < MIN_POINTS:
-            raise _detection_error(target, image, levels, len(ids))
+    if len(ids) >= MIN_POINTS:
+        is_good = is_in_place(target, ids, pixels, spacing)
+        ids, pixels = ids[is_good], pixels[is_good]
+    if len(ids) < MIN_POINTS:
+        raise _detection_error(target, image, levels, len(ids))
     return Detection(ids, pixels, quality.sigma_px(target, ids, pixels), edge, spacing)
 
 

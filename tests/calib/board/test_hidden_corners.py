@@ -7,7 +7,7 @@ import pytest
 from calib import pose
 from calib.board.corners import errors
 from calib.board.corners.detection import detect
-from calib.board.target import AprilGrid, Charuco, Chessboard, Target
+from calib.board.target import AprilGrid, Charuco, Chessboard, Circles, Target
 from tests.calib.board.boards import VGA, as_bytes, centered, photograph
 
 BOARDS = [Chessboard(9, 6, 0.03), Charuco(10, 7, 0.03, 0.0225, "4x4_100")]
@@ -45,3 +45,24 @@ def test_a_board_seen_in_part_has_no_corners_at_the_border(target: Target, up: f
     found = detect(target, as_bytes(photograph(target, VGA, T_sb)))
     corners = VGA.project(pose.transform(T_sb, target.points()))
     assert np.abs(found.pixels - corners[found.ids]).max() < 0.1
+
+
+@pytest.mark.parametrize("target", [*BOARDS, AprilGrid(6, 5, 0.03, 0.009), Circles(9, 7, 0.03, 0.018)], ids=repr)
+@pytest.mark.parametrize("seed", range(6))
+def test_a_stain_beside_a_corner_does_not_move_it(target: Target, seed: int) -> None:
+    """Its edge crosses that of a square, or cuts a disc off: the largest of these errors was 10 px."""
+    random = np.random.default_rng(seed)
+    T_sb = centered(target, (0.35, -0.4, 0.2), 0.5)
+    image = as_bytes(photograph(target, VGA, T_sb))
+    corners = VGA.project(pose.transform(T_sb, target.points()))
+    square_px = float(np.linalg.norm(corners[1] - corners[0]))
+    for stained in random.choice(len(corners), 3, replace=False):
+        middle = np.rint(16 * (corners[stained] + random.normal(0, 0.2 * square_px, 2))).astype(int).tolist()
+        radius, level = 16 * random.uniform(0.1, 0.35) * square_px, random.uniform(20, 210)
+        cv2.circle(image, middle, round(radius), level, -1, cv2.LINE_AA, 4)
+    try:
+        found = detect(target, image)
+    except errors.NothingFoundError:
+        return
+    assert len(found.ids) > 0.75 * len(corners)
+    assert np.abs(found.pixels - corners[found.ids]).max() < 1.5
