@@ -11,7 +11,7 @@ from calib.board.corners.misplaced import is_in_place
 from calib.board.corners.order import canonical_order
 from calib.board.corners.search import MIN_POINTS, Found, find, is_cut_off
 from calib.board.corners.to_8bit import Grey, Image, grey, tones
-from calib.board.target import AsymmetricCircles, Charuco, Circles, Target
+from calib.board.target import AsymmetricCircles, Charuco, Chessboard, Circles, Target
 from calib.board.views import CornerView
 
 #: Minimum distance of neighbouring points [px].
@@ -31,6 +31,9 @@ MAX_UNFOCUSED_SHARE, UNFOCUSED = 0.3, 2.0
 _REFINED = 0.13
 #: Minimum distance of points from the image's border [px]; their neighbourhood must be complete.
 MIN_BORDER_PX = 2.0
+
+#: Largest part of an outer row or column of a chessboard without corners.
+MAX_LOST = 0.5
 
 _CUT_OFF = (
     "the board touches the border of the image: all of it must be seen, with a rim around it. Move it to the middle, "
@@ -100,6 +103,8 @@ def detect(target: Target, image: Image, largest_saturated: float = MAX_SATURATE
         ids, pixels = ids[is_good], pixels[is_good]
     if len(ids) < MIN_POINTS:
         raise _detection_error(target, image, levels, len(ids))
+    if isinstance(target, Chessboard):
+        _check_rim(quality.lattice(target, ids, pixels))
     return Detection(ids, pixels, quality.sigma_px(target, ids, pixels), edge, spacing)
 
 
@@ -123,6 +128,19 @@ def _check_whole(
         reach += 0.5 * target.diameter / target.spacing * quality.spacing_px(points)
     if distance < reach:
         raise errors.CutOffError(_CUT_OFF)
+
+
+def _check_rim(points: NDArray[np.float64]) -> None:
+    """Rejects corners of a chessboard (rows, columns, 2) that may all be displaced by a square, NaN where there are none.
+
+    If an outer row or column is hidden, a search may take the ends of the squares on the other side for corners.
+    """
+    is_lost = np.isnan(points[..., 0])
+    if max(side.mean() for side in (is_lost[0], is_lost[-1], is_lost[:, 0], is_lost[:, -1])) > MAX_LOST:
+        raise errors.HiddenError(
+            "most corners of an outer row or column of the board are hidden, so that the others cannot be numbered: "
+            "take the hand off the squares, or describe the board as it is"
+        )
 
 
 def _check_sharp(edge: float, narrow: float, spacing: float, has_markers: bool) -> None:

@@ -8,7 +8,8 @@ from calib import pose
 from calib.board.corners import errors
 from calib.board.corners.detection import detect
 from calib.board.target import AprilGrid, Charuco, Chessboard, Circles, Target
-from tests.calib.board.boards import VGA, as_bytes, centered, photograph
+from calib.camera import Camera
+from tests.calib.board.boards import VGA, as_bytes, board_pose, centered, photograph
 
 BOARDS = [Chessboard(9, 6, 0.03), Charuco(10, 7, 0.03, 0.0225, "4x4_100")]
 
@@ -66,3 +67,13 @@ def test_a_stain_beside_a_corner_does_not_move_it(target: Target, seed: int) -> 
         return
     assert len(found.ids) > 0.75 * len(corners)
     assert np.abs(found.pixels - corners[found.ids]).max() < 1.5
+
+
+def test_a_board_whose_outer_column_is_hidden_is_not_numbered_from_the_next_one() -> None:
+    """The ends of the outermost squares on the other side were taken for corners, and all of the numbers displaced."""
+    target, camera = Chessboard(9, 6, 0.03), Camera(640, 360, 460, 460, 322, 176)
+    image = as_bytes(photograph(target, camera, board_pose((-0.592, -0.417, -0.212), (-0.15, -0.0893, 0.4463))))
+    for down in (163, 201, 240):
+        cv2.line(image, (412, down), (640, down + 84), 60, 28, cv2.LINE_AA)  # fingers
+    with pytest.raises((errors.HiddenError, errors.NothingFoundError)):
+        detect(target, image)
