@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from calib.board.april_grid import AprilGrid
 from calib.board.corners import description, ellipse, errors, other_discs, quality, saddle
+from calib.board.corners.copies import require_one_board
 from calib.board.corners.misplaced import is_in_place
 from calib.board.corners.order import canonical_order
 from calib.board.corners.search import MIN_POINTS, Found, find, is_cut_off
@@ -76,6 +77,8 @@ def detect(target: Target, image: Image, largest_saturated: float = MAX_SATURATE
         BoardError: unusable image; the subclass is the reason, see `calib.board.corners.errors`.
     """
     levels, (ids, pixels) = _found(target, image)
+    if isinstance(target, AprilGrid) or (isinstance(target, Charuco) and len(ids) < MIN_POINTS):
+        require_one_board(target, levels)
     if len(ids) < MIN_POINTS:
         raise _detection_error(target, image, levels, len(ids))
     pixels = canonical_order(target, pixels, levels)
