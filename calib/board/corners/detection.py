@@ -33,6 +33,8 @@ _REFINED = 0.13
 #: Minimum distance of points from the image's border [px]; their neighbourhood must be complete.
 MIN_BORDER_PX = 2.0
 
+#: Largest part of the points of a board without markers that may be elsewhere than those beside them say.
+MAX_MISPLACED = 0.1
 #: Largest part of an outer row or column of a chessboard without corners.
 MAX_LOST = 0.5
 
@@ -103,6 +105,7 @@ def detect(target: Target, image: Image, largest_saturated: float = MAX_SATURATE
         ids, pixels = ids[is_corner], pixels[is_corner]
     if len(ids) >= MIN_POINTS:
         is_good = is_in_place(target, ids, pixels, spacing)
+        _check_order(1 - is_good.mean(), has_markers=isinstance(target, Charuco | AprilGrid))
         ids, pixels = ids[is_good], pixels[is_good]
     if len(ids) < MIN_POINTS:
         raise _detection_error(target, image, levels, len(ids))
@@ -131,6 +134,15 @@ def _check_whole(
         reach += 0.5 * target.diameter / target.spacing * quality.spacing_px(points)
     if distance < reach:
         raise errors.CutOffError(_CUT_OFF)
+
+
+def _check_order(misplaced: float, has_markers: bool) -> None:
+    """Rejects points without numbers of which more than single ones are not where they should be, 0 to 1."""
+    if misplaced > MAX_MISPLACED and not has_markers:
+        raise errors.HiddenError(
+            f"{misplaced:.0%} of the points that were found do not stand as on the board, as if some were hidden and "
+            "others taken for them: show all of the board, without hands, stains and highlights on it"
+        )
 
 
 def _check_rim(points: NDArray[np.float64]) -> None:

@@ -26,8 +26,8 @@ def is_in_place(target: Target, ids: NDArray[np.intp], pixels: Array, spacing: f
     """True for points whose pixels (n, 2) agree with those beside them in rows and columns.
 
     What a homography leaves is smooth: the lens, and a sheet that is slightly bent. Its divided differences of third
-    order are noise. The point whose displacement explains most of them is left out, until none explains much. Points
-    with fewer than three others near them in a line are not judged.
+    order are noise. The point whose displacement explains most of them is left out, until none explains much, and with
+    it those that nothing but such points spoke for. Others with fewer than three near them in a line are not judged.
 
     Args:
         target: the board.
@@ -41,10 +41,9 @@ def is_in_place(target: Target, ids: NDArray[np.intp], pixels: Array, spacing: f
         return is_good
     flat = pixels - cv2.perspectiveTransform(points[ids][:, None], H)[:, 0]  # rougher than the pixels by some fisheyes
     length = max((_span(points[line]) for axis in (0, 1) for line in _lines(points, axis)), default=1.0)
-    for _ in range(len(ids) // _COMPARED):
-        differences = _differences(points[ids], is_good, length)
-        if not len(differences):
-            break
+    differences = _differences(points[ids], is_good, length)
+    is_judged = differences.any(axis=0)
+    while len(differences):
         found = min((differences @ each for each in (flat, pixels)), key=_sigma)
         known = np.sqrt(np.maximum(np.sum(differences**2, axis=0), 1e-6))
         pulls = np.linalg.norm(differences.T @ found, axis=1) / known
@@ -53,7 +52,8 @@ def is_in_place(target: Target, ids: NDArray[np.intp], pixels: Array, spacing: f
         if pulls[worst] < max(_DEVIATIONS * _sigma(found), _SMOOTH * spacing):
             break
         is_good[worst] = False
-    return is_good
+        differences = _differences(points[ids], is_good, length)
+    return is_good & (differences.any(axis=0) | ~is_judged)
 
 
 def _sigma(differences: Array) -> float:

@@ -63,7 +63,7 @@ def test_a_stain_beside_a_corner_does_not_move_it(target: Target, seed: int) -> 
         cv2.circle(image, middle, round(radius), level, -1, cv2.LINE_AA, 4)
     try:
         found = detect(target, image)
-    except errors.NothingFoundError:
+    except (errors.NothingFoundError, errors.HiddenError):
         return
     assert len(found.ids) > 0.75 * len(corners)
     assert np.abs(found.pixels - corners[found.ids]).max() < 1.5
@@ -76,4 +76,18 @@ def test_a_board_whose_outer_column_is_hidden_is_not_numbered_from_the_next_one(
     for down in (163, 201, 240):
         cv2.line(image, (412, down), (640, down + 84), 60, 28, cv2.LINE_AA)  # fingers
     with pytest.raises((errors.HiddenError, errors.NothingFoundError)):
+        detect(target, image)
+
+
+@pytest.mark.parametrize("hidden", [4, 62])
+def test_discs_that_others_are_taken_for_are_not_found(hidden: int) -> None:
+    """With one disc hidden, the search put others in its row and column, some 32 px from their places."""
+    target = Circles(9, 7, 0.03, 0.018)
+    T_sb = centered(target, (0.2, 0.3, -0.1), 0.6)
+    image = as_bytes(photograph(target, VGA, T_sb))
+    discs = VGA.project(pose.transform(T_sb, target.points()))
+    out = discs[hidden] - discs.mean(axis=0)
+    ends = [np.rint(discs[hidden] + far * out / np.linalg.norm(out)).astype(int).tolist() for far in (0, 300)]
+    cv2.line(image, *ends, 115, int(0.8 * np.linalg.norm(discs[1] - discs[0])), cv2.LINE_AA)
+    with pytest.raises(errors.HiddenError, match="others taken for them"):
         detect(target, image)
