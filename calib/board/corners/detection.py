@@ -146,7 +146,7 @@ def _check_order(misplaced: float, has_markers: bool) -> None:
 
 
 def _check_rim(points: NDArray[np.float64]) -> None:
-    """Rejects corners of a chessboard (rows, columns, 2) that may all be displaced by a square, NaN where there are none.
+    """Rejects corners of a chessboard (rows, columns, 2), NaN where hidden, that may all be displaced by a square.
 
     If an outer row or column is hidden, a search may take the ends of the squares on the other side for corners.
     """
