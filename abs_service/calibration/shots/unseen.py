@@ -19,6 +19,7 @@ _WORDS = {
     errors.SaturatedError: "saturated",
     errors.TooSmallError: "too small",
     errors.CutOffError: "cut off by the border",
+    errors.HiddenError: "partly hidden",
     errors.BlurredError: "blurred",
     errors.MovedError: "moved since the image before",
 }

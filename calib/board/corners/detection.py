@@ -7,10 +7,12 @@ from numpy.typing import NDArray
 
 from calib.board.april_grid import AprilGrid
 from calib.board.corners import description, ellipse, errors, other_discs, quality, saddle
+from calib.board.corners.copies import require_one_board
+from calib.board.corners.misplaced import is_in_place
 from calib.board.corners.order import canonical_order
 from calib.board.corners.search import MIN_POINTS, Found, find, is_cut_off
 from calib.board.corners.to_8bit import Grey, Image, grey, tones
-from calib.board.target import AsymmetricCircles, Charuco, Circles, Target
+from calib.board.target import AsymmetricCircles, Charuco, Chessboard, Circles, Target
 from calib.board.views import CornerView
 
 #: Minimum distance of neighbouring points [px].
@@ -30,6 +32,11 @@ MAX_UNFOCUSED_SHARE, UNFOCUSED = 0.3, 2.0
 _REFINED = 0.13
 #: Minimum distance of points from the image's border [px]; their neighbourhood must be complete.
 MIN_BORDER_PX = 2.0
+
+#: Largest part of the points of a board without markers that may be elsewhere than those beside them say.
+MAX_MISPLACED = 0.1
+#: Largest part of an outer row or column of a chessboard without corners.
+MAX_LOST = 0.5
 
 _CUT_OFF = (
     "the board touches the border of the image: all of it must be seen, with a rim around it. Move it to the middle, "
@@ -72,6 +79,8 @@ def detect(target: Target, image: Image, largest_saturated: float = MAX_SATURATE
         BoardError: unusable image; the subclass is the reason, see `calib.board.corners.errors`.
     """
     levels, (ids, pixels) = _found(target, image)
+    if isinstance(target, AprilGrid) or (isinstance(target, Charuco) and len(ids) < MIN_POINTS):
+        require_one_board(target, levels)
     if len(ids) < MIN_POINTS:
         raise _detection_error(target, image, levels, len(ids))
     pixels = canonical_order(target, pixels, levels)
@@ -94,8 +103,14 @@ def detect(target: Target, image: Image, largest_saturated: float = MAX_SATURATE
     else:
         pixels, is_corner = saddle.refine(levels, pixels, int(np.clip(round(_REFINED * spacing), 2, 10)))
         ids, pixels = ids[is_corner], pixels[is_corner]
-        if len(ids) < MIN_POINTS:
-            raise _detection_error(target, image, levels, len(ids))
+    if len(ids) >= MIN_POINTS:
+        is_good = is_in_place(target, ids, pixels, spacing)
+        _check_order(1 - is_good.mean(), has_markers=isinstance(target, Charuco | AprilGrid))
+        ids, pixels = ids[is_good], pixels[is_good]
+    if len(ids) < MIN_POINTS:
+        raise _detection_error(target, image, levels, len(ids))
+    if isinstance(target, Chessboard):
+        _check_rim(quality.lattice(target, ids, pixels))
     return Detection(ids, pixels, quality.sigma_px(target, ids, pixels), edge, spacing)
 
 
@@ -119,6 +134,28 @@ def _check_whole(
         reach += 0.5 * target.diameter / target.spacing * quality.spacing_px(points)
     if distance < reach:
         raise errors.CutOffError(_CUT_OFF)
+
+
+def _check_order(misplaced: float, has_markers: bool) -> None:
+    """Rejects points without numbers of which more than single ones are not where they should be, 0 to 1."""
+    if misplaced > MAX_MISPLACED and not has_markers:
+        raise errors.HiddenError(
+            f"{misplaced:.0%} of the points that were found do not stand as on the board, as if some were hidden and "
+            "others taken for them: show all of the board, without hands, stains and highlights on it"
+        )
+
+
+def _check_rim(points: NDArray[np.float64]) -> None:
+    """Rejects corners of a chessboard (rows, columns, 2), NaN where hidden, that may all be displaced by a square.
+
+    If an outer row or column is hidden, a search may take the ends of the squares on the other side for corners.
+    """
+    is_lost = np.isnan(points[..., 0])
+    if max(side.mean() for side in (is_lost[0], is_lost[-1], is_lost[:, 0], is_lost[:, -1])) > MAX_LOST:
+        raise errors.HiddenError(
+            "most corners of an outer row or column of the board are hidden, so that the others cannot be numbered: "
+            "take the hand off the squares, or describe the board as it is"
+        )
 
 
 def _check_sharp(edge: float, narrow: float, spacing: float, has_markers: bool) -> None:

@@ -29,6 +29,10 @@ class CutOffError(BoardError):
     """Board cut off by the image's border."""
 
 
+class HiddenError(BoardError):
+    """Hidden points, by which the others are numbered."""
+
+
 class BlurredError(BoardError):
     """Blurred edges bias the corners."""
 

@@ -198,3 +198,11 @@ def test_a_part_of_a_grid_of_discs_is_not_taken_for_the_board(columns: int, rows
     assert len(detect(printed, image).ids) == 48
     with pytest.raises(OtherBoardError, match=f"has more {more} than the {columns} × {rows} of the description"):
         detect(Circles(columns, rows, 0.03, 0.015), image)
+
+
+@pytest.mark.parametrize("target", [GRID, Charuco(7, 5, 0.03, 0.022, "4x4_50")], ids=repr)
+def test_two_copies_of_a_board_are_named(target: AprilGrid | Charuco) -> None:
+    """Columns and rows were doubted, or focus and light."""
+    images = [as_bytes(photograph(target, VGA, centered(target, (0.2, tilt, 0.1), 0.6))) for tilt in (0.2, -0.4)]
+    with pytest.raises(OtherBoardError, match="more than one board"):
+        detect(target, np.hstack(images))

@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 from calib import pose
 from calib.board.corners import errors
 from calib.board.corners.detection import detect
-from calib.board.target import AprilGrid, Charuco, Chessboard, Target
-from tests.calib.board.boards import VGA, as_bytes, centered, photograph
+from calib.board.target import AprilGrid, Charuco, Chessboard, Circles, Target
+from calib.camera import Camera
+from tests.calib.board.boards import VGA, as_bytes, board_pose, centered, photograph
 
 BOARDS = [Chessboard(9, 6, 0.03), Charuco(10, 7, 0.03, 0.0225, "4x4_100")]
 
@@ -54,3 +55,48 @@ def test_a_board_seen_in_part_has_no_corners_at_the_border(target: Target, up: f
     found = detect(target, as_bytes(photograph(target, VGA, T_sb)))
     corners = VGA.project(pose.transform(T_sb, target.points()))
     assert np.abs(found.pixels - corners[found.ids]).max() < 0.1
+
+
+@pytest.mark.parametrize("target", [*BOARDS, AprilGrid(6, 5, 0.03, 0.009), Circles(9, 7, 0.03, 0.018)], ids=repr)
+@pytest.mark.parametrize("seed", range(6))
+def test_a_stain_beside_a_corner_does_not_move_it(target: Target, seed: int) -> None:
+    """Its edge crosses that of a square, or cuts a disc off: the largest of these errors was 10 px."""
+    random = np.random.default_rng(seed)
+    T_sb = centered(target, (0.35, -0.4, 0.2), 0.5)
+    image = as_bytes(photograph(target, VGA, T_sb))
+    corners = VGA.project(pose.transform(T_sb, target.points()))
+    square_px = float(np.linalg.norm(corners[1] - corners[0]))
+    for stained in random.choice(len(corners), 3, replace=False):
+        middle = np.rint(16 * (corners[stained] + random.normal(0, 0.2 * square_px, 2))).astype(int).tolist()
+        radius, level = 16 * random.uniform(0.1, 0.35) * square_px, random.uniform(20, 210)
+        cv2.circle(image, middle, round(radius), level, -1, cv2.LINE_AA, 4)
+    try:
+        found = detect(target, image)
+    except (errors.NothingFoundError, errors.HiddenError):
+        return
+    assert len(found.ids) > 0.75 * len(corners)
+    assert np.abs(found.pixels - corners[found.ids]).max() < 1.5
+
+
+def test_a_board_whose_outer_column_is_hidden_is_not_numbered_from_the_next_one() -> None:
+    """The ends of the outermost squares on the other side were taken for corners, and all of the numbers displaced."""
+    target, camera = Chessboard(9, 6, 0.03), Camera(640, 360, 460, 460, 322, 176)
+    image = as_bytes(photograph(target, camera, board_pose((-0.592, -0.417, -0.212), (-0.15, -0.0893, 0.4463))))
+    for down in (163, 201, 240):
+        cv2.line(image, (412, down), (640, down + 84), 60, 28, cv2.LINE_AA)  # fingers
+    with pytest.raises((errors.HiddenError, errors.NothingFoundError)):
+        detect(target, image)
+
+
+@pytest.mark.parametrize("hidden", [4, 62])
+def test_discs_that_others_are_taken_for_are_not_found(hidden: int) -> None:
+    """With one disc hidden, the search put others in its row and column, some 32 px from their places."""
+    target = Circles(9, 7, 0.03, 0.018)
+    T_sb = centered(target, (0.2, 0.3, -0.1), 0.6)
+    image = as_bytes(photograph(target, VGA, T_sb))
+    discs = VGA.project(pose.transform(T_sb, target.points()))
+    out = discs[hidden] - discs.mean(axis=0)
+    ends = [np.rint(discs[hidden] + far * out / np.linalg.norm(out)).astype(int).tolist() for far in (0, 300)]
+    cv2.line(image, *ends, 115, int(0.8 * np.linalg.norm(discs[1] - discs[0])), cv2.LINE_AA)
+    with pytest.raises(errors.HiddenError, match="others taken for them"):
+        detect(target, image)
