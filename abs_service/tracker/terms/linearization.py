@@ -37,6 +37,7 @@ class Linearization:
         places: of the points that they belong to (m, 3) [m]; empty (0, 3) if they belong to none.
         rows: derivatives (m, 3) with respect to the positions of these [1/m]; likewise.
         shared: sum of the derivatives (s, dim) of the residuals that share an error, times that error's deviation.
+        of_surface: see `PointLinearization`.
     """
 
     residual: NDArray[np.float64]
@@ -44,6 +45,7 @@ class Linearization:
     places: NDArray[np.floating] = field(default_factory=lambda: np.zeros((0, 3)))
     rows: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 3)))
     shared: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
+    of_surface: OfSurface = as_measured
 
     def moved(self, by: NDArray[np.float64]) -> "Linearization":
         """Linearisation with its residuals extrapolated to first order by a step (dim,) of theta."""

@@ -100,12 +100,10 @@ def _information(
     known, most = np.zeros((2, 6, 6))
     if len(part.rows):
         places = np.ascontiguousarray(part.places, np.float64)
-        own, sight = part.rows, np.zeros_like(places)
-        if isinstance(part, PointLinearization):
-            own = part.of_surface(part.rows)
-            if part.center.size:  # of an image
-                sight = places - part.center
-                sight /= np.sqrt(np.einsum("mi,mi->m", sight, sight))[:, None]
+        own, sight = part.of_surface(part.rows), np.zeros_like(places)
+        if isinstance(part, PointLinearization) and part.center.size:  # of an image
+            sight = places - part.center
+            sight /= np.sqrt(np.einsum("mi,mi->m", sight, sight))[:, None]
         add_information(part.rows, own, places, sight, center, size, known, most)
     return known, most
 

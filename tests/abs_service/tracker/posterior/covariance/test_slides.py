@@ -32,6 +32,21 @@ def test_a_board_whose_ends_are_out_of_sight_is_held_by_nothing(half_length_m: f
     assert found == [expected] * 3
 
 
+@pytest.mark.parametrize(("half_length_m", "expected"), [(1.0, "DEGRADED"), (0.2, "TRACKING")])
+def test_ends_that_may_be_those_of_the_view_hold_nothing_in_the_first_images(half_length_m: float, expected: str):
+    """A board before nothing is drawn along itself from the first image on, beneath the last columns without return."""
+    generator, rays = np.random.default_rng(2), CAMERA.unproject(np.ones((CAMERA.height, CAMERA.width)))
+    x, y = 0.7 * rays[..., 0] / rays[..., 2], 0.7 * rays[..., 1] / rays[..., 2]
+    tracker, found = a.Tracker(CAMERA, a.Nurbs()), []
+    for k in range(6):
+        noise, frayed = generator.standard_normal((2, *x.shape))
+        on = (np.abs(x - 0.006 * k + 0.001 * frayed) < half_length_m) & (np.abs(y) < 0.07 + 0.001 * frayed)
+        on[:, :7] = on[:, -7:] = False
+        distance = np.where(on, 0.7 + 0.1 * x**2 + 0.0015 * noise, np.nan)
+        found.append(tracker.track(distance, time_s=k / 30, mask=on).status)
+    assert found == [expected] * 6
+
+
 @pytest.mark.parametrize("has_color", [False, True])
 def test_an_end_that_comes_into_sight_does_not_hold_a_plain_board_that_has_slid(has_color: bool):
     """It is drawn along itself before nothing by 8 mm a frame. Its end pushes the mesh along, wherever that lies on it.
