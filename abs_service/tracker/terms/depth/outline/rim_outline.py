@@ -88,11 +88,7 @@ class RimOutline:
         ends = self._edges.some(free).ends(predicted)
         edges = self._edges.some(free[~is_behind(self._camera, ends, expected, window)])
         points, places, of_edges = image.locate(edges, predicted)
-        if not self._images:
-            self._is_round = is_round(self._camera, points, away, first)
-        is_sure = np.ones(len(places), np.bool_)
-        if self._images < LATER_IMAGES:  # later, what is cut is known
-            is_sure = ~self._may_be_cut(places, distance, window)
+        self._is_round = self._is_round if self._images else is_round(self._camera, points, away, first)
         self._images += 1
         directions = edges.directions(self._camera, predicted, places)
         self._raggedness.update(of_edges, directions, places)  # counts from the next frame on
@@ -102,7 +98,7 @@ class RimOutline:
         return ObservedRimOutline(
             image=image,
             edges=edges,
-            is_sure=is_sure,
+            is_sure=self._are_ends(places, distance, window),
             hidden=len(free) - len(edges.outer),
             covered=self._edges.some(np.flatnonzero(covered)),
             along=rim_directions(places, directions),
@@ -146,12 +142,17 @@ class RimOutline:
         self._was_cut = np.where(np.isfinite(at_first), at_first > 0, self._was_cut)
         return self._was_cut | (now > 0)
 
-    def _may_be_cut(
+    def _are_ends(
         self, places: NDArray[np.float64], distance: NDArray[np.float32], window: Window
     ) -> NDArray[np.bool_]:
-        """True for edges at places (k, 2) near a side of the image, towards which a window has no return."""
+        """False for edges at places (k, 2) near a side of the image, towards which a window has no return.
+
+        That is in the first images: later, what the end of the view cuts is known.
+        """
+        if self._images > LATER_IMAGES:
+            return np.ones(len(places), np.bool_)
         size = np.array([self._camera.width, self._camera.height])
         near = np.concatenate([places > (1 - MARGIN) * size, places < MARGIN * size], axis=1).T
         first, (width, height) = np.array(corner(window)[::-1], np.float32), size.tolist()
-        towards = (read(distance, first, places + BESIDE_PX * step, (width, height)) for step in _TO_SIDES)
-        return np.any(near & ~np.isfinite(list(towards)), axis=0)
+        towards = [read(distance, first, places + BESIDE_PX * step, (width, height)) for step in _TO_SIDES]
+        return ~np.any(near & ~np.isfinite(towards), axis=0)
