@@ -31,7 +31,7 @@ class ObservedRimOutline:
     Attributes:
         image: distances from the outline.
         edges: the free edges (k,) in sight.
-        is_sure: False for those of them (k,) where the object may go on beyond the field of view.
+        is_sure: False for those of them (k,) where the outline may be a silhouette, or the end of the field of view.
         hidden: number of free edges that the predicted mesh itself hides.
         covered: edges beyond which something hid the object in the first image, or that its border cut.
         along: unit directions of the rim in the image (k, 2) at the free edges, see `rim_directions`.

@@ -18,7 +18,7 @@ from abs_service.tracker.terms.depth.classification.visibility import Visibility
 from abs_service.tracker.terms.depth.outline.observed_outline import ObservedRimOutline
 from abs_service.tracker.terms.depth.outline.raggedness import Raggedness
 from abs_service.tracker.terms.depth.outline.rim import Edges, OutlineImage, Rim, is_behind, read
-from abs_service.tracker.terms.depth.outline.rim_classes import RimClass, classify_rim
+from abs_service.tracker.terms.depth.outline.rim_classes import RimClass, classify_rim, turns_away
 from abs_service.tracker.terms.depth.outline.rim_cost import FARTHEST, rim_cost
 from abs_service.tracker.terms.depth.outline.rim_gap import exact_gap
 from abs_service.tracker.terms.depth.outline.rim_normal import rim_directions
@@ -98,7 +98,7 @@ class RimOutline:
         return ObservedRimOutline(
             image=image,
             edges=edges,
-            is_sure=self._are_ends(places, distance, window),
+            is_sure=self._are_ends(edges, predicted, places, distance, window),
             hidden=len(free) - len(edges.outer),
             covered=self._edges.some(np.flatnonzero(covered)),
             along=rim_directions(places, directions),
@@ -143,16 +143,23 @@ class RimOutline:
         return self._was_cut | (now > 0)
 
     def _are_ends(
-        self, places: NDArray[np.float64], distance: NDArray[np.float32], window: Window
+        self,
+        edges: Edges,
+        predicted: Surface,
+        places: NDArray[np.float64],
+        distance: NDArray[np.float32],
+        window: Window,
     ) -> NDArray[np.bool_]:
-        """False for edges at places (k, 2) near a side of the image, towards which a window has no return.
+        """True for edges at places (k, 2) where the outline is the object's end, and no silhouette or end of the view.
 
-        That is in the first images: later, what the end of the view cuts is known.
+        The latter is doubted in the first images, near a side of the image, if a window (rows, columns) has no return
+        towards it: later, what the end of the view cuts is known.
         """
+        are_ends = ~turns_away(self._camera, predicted, edges.outer, edges.inner)
         if self._images > LATER_IMAGES:
-            return np.ones(len(places), np.bool_)
+            return are_ends
         size = np.array([self._camera.width, self._camera.height])
         near = np.concatenate([places > (1 - MARGIN) * size, places < MARGIN * size], axis=1).T
         first, (width, height) = np.array(corner(window)[::-1], np.float32), size.tolist()
         towards = [read(distance, first, places + BESIDE_PX * step, (width, height)) for step in _TO_SIDES]
-        return ~np.any(near & ~np.isfinite(towards), axis=0)
+        return are_ends & ~np.any(near & ~np.isfinite(towards), axis=0)

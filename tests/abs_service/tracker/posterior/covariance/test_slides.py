@@ -66,6 +66,25 @@ def test_an_end_that_comes_into_sight_does_not_hold_a_plain_board_that_has_slid(
     assert "TRACKING" not in found
 
 
+def test_silhouettes_of_a_sheet_that_rolls_up_are_no_ends_that_hold_it():
+    """30 cm long and plain, it moves before nothing and bends to 200°: its ends turn away, and the mesh slides."""
+    generator, rays = np.random.default_rng(3), CAMERA.unproject(np.ones((CAMERA.height, CAMERA.width)))
+    u, v = rays[..., 0] / rays[..., 2], rays[..., 1] / rays[..., 2]
+    tracker, found = a.Tracker(CAMERA, a.Nurbs()), []
+    for k in range(41):
+        radius, middle = 0.3 / np.deg2rad(3 + 197 * k / 40), 0.06 * np.sin(k / 12)
+        behind = 0.7 + radius  # the axis of a cylinder, whose nearest point on every ray is z (u, v, 1)
+        along, square = behind + u * middle, 1 + u**2
+        root = along**2 - square * (behind**2 + middle**2 - radius**2)
+        z = (along - np.sqrt(np.maximum(root, 0))) / square
+        place = radius * np.arctan2(u * z - middle, behind - z)
+        on = (root > 0) & (np.abs(place) < 0.15) & (np.abs(v * z) < 0.1)
+        distance = np.where(on, z, np.nan) + 0.0015 * generator.standard_normal(z.shape)
+        found.append(tracker.track(distance, time_s=k / 30, mask=on).status)
+    assert found[:20] == ["TRACKING"] * 20
+    assert "TRACKING" not in found[-10:]
+
+
 def test_a_print_that_is_seen_obliquely_holds_a_mat_on_a_table():
     """It lies at 70°: a slide along the table goes along the line of sight for the most part. It is as fine across."""
     generator, rays = np.random.default_rng(0), CAMERA.unproject(np.ones((CAMERA.height, CAMERA.width)))
