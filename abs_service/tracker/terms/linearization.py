@@ -13,6 +13,19 @@ from abs_service.tracker.terms.grouped import GroupedLinearization
 #: Covariance (n, 3, 3) of the points of a sparse Jacobian, from that of theta.
 AtPoints = Callable[[SparseJacobian], NDArray[np.float64]]
 
+#: Derivatives (m, 3) of residuals by what is known of the surface itself, from those by the measurements (m, 3).
+OfSurface = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+
+
+def as_measured(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The derivatives (m, 3) by the measurements: what these show is the surface's own."""
+    return rows
+
+
+def of_anything(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Zeros (m, 3): whatever part of the surface is there, the residuals are the same."""
+    return np.zeros_like(rows)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Linearization:
@@ -24,6 +37,7 @@ class Linearization:
         places: of the points that they belong to (m, 3) [m]; empty (0, 3) if they belong to none.
         rows: derivatives (m, 3) with respect to the positions of these [1/m]; likewise.
         shared: sum of the derivatives (s, dim) of the residuals that share an error, times that error's deviation.
+        of_surface: see `PointLinearization`.
     """
 
     residual: NDArray[np.float64]
@@ -31,6 +45,7 @@ class Linearization:
     places: NDArray[np.floating] = field(default_factory=lambda: np.zeros((0, 3)))
     rows: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 3)))
     shared: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
+    of_surface: OfSurface = as_measured
 
     def moved(self, by: NDArray[np.float64]) -> "Linearization":
         """Linearisation with its residuals extrapolated to first order by a step (dim,) of theta."""
@@ -74,6 +89,7 @@ class PointLinearization:
         positions: of all points (n, 3) [m].
         shared: derivatives (m, s) with respect to errors that the residuals share, times those errors' deviations.
         center: of the camera (3,) [m] that tells of motion across its lines of sight only; empty (0,) for distances.
+        of_surface: what of the derivatives the surface itself has; only this tells which part of it is where.
     """
 
     residual: NDArray[np.float64]
@@ -83,6 +99,7 @@ class PointLinearization:
     positions: NDArray[np.floating]
     shared: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
     center: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    of_surface: OfSurface = as_measured
 
     @classmethod
     def empty(cls, sparse_jacobian: SparseJacobian) -> "PointLinearization":

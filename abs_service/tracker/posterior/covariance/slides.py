@@ -92,23 +92,27 @@ def _information(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Information of residuals on rigid motions, and what it were in the direction of most, each (6, 6).
 
+    A measurement tells of a motion what its derivatives and the surface's own have in common. Noise in the two is
+    independent. What comes to lie beneath the surface, or beside its end, has no counterpart in it.
+
     A gradient in an image lies across the line of sight, however steeply that meets the surface, and is off within the
     image only.
     """
     known, most = np.zeros((2, 6, 6))
     if len(part.rows):
         places = np.ascontiguousarray(part.places, np.float64)
-        sight = np.zeros_like(places)
+        own, sight = part.of_surface(part.rows), np.zeros_like(places)
         if isinstance(part, PointLinearization) and part.center.size:  # of an image
             sight = places - part.center
             sight /= np.sqrt(np.einsum("mi,mi->m", sight, sight))[:, None]
-        add_information(part.rows, places, sight, center, size, known, most)
+        add_information(part.rows, own, places, sight, center, size, known, most)
     return known, most
 
 
 @kernel
 def add_information(
     rows: NDArray[np.float64],
+    own: NDArray[np.float64],
     places: NDArray[np.float64],
     sight: NDArray[np.float64],
     center: NDArray[np.float64],
@@ -116,15 +120,18 @@ def add_information(
     known: NDArray[np.float64],
     most: NDArray[np.float64],
 ) -> None:
-    """Adds up (row M)ᵀ(row M) and |row|² Mᵀ(1 − s sᵀ)M, of the motions M (3, 6) of every place; see `_motions`.
+    """Adds up (row M)ᵀ(own M) and |row|² Mᵀ(1 − s sᵀ)M, of the motions M (3, 6) of every place; see `_motions`.
+
+    Of the first, the symmetric part.
 
     Args:
         rows, places: derivatives [1/m] of residuals with respect to their places [m], each (m, 3).
+        own: the same derivatives (m, 3), by the surface itself.
         sight: directions s (m, 3) in which an error of the row's direction does not lie, of length 1; or 0.
         center, size: of the motions (3,) [m] and [m].
         known, most: the sums (6, 6), zeros before.
     """
-    seen, unseen, along = np.empty(6), np.empty(6), np.zeros((3, 6))
+    seen, shown, unseen, along = np.empty(6), np.empty(6), np.empty(6), np.zeros((3, 6))
     along[0, 0] = along[1, 1] = along[2, 2] = 1.0
     for m in range(rows.shape[0]):
         a, b, c = rows[m, 0], rows[m, 1], rows[m, 2]
@@ -134,13 +141,15 @@ def add_information(
             (places[m, 2] - center[2]) / size,
         )
         seen[0], seen[1], seen[2], seen[3], seen[4], seen[5] = a, b, c, y * c - z * b, z * a - x * c, x * b - y * a
+        shown[0], shown[1], shown[2] = d, e, f = own[m, 0], own[m, 1], own[m, 2]
+        shown[3], shown[4], shown[5] = y * f - z * e, z * d - x * f, x * e - y * d
         along[0, 4], along[0, 5], along[1, 3], along[1, 5], along[2, 3], along[2, 4] = z, -y, -z, x, y, -x
         square = a * a + b * b + c * c
         for i in range(6):
             unseen[i] = sight[m, 0] * along[0, i] + sight[m, 1] * along[1, i] + sight[m, 2] * along[2, i]
         for i in range(6):
             for j in range(6):
-                known[i, j] += seen[i] * seen[j]
+                known[i, j] += 0.5 * (seen[i] * shown[j] + shown[i] * seen[j])
                 moved = along[0, i] * along[0, j] + along[1, i] * along[1, j] + along[2, i] * along[2, j]
                 most[i, j] += square * (moved - unseen[i] * unseen[j])
 

@@ -15,7 +15,7 @@ from abs_service.tracker.terms.depth.outline.base import ObservedOutline
 from abs_service.tracker.terms.depth.pixel_classes import PixelClasses
 from abs_service.tracker.terms.depth.texels import Texels
 from abs_service.tracker.terms.gradients import color_rows, depth_rows
-from abs_service.tracker.terms.linearization import Part, PointLinearization
+from abs_service.tracker.terms.linearization import Part, PointLinearization, of_anything
 from abs_service.tracker.terms.patches import Patches
 from abs_service.tracker.terms.sensor_fit import Remainder, SensorFit, summarize
 from abs_service.tracker.terms.vertex_counts import VertexMasks
@@ -105,7 +105,9 @@ class ObservedDepth:
         distances = np.ascontiguousarray(free_m[1:-1, 1:-1, None])
         weight = 1 / np.sqrt(FREE_SCALE_M * np.maximum(away[out], MIN_FREE_M))
         rows = color_rows(distances, self.view.camera, vertices[out])[:, 0] * weight[:, None]
-        return PointLinearization(away[out] * weight, rows, np.flatnonzero(out), samples, vertices)
+        return PointLinearization(
+            away[out] * weight, rows, np.flatnonzero(out), samples, vertices, of_surface=of_anything
+        )
 
     def fit(self, surface: Surface) -> SensorFit:
         """Agreement of the sensor with a population of one."""

@@ -1,6 +1,7 @@
 """Term of a colour sensor: measured colours compared with those of the vertices."""
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,6 +9,7 @@ from numpy.typing import NDArray
 from abs_service.pairing.images import ColorImage, Image, Window
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import ObservedView, Resampling, Synthesis, Synthesizer
+from abs_service.tracker.synthesis.perspective import project_with_jacobian
 from abs_service.tracker.terms.base import NO_OCCLUDERS, Bounds, Prediction, facing
 from abs_service.tracker.terms.gradients import noiseless_color_rows
 from abs_service.tracker.terms.linearization import Part, PointLinearization
@@ -160,9 +162,32 @@ class ObservedColor:
         points = np.repeat(use, residual.shape[1])
         samples = seen.interpolation.follow(sparse_jacobian)
         bias = self.bias.derivatives(vertices, rows, points)
-        return [
-            PointLinearization(residual[use].ravel(), rows, points, samples, vertices, bias, self.view.camera.center)
-        ]
+        own = partial(self._of_appearance, seen, use, vertices[use], inverse)
+        center = self.view.camera.center
+        return [PointLinearization(residual[use].ravel(), rows, points, samples, vertices, bias, center, own)]
+
+    def _of_appearance(
+        self,
+        seen: Synthesis,
+        use: NDArray[np.intp],
+        vertices: NDArray[np.floating],
+        inverse: NDArray[np.float32],
+        rows: NDArray[np.float64],
+    ) -> NDArray[np.float64]:
+        """Derivatives (3 m, 3) of residuals by gradients of the appearance; those by the image's where unknown.
+
+        Args:
+            seen: the synthesis of a population of one.
+            use: indices of its samples (m,).
+            vertices: their positions (m, 3) [m].
+            inverse: inverse deviations (m, 3).
+            rows: derivatives (3 m, 3) by gradients of the image.
+        """
+        gradients = self.view.attribute_gradients(seen)[use] * inverse[..., None]
+        own = (gradients @ project_with_jacobian(self.view.camera, vertices)[1]).reshape(rows.shape)
+        own = np.where(np.isnan(own), rows, own)
+        # In the first image, the noise of the two is the same; it has been taken away from the image's only.
+        return own * np.sqrt(min(np.vdot(rows, rows) / max(np.vdot(own, own), 1e-300), 1.0))
 
     def fit(self, surface: Surface) -> SensorFit:
         """Agreement of the sensor with a population of one."""

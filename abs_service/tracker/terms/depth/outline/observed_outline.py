@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +31,7 @@ class ObservedRimOutline:
     Attributes:
         image: distances from the outline.
         edges: the free edges (k,) in sight.
+        is_sure: False for those of them (k,) where the outline may be a silhouette, or the end of the field of view.
         hidden: number of free edges that the predicted mesh itself hides.
         covered: edges beyond which something hid the object in the first image, or that its border cut.
         along: unit directions of the rim in the image (k, 2) at the free edges, see `rim_directions`.
@@ -42,6 +44,7 @@ class ObservedRimOutline:
 
     image: OutlineImage
     edges: Edges
+    is_sure: NDArray[np.bool_]
     hidden: int
     covered: Edges
     along: NDArray[np.float64]
@@ -72,7 +75,8 @@ class ObservedRimOutline:
         jacobian = np.zeros((len(use), sparse_jacobian.dimension))
         chain(rows, self.edges.some(use), sparse_jacobian.blocks, jacobian)
         shared = _shared_by_side(jacobian, residual[use], gradients[use])
-        return Linearization(residual[use], jacobian, points[use], rows, shared)
+        own = partial(np.multiply, self.is_sure[use, None])
+        return Linearization(residual[use], jacobian, points[use], rows, shared, own)
 
     def match(self, surface: Surface, sparse_jacobian: SparseJacobian) -> PointLinearization:
         """Residuals of the places of outermost vertices, if a slide and a turn lay the edges on the outline."""

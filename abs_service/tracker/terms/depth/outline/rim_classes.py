@@ -88,13 +88,12 @@ def classify_rim(
     far = ~goes_on & (inside > LARGEST_MISS_PX) & (not rim.is_end)
     goes_on[far] = _leaves(camera, (outer + _ALMOST * gap[:, None] * step)[far], distance)
     hidden, unseen = _unseen(camera, [outer + by * step for by in _HIDING_STEPS], inside_at)
-    # Extrapolated to the end of the surface, which lies about as far outside the outer vertex as the inner one inside.
-    turns_away = 2 * _cosine(camera, surface, rim.outer) - _cosine(camera, surface, rim.inner) < MIN_COSINE
+    turned = turns_away(camera, surface, rim.outer, rim.inner)
     unknown = inside > camera.width + camera.height
     at_border = ~_is_within(camera, place, BORDER_PX)
     cut = _ends_at_border(camera.project(ends), distance) & (not rim.is_end)
     classes = np.select(  # the first that holds
-        [at_border, unknown, turns_away, goes_on & hidden, goes_on, cut],
+        [at_border, unknown, turned, goes_on & hidden, goes_on, cut],
         [RimClass.BORDER, unseen, RimClass.SILHOUETTE, unseen, RimClass.CONTACT, RimClass.BORDER],
         RimClass.FREE,
     ).astype(np.uint8)
@@ -105,6 +104,14 @@ def classify_rim(
     classes[(classes == RimClass.FREE) & _are_few(classes)] = RimClass.CONTACT
     gap[(classes != RimClass.FREE) | rim.is_end] = 0.0
     return classes, gap.astype(np.float32)
+
+
+def turns_away(camera: Camera, surface: Surface, outer: NDArray[np.intp], inner: NDArray[np.intp]) -> NDArray[np.bool_]:
+    """True for edges (k,) of a population of one at which the surface turns away from a camera: what ends is its image.
+
+    Extrapolated to the end of the surface, which lies about as far outside the outer vertex as the inner one inside.
+    """
+    return 2 * _cosine(camera, surface, outer) - _cosine(camera, surface, inner) < MIN_COSINE
 
 
 def _are_few(classes: NDArray[np.uint8]) -> bool:

@@ -12,12 +12,13 @@ from abs_service.pairing.images import Window
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.synthesis.projection import Projection
 from abs_service.tracker.synthesis.window import WHOLE, corner
+from abs_service.tracker.terms.depth.classification.fixed_edges import LATER_IMAGES, MARGIN
 from abs_service.tracker.terms.depth.classification.outline_distance import inwards
 from abs_service.tracker.terms.depth.classification.visibility import Visibility
 from abs_service.tracker.terms.depth.outline.observed_outline import ObservedRimOutline
 from abs_service.tracker.terms.depth.outline.raggedness import Raggedness
 from abs_service.tracker.terms.depth.outline.rim import Edges, OutlineImage, Rim, is_behind, read
-from abs_service.tracker.terms.depth.outline.rim_classes import RimClass, classify_rim
+from abs_service.tracker.terms.depth.outline.rim_classes import RimClass, classify_rim, turns_away
 from abs_service.tracker.terms.depth.outline.rim_cost import FARTHEST, rim_cost
 from abs_service.tracker.terms.depth.outline.rim_gap import exact_gap
 from abs_service.tracker.terms.depth.outline.rim_normal import rim_directions
@@ -32,6 +33,9 @@ OFF_PX = 3.0
 
 #: Where the field of view turns out to end so many pixels beside a free edge, it cuts the object there [px].
 BESIDE_PX = 2.0
+
+#: Steps (column, row) towards the right, lower, left and upper side of the image.
+_TO_SIDES = np.array([[1, 0], [0, 1], [-1, 0], [0, -1]])
 
 
 class RimOutline:
@@ -61,7 +65,7 @@ class RimOutline:
         self._first, self._was_cut = np.zeros((len(rim.outer), 2)), np.zeros(len(rim.outer), np.bool_)
         self._raggedness = Raggedness(deviation, ragged)
         self._min_off_px = max(OFF_PX, FARTHEST * deviation)
-        self._begun, self._is_round = False, False
+        self._images, self._is_round = 0, False
 
     def observe(
         self,
@@ -77,16 +81,15 @@ class RimOutline:
         part, away = inwards(distance, seen, int(np.ceil(FARTHEST * deviation)) + 1)
         first = np.add(corner(window), corner(part))[::-1].astype(np.float32)
         image = OutlineImage(self._camera, self._projection, away, first)
-        if not self._begun:
+        if not self._images:
             self._classify(image, predicted, distance)
         is_cut = self._find_cut(predicted, seen.beyond, window)
         free = np.flatnonzero((self.classes == RimClass.FREE) & ~is_cut)
         ends = self._edges.some(free).ends(predicted)
         edges = self._edges.some(free[~is_behind(self._camera, ends, expected, window)])
         points, places, of_edges = image.locate(edges, predicted)
-        if not self._begun:
-            self._is_round = is_round(self._camera, points, away, first)
-            self._begun = True
+        self._is_round = self._is_round if self._images else is_round(self._camera, points, away, first)
+        self._images += 1
         directions = edges.directions(self._camera, predicted, places)
         self._raggedness.update(of_edges, directions, places)  # counts from the next frame on
         doubtful = np.zeros(distance.shape, np.bool_)
@@ -95,6 +98,7 @@ class RimOutline:
         return ObservedRimOutline(
             image=image,
             edges=edges,
+            is_sure=self._are_ends(edges, predicted, places, distance, window),
             hidden=len(free) - len(edges.outer),
             covered=self._edges.some(np.flatnonzero(covered)),
             along=rim_directions(places, directions),
@@ -135,3 +139,25 @@ class RimOutline:
         at_first, now = (read(image, first, places, last) for places in (self._first, self._beside(surface)))
         self._was_cut = np.where(np.isfinite(at_first), at_first > 0, self._was_cut)
         return self._was_cut | (now > 0)
+
+    def _are_ends(
+        self,
+        edges: Edges,
+        predicted: Surface,
+        places: NDArray[np.float64],
+        distance: NDArray[np.float32],
+        window: Window,
+    ) -> NDArray[np.bool_]:
+        """True for edges at places (k, 2) where the outline is the object's end, and no silhouette or end of the view.
+
+        The latter is doubted in the first images, near a side of the image, if a window (rows, columns) has no return
+        towards it: later, what the end of the view cuts is known.
+        """
+        are_ends = ~turns_away(self._camera, predicted, edges.outer, edges.inner)
+        if self._images > LATER_IMAGES:
+            return are_ends
+        size = np.array([self._camera.width, self._camera.height])
+        near = np.concatenate([places > (1 - MARGIN) * size, places < MARGIN * size], axis=1).T
+        first, (width, height) = np.array(corner(window)[::-1], np.float32), size.tolist()
+        towards = [read(distance, first, places + BESIDE_PX * step, (width, height)) for step in _TO_SIDES]
+        return are_ends & ~np.any(near & ~np.isfinite(towards), axis=0)
