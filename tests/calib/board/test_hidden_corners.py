@@ -96,7 +96,7 @@ def test_discs_that_others_are_taken_for_are_not_found(hidden: int) -> None:
     image = as_bytes(photograph(target, VGA, T_sb))
     discs = VGA.project(pose.transform(T_sb, target.points()))
     out = discs[hidden] - discs.mean(axis=0)
-    ends = [np.rint(discs[hidden] + far * out / np.linalg.norm(out)).astype(int).tolist() for far in (0, 300)]
-    cv2.line(image, *ends, 115, int(0.8 * np.linalg.norm(discs[1] - discs[0])), cv2.LINE_AA)
+    first, last = (np.rint(discs[hidden] + far * out / np.linalg.norm(out)).astype(int).tolist() for far in (0, 300))
+    cv2.line(image, first, last, 115, int(0.8 * np.linalg.norm(discs[1] - discs[0])), cv2.LINE_AA)
     with pytest.raises(errors.HiddenError, match="others taken for them"):
         detect(target, image)
