@@ -188,6 +188,7 @@ _GOES_ON = (
     "something lies against it, or where the mesh has shrunk or slid – take away what lies against it; a new mesh "
     "is made if that lasts"
 )
+_PAST_THE_END = "a side that the first image did not show to its end hangs over that end, by an unknown distance"
 
 #: Why a vertex is not seen to agree, and what to do.
 _ABSENT = {
@@ -202,9 +203,8 @@ def _placed(fits: Sequence[SensorFit], shape: ShapeQuality, innovation: float, l
     """Reasons by where the mesh lies."""
     if is_misplaced(fits, shape, limits):
         off_m, why = rim_distance(fits), _SLID if hangs_over(fits) else _GOES_ON
-        by = f"{off_m * 1e3:.0f} mm" if np.isfinite(off_m) else "an unknown distance"
-        off = f"{rim_share(fits):.0%} of the free edges lie off the object's outline"
-        yield f"{off}, by {by} together or across a slide: {why}"
+        off = f"{rim_share(fits):.0%} of the free edges lie off the object's outline, by {off_m * 1e3:.0f} mm together"
+        yield f"{off} or across a slide: {why}" if np.isfinite(off_m) else f"{_PAST_THE_END}: {_SLID}"
     if any(fit.is_surprised for fit in fits) and not any(np.isfinite(fit.remainder.share) for fit in fits):
         yield (
             "nothing was where the object was expected, so neither its outline nor what lies beside it is judged – "
