@@ -6,8 +6,9 @@ from dataclasses import replace
 import numpy as np
 
 from calib import pose
-from calib.board.views import CornerView
+from calib.board.views import CornerView, PlaneView
 from calib.camera import Camera
+from calib.lenses.lens import LensError
 from calib.pose import Pose
 from calib.solve.bundle.adjustment import NotSolvedError, search
 from calib.solve.bundle.formulation import formulate
@@ -31,8 +32,8 @@ def start(task: Task, note: Callable[[str], None]) -> tuple[Task, State]:
     cameras: dict[str, Camera] = {}
     seen: dict[str, dict[int, list[PoseCandidate]]] = {}
     for name, sensor in task.sensors.items():
-        views = [view for view in task.corners if view.sensor == name]
-        cameras[name] = _camera(name, sensor, views, note)
+        views, planes = ([view for view in each if view.sensor == name] for each in (task.corners, task.planes))
+        cameras[name] = _camera(name, sensor, views, planes, note)
         found = {view.shot: pose_candidates(cameras[name], view) for view in views}
         if views and not any(found.values()):
             raise NotSolvedError(f"{name}: no view shows a board that its camera could have seen")
@@ -47,14 +48,34 @@ def start(task: Task, note: Callable[[str], None]) -> tuple[Task, State]:
     return usable, placed
 
 
-def _camera(name: str, sensor: SensorTask, views: Sequence[CornerView], note: Callable[[str], None]) -> Camera:
+def _camera(
+    name: str,
+    sensor: SensorTask,
+    views: Sequence[CornerView],
+    planes: Sequence[PlaneView],
+    note: Callable[[str], None],
+) -> Camera:
     if sensor.fixed_intrinsics or (sensor.factory and not views):
         return sensor.factory[0]
     if not views:
         raise NotSolvedError(f"{name}: sees no corners, so its intrinsics have to be given and kept")
     known = sensor.factory or (initial_camera(sensor.width, sensor.height, sensor.lens, views),)
     note(f"{name}: {len(views)} views, focal length about {known[0].fx:.0f} px to begin with")
-    return fit_camera(name, sensor, views, known[0]) if sensor.factory else fit_unknown(name, sensor, views, known[0])
+    fit = fit_camera if sensor.factory else fit_unknown
+    camera, free = fit(name, sensor, views, known[0]), sensor.lens.coefficients
+    while free and not all(_has_inverse(camera, view) for view in planes):
+        free = free[:-1]  # coarse corners may leave a lens that folds back beyond them, where planes were measured
+        fixed = (*sensor.fixed, *sensor.lens.coefficients[len(free) :])
+        camera = fit(name, replace(sensor, fixed=fixed), views, known[0])
+    return camera
+
+
+def _has_inverse(camera: Camera, view: PlaneView) -> bool:
+    try:
+        camera.directions(view.pixels)
+    except LensError:
+        return False
+    return True
 
 
 def fit_unknown(name: str, sensor: SensorTask, views: Sequence[CornerView], first: Camera) -> Camera:

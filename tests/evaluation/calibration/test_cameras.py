@@ -31,6 +31,13 @@ def test_circles_give_the_published_intrinsics(data_set: Callable[[str], Path]) 
     assert np.abs(found[2:] - published.matrix[2:]).max() < 1.5
 
 
+@pytest.mark.parametrize("seed", [2, 29])
+def test_a_lens_that_folds_back_beyond_coarse_corners_begins_with_fewer_coefficients(seed: int) -> None:
+    """It was an error that the distortion has no inverse, where distances were measured beside the corners."""
+    alone, with_planes = simulated_rig.tof_errors(seed, corner_sigma=1.0)
+    assert with_planes < 1.5e-3 < alone
+
+
 @pytest.mark.slow
 def test_a_stereo_pair_stands_where_opencv_says(data_set: Callable[[str], Path]) -> None:
     views = published_boards.stereo(data_set("calib_opencv_stereo"))
