@@ -82,12 +82,14 @@ def require_matching_sensors(task: Task) -> None:
     """
     for view in task.corners:
         sensor = task.sensors[view.sensor]
-        if np.any(view.pixels < -0.5) or np.any(view.pixels > (sensor.width - 0.5, sensor.height - 0.5)):
+        size = np.array([sensor.width, sensor.height])
+        outside = view.pixels[np.any((view.pixels < -0.5) | (view.pixels > size - 0.5), axis=1)]
+        if len(outside):
             fits = [name for name, other in task.sensors.items() if name != view.sensor and _fits(view, other.width)]
             hint = f"; they would fit {' or '.join(fits)}: are the names mixed up?" if fits else ""
             raise MixedUpError(
-                f"{view.sensor}, shot {view.shot}: corners at up to {view.pixels.max(axis=0).round().tolist()} do not "
-                f"lie in an image of {sensor.width} × {sensor.height} pixels{hint}"
+                f"{view.sensor}, shot {view.shot}: a corner at {outside[0].round(1).tolist()} does not lie in an image "
+                f"of {sensor.width} × {sensor.height} pixels{hint}"
             )
     factory = {name: sensor.factory[0] for name, sensor in task.sensors.items() if sensor.factory}
     for a, b in combinations(factory, 2):
@@ -97,7 +99,7 @@ def require_matching_sensors(task: Task) -> None:
 
 
 def _fits(view: CornerView, width: int) -> bool:
-    return bool(view.pixels[:, 0].max() < width)
+    return bool(view.pixels.min() >= -0.5 and view.pixels[:, 0].max() < width)
 
 
 def _require_not_swapped(a: str, b: str, factory: Mapping[str, Camera], task: Task) -> None:

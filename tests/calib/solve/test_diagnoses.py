@@ -101,6 +101,18 @@ def test_corners_outside_the_image_tell_whose_they_might_be() -> None:
         calibrate(replace(task, corners=swapped))
 
 
+def test_a_corner_beside_the_image_is_named_and_fits_no_other_sensor() -> None:
+    """It was said that the largest of all coordinates is outside, and that the views would fit another sensor."""
+    _, task = scene()
+    view = task.corners[0]
+    pixels = view.pixels.copy()
+    pixels[3] = -0.7, 12
+    with pytest.raises(
+        MixedUpError, match=rf"{view.sensor}, shot {view.shot}: a corner at \[-0\.7, 12\.0\] .* pixels$"
+    ):
+        calibrate(replace(task, corners=[replace(view, pixels=pixels), *task.corners[1:]]))
+
+
 def test_kept_intrinsics_of_another_mode_are_noticed() -> None:
     heads, task = scene()
     wrong = replace(heads["color"].camera, fx=1400.0, fy=1400.0)
