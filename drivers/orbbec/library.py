@@ -3,6 +3,7 @@
 import ctypes
 import os
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
@@ -11,6 +12,10 @@ from typing import Any
 from drivers.contract.device import SdkMissingError
 from drivers.contract.discovery import UDEV_REMEDY
 from drivers.contract.errors import translated_sdk_errors
+
+#: Threads of a context begin within this time [s]. One that has not when the context ends is not told, and the end
+#: waits for it for 60 s (SDK 2.9).
+_BEGINS_S = 0.1
 
 #: The wheel's requirements are those of its examples: 2 GB, and an older NumPy than ours.
 _INSTALL = ".venv/bin/pip install --no-deps pyorbbecsdk2"
@@ -32,7 +37,9 @@ def load() -> Any:
 
 def context(ob: Any) -> Any:
     """The SDK's context with `sdk.xml`; the settings hold while somebody holds it."""
-    return ob.Context(str(Path(__file__).with_name("sdk.xml")))
+    made = ob.Context(str(Path(__file__).with_name("sdk.xml")))
+    time.sleep(_BEGINS_S)
+    return made
 
 
 def translated_errors(uri: str) -> AbstractContextManager[None]:
