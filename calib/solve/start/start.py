@@ -32,7 +32,8 @@ def start(task: Task, note: Callable[[str], None]) -> tuple[Task, State]:
     cameras: dict[str, Camera] = {}
     seen: dict[str, dict[int, list[PoseCandidate]]] = {}
     for name, sensor in task.sensors.items():
-        views, planes = ([view for view in each if view.sensor == name] for each in (task.corners, task.planes))
+        views = [view for view in task.corners if view.sensor == name]
+        planes = [view for view in task.planes if view.sensor == name]
         cameras[name] = _camera(name, sensor, views, planes, note)
         found = {view.shot: pose_candidates(cameras[name], view) for view in views}
         if views and not any(found.values()):
