@@ -8,6 +8,9 @@ from typing import Any
 
 from calib.jit import Kernel
 
+#: The time for the rest is told once this share of all code is compiled: before, it is mostly the start of the workers.
+_TELLING_SHARE = 0.05
+
 #: A kernel, and the types of its arguments.
 Task = tuple[Kernel, tuple[Any, ...]]
 
@@ -36,10 +39,10 @@ class KernelQueue:
 
     @property
     def left_s(self) -> float:
-        """Estimated time for the remaining kernels, by the size of their code [s]; infinite as long as none is done."""
+        """Estimated time for the remaining kernels, by the size of their code [s]; infinite as long as few are done."""
         with self._changed:
             share = self._done_size / self._size if self._done_size else 0.0
-        return (self._clock() - self._began_s) * (1 / share - 1) if share else inf
+        return (self._clock() - self._began_s) * (1 / share - 1) if share >= _TELLING_SHARE else inf
 
     def put(self, task: Task) -> None:
         """Adds a kernel."""

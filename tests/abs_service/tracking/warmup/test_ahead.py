@@ -109,14 +109,17 @@ def test_progress_says_how_many_and_how_long() -> None:
 def test_the_largest_kernel_is_compiled_first_and_the_rest_is_judged_by_size() -> None:
     now_s = 100.0
     queue = KernelQueue(lambda: now_s)
-    for size in (1, 4, 15):
+    for size in (10, 40, 150, 1):
         queue.put((cast(Kernel, SimpleNamespace(size=size, digest=str(size))), ()))
     assert queue.left_s == inf
-    taken = [cast(Any, queue.take())[0] for _ in range(3)]
-    assert [kernel.size for kernel in taken] == [15, 4, 1]
-    now_s += 30
+    taken = [cast(Any, queue.take())[0] for _ in range(4)]
+    assert [kernel.size for kernel in taken] == [150, 40, 10, 1]
+    now_s += 0.2
+    queue.finish(taken[3])
+    assert queue.left_s == inf, "so little tells nothing: a start on a busy machine began with 3279 s"
+    now_s += 29.8
     queue.finish(taken[0])
-    assert queue.left_s == pytest.approx(10)
-    assert (queue.done, queue.total) == (1, 3)
+    assert queue.left_s == pytest.approx(30 * 50 / 151)
+    assert (queue.done, queue.total) == (2, 4)
     queue.close()
     assert queue.take() is None
