@@ -5,6 +5,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.board.april_grid import BORDER, TAGS, AprilGrid
+from calib.board.corners.markers import find_markers
 from calib.board.corners.to_8bit import Grey
 
 #: Factors by which the image is enlarged, and widths by which white grows, of every attempt. Black squares touch the
@@ -35,13 +36,8 @@ def _tags(levels: Grey, enlarged: int, grown: int) -> dict[int, NDArray[np.float
         image = cv2.resize(levels, None, fx=enlarged, fy=enlarged, interpolation=cv2.INTER_CUBIC)
     if grown > 1:
         image = cv2.dilate(image, np.ones((grown, grown), np.uint8))
-    parameters = cv2.aruco.DetectorParameters()
-    parameters.markerBorderBits = BORDER
-    found, numbers, _ = cv2.aruco.ArucoDetector(TAGS, parameters).detectMarkers(image)
-    if numbers is None:
-        return {}
-    corners = [(each.reshape(4, 2).astype(np.float64) + 0.5) / enlarged - 0.5 for each in found]
-    return {int(number): each for number, each in zip(numbers.ravel(), corners, strict=True)}
+    numbers, corners = find_markers(image, TAGS, BORDER)
+    return dict(zip(numbers.tolist(), (corners.astype(np.float64) + 0.5) / enlarged - 0.5, strict=True))
 
 
 def _at_the_corners(levels: Grey, corners: NDArray[np.float64]) -> NDArray[np.float64]:

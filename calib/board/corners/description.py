@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from calib.board.april_grid import BORDER, AprilGrid
 from calib.board.corners.errors import OtherBoardError
+from calib.board.corners.markers import find_markers
 from calib.board.corners.to_8bit import Grey
 from calib.board.target import DICTIONARIES, Charuco, Target
 
@@ -172,12 +173,9 @@ def _is_lattice(seen: _Markers) -> bool:
 
 
 def _markers(levels: Grey, family: str, border: int) -> _Markers:
-    parameters = cv2.aruco.DetectorParameters()
-    parameters.markerBorderBits = border
     dictionary = cv2.aruco.getPredefinedDictionary([*DICTIONARIES].index(family))
-    corners, ids, _ = cv2.aruco.ArucoDetector(dictionary, parameters).detectMarkers(levels)
-    numbers = np.zeros(0, np.intp) if ids is None else ids.ravel().astype(np.intp)
-    return _Markers(family, border, numbers, np.array([each.reshape(4, 2).mean(axis=0) for each in corners]))
+    numbers, corners = find_markers(levels, dictionary, border)
+    return _Markers(family, border, numbers, corners.mean(axis=1))
 
 
 def _misplaced(target: Charuco | AprilGrid, seen: _Markers) -> str:

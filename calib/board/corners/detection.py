@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from calib.board.april_grid import AprilGrid
 from calib.board.corners import description, ellipse, errors, other_discs, quality, saddle
-from calib.board.corners.copies import require_one_board
+from calib.board.corners.markers import require_one_board
 from calib.board.corners.misplaced import is_in_place
 from calib.board.corners.order import canonical_order
 from calib.board.corners.search import MIN_POINTS, Found, find, is_cut_off
