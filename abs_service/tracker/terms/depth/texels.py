@@ -142,6 +142,7 @@ class TexelsOnDemand:
         self._done = np.zeros((0, 0), np.bool_)
         self._costs = ConstantCosts(self._done, self._distance, self._distance, image.border, 0.0, 0.0)
         self._complete: list[NDArray[np.int32]] = []  # pixels of single candidates, which are read again and again
+        self._is_whole = False
 
     def observe(self, image: DepthImage, window: Window, scale: float, resampling: Resampling) -> NDArray[np.float32]:
         """Corrects the distances in the window, and renders nothing yet."""
@@ -149,7 +150,7 @@ class TexelsOnDemand:
         self._scaled = Scaled(self._noise, scale)
         self._distance, self._amplitude = (np.ascontiguousarray(part, np.float32) for part in image.within(window))
         corrected = corrected_distances(self._noise, self._distance, self._amplitude, corner(window))
-        self._done, self._complete = np.zeros(corrected.shape, np.bool_), []
+        self._done, self._complete, self._is_whole = np.zeros(corrected.shape, np.bool_), [], False
         none, outlier = np.zeros(corrected.shape, np.bool_), float(self._image.beyond[6])
         nowhere = np.zeros(corrected.shape, np.float32)
         self._costs = ConstantCosts(none, corrected, nowhere, self._image.border, 0.0, outlier)
@@ -170,7 +171,7 @@ class TexelsOnDemand:
 
     def at(self, pixel: NDArray[np.int32]) -> NDArray[np.float32]:
         """The texture after rendering what is still missing of it."""
-        if not any(pixel is one for one in self._complete):
+        if not (self._is_whole or any(pixel is one for one in self._complete)):
             self._render(pixel)
         return self._texture.reshape(-1, 8)
 
@@ -186,6 +187,7 @@ class TexelsOnDemand:
             write_pixels(self._scaled, measured, amplitude, (row, column), self._texture)
         if is_single:
             self._complete.append(pixel)
+        self._is_whole = not is_single
 
     def _of_window(self) -> NDArray[np.int32]:
         """Indices (m,) of all pixels of the window into the flattened texture."""
