@@ -68,9 +68,14 @@ class Case:
     call: Callable[[], object]
 
 
+def flat_sheet(side: int) -> Mesh:
+    """A flat mesh of side × side vertices, 1 m before the sensor."""
+    return sheet(side, side, flat)
+
+
 def nurbs_of(shape: tuple[int, int], mesh: Mesh | None = None) -> DeformationModel:
     """A surface of degree 2."""
-    return nurbs.Settings(control_points=shape, degree=2).of_mesh(mesh or sheet(32, 32, flat))
+    return nurbs.Settings(control_points=shape, degree=2).of_mesh(mesh or flat_sheet(32))
 
 
 def population(model: DeformationModel, size: int = POPULATION) -> NDArray[np.float64]:

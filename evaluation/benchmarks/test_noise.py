@@ -15,7 +15,7 @@ from calib.noise.region_polynomial import RegionPolynomial, blocks
 from calib.noise.structured_light import StructuredLight
 from calib.noise.tof_amplitude import TofAmplitude
 from drivers.simulated.sensors.time_of_flight import SIGMA_POLYNOMIAL
-from tests.calib.noise import laws
+from evaluation.calibration import noise_laws
 from tests.calib.noise.test_shrinkage import DEGREES, HEIGHT, LABELS, WIDTH, Head
 from tests.calib.noise.texels import render_texture
 
@@ -60,7 +60,7 @@ FITS = {
 
 @pytest.mark.parametrize("name", FITS)
 def test_fit_20000_samples(benchmark, name):
-    samples = laws.time_of_flight(1, outliers=0.05)
+    samples = noise_laws.time_of_flight(1, outliers=0.05)
     assert benchmark.pedantic(FITS[name], (samples,), rounds=1 if benchmark.disabled else 5).uses_amplitude
 
 

@@ -20,8 +20,8 @@ from calib.noise.base import pixels_where
 from calib.sequences.static_board import StaticBoard
 from drivers.simulated.sensors.time_of_flight import TimeOfFlight
 from drivers.simulated.simulation import Simulation
+from evaluation.calibration.simulated_board import Scene, scene
 from evaluation.experiment import Context, Findings, at_most
-from tests.abs_service.calibration.simulated import Scene, scene
 
 ERRORS = ("offset=0.012", "dark=-8", "wiggle=0.002")
 RATE = 10

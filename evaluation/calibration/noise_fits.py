@@ -1,6 +1,6 @@
 """Accuracy of fitted noise models: the table of docs/explanation/noise.md.
 
-Samples are those of `tests/calib/noise/laws.py`: 20 000 from the simulator, 5 % of them uniform outliers, and as many
+Samples are those of `noise_laws`: 20 000 from the simulator, 5 % of them uniform outliers, and as many
 held out. Errors are the largest over the domain, in the worst of the seeds; all other statistics are means.
 
 Goals: the sensor's own law is found to 10 % of σ and 1 mm of μ, in the worst of the seeds.
@@ -17,8 +17,8 @@ from calib.noise import constant, gaussian_polynomial, structured_light, tof_amp
 from calib.noise.base import DepthNoise
 from calib.noise.fit.quality import Quality, goodness_of_fit
 from calib.noise.fit.samples import Samples
+from evaluation.calibration import noise_laws
 from evaluation.experiment import Context, Findings, at_most
-from tests.calib.noise import laws
 
 TITLE = "Accuracy of fitted noise models"
 
@@ -33,13 +33,13 @@ FITS: Mapping[str, Callable[[Samples], DepthNoise]] = {
 
 def time_of_flight(fit: Callable[[Samples], DepthNoise], seeds: int) -> list[float]:
     """Largest errors of σ [%] and μ [mm] over the seeds, and means of the held-out statistics."""
-    (x, a), rows = laws.grid(), []
-    p = laws.somewhere(len(x))
+    (x, a), rows = noise_laws.grid(), []
+    p = noise_laws.somewhere(len(x))
     for seed in range(seeds):
-        model = fit(laws.time_of_flight(seed, outliers=OUTLIERS))
-        quality = goodness_of_fit(model, laws.time_of_flight(seed + 100, outliers=OUTLIERS))
-        sigma = np.abs(model.deviation(x, a, p) / laws.TOF.sigma(x, a) - 1).max() * 100
-        mean = np.abs(model.mean(x, a, p) - laws.TOF.mu(x, a)).max() * 1e3
+        model = fit(noise_laws.time_of_flight(seed, outliers=OUTLIERS))
+        quality = goodness_of_fit(model, noise_laws.time_of_flight(seed + 100, outliers=OUTLIERS))
+        sigma = np.abs(model.deviation(x, a, p) / noise_laws.TOF.sigma(x, a) - 1).max() * 100
+        mean = np.abs(model.mean(x, a, p) - noise_laws.TOF.mu(x, a)).max() * 1e3
         rows.append([sigma, mean, *_statistics(quality)])
     return _over_seeds(rows)
 
@@ -48,9 +48,9 @@ def kinect(seeds: int) -> list[float]:
     """The same for structured light, which has no mean offset."""
     x, rows = np.linspace(0.6, 3.5, 100), []
     for seed in range(seeds):
-        model = structured_light.fit(laws.structured_light(seed, outliers=OUTLIERS), laws.KINECT.step)
-        quality = goodness_of_fit(model, laws.structured_light(seed + 100, outliers=OUTLIERS))
-        sigma = model.deviation(x, x, laws.somewhere(100)) / laws.structured_light_deviation(x)
+        model = structured_light.fit(noise_laws.structured_light(seed, outliers=OUTLIERS), noise_laws.KINECT.step)
+        quality = goodness_of_fit(model, noise_laws.structured_light(seed + 100, outliers=OUTLIERS))
+        sigma = model.deviation(x, x, noise_laws.somewhere(100)) / noise_laws.structured_light_deviation(x)
         rows.append([np.abs(sigma - 1).max() * 100, 0.0, *_statistics(quality)])
     return _over_seeds(rows)
 

@@ -12,8 +12,8 @@ from calib.camera import Camera
 from calib.solve.bundle.tasks import SensorTask, Task
 from calib.solve.calibrate import calibrate
 from calib.solve.solution import Solution
-from tests.calib.solve import board_views
-from tests.calib.solve.board_views import Head
+from evaluation.scenes.boards import board_views
+from evaluation.scenes.boards.board_views import Head
 
 SEEDS = 50
 PLANE_SEEDS = 6

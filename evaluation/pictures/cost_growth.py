@@ -16,9 +16,8 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from abs_service.supervision.process_setup.process_tuning import keep_freed_memory
-from evaluation.benchmarks.kernels import POPULATION, VERTICES, Case, nurbs_of, seconds, whole
+from evaluation.benchmarks.kernels import POPULATION, VERTICES, Case, flat_sheet, nurbs_of, seconds, whole
 from evaluation.service.growth.laws import fit
-from tests.abs_service.tracker.scenes import flat, sheet
 
 ROUNDS = 150
 
@@ -28,7 +27,7 @@ POPULATIONS = (4, 8, 16, 32, 48, 64, 96)
 
 def by_vertices() -> dict[int, Case]:
     """Meshes of more and more vertices."""
-    meshes = [sheet(side, side, flat) for side in SIDES]
+    meshes = [flat_sheet(side) for side in SIDES]
     return {len(mesh.vertices): whole("", nurbs_of((4, 4), mesh)) for mesh in meshes}
 
 

@@ -18,8 +18,8 @@ from drivers.kinect1 import unpacking
 from drivers.kinect1.reference_plane import ReferencePlane
 from drivers.kinect1.transport.packets import DEPTH
 from evaluation.experiment import Context, Findings, UnavailableError, at_least
+from evaluation.service.kinect1_emulation import testbed
 from evaluation.service.kinect1_receiver import Outcome
-from tests.drivers.kinect1.emulation import testbed
 
 TITLE = "Kinect v1: whole images and CPU time, by emulated cameras"
 

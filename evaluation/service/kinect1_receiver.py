@@ -12,8 +12,7 @@ from dataclasses import asdict, dataclass
 from drivers.contract.device import Device, DeviceError, DeviceState, Truth
 from drivers.contract.frame import Frame
 from drivers.kinect1 import open_device
-from tests.drivers.kinect1.emulation.testbed import SERIALS, Server
-from tests.waiting import eventually
+from evaluation.service.kinect1_emulation.testbed import SERIALS, Server
 
 #: Timeout of the first image of every camera [s].
 FIRST_S = 60.0
@@ -67,6 +66,14 @@ class _Counting:
         return sum(seqs[-1] - seqs[0] + 1 for seqs in self._seqs.values())
 
 
+def _wait_for_first(sinks: list[_Counting]) -> None:
+    end_s = time.monotonic() + FIRST_S
+    while not all(sink.frames for sink in sinks):
+        if time.monotonic() > end_s:
+            raise DeviceError(f"no image arrived within {FIRST_S:g} s")
+        time.sleep(0.01)
+
+
 def receive(server: Server, losses: list[float], streams: str, seconds: float) -> list[Outcome]:
     """Receives cameras with the given fractions of packet loss."""
     devices: list[Device] = []
@@ -75,8 +82,7 @@ def receive(server: Server, losses: list[float], streams: str, seconds: float) -
         devices.append(open_device(f"kinect1://{SERIALS[index]}?streams={streams}", time.monotonic_ns))
         server.send(f"lose {index} {share}")
         devices[-1].start(sink)
-    if not eventually(lambda: all(sink.frames for sink in sinks), FIRST_S):
-        raise DeviceError(f"no image arrived within {FIRST_S:g} s")
+    _wait_for_first(sinks)
     time.sleep(WARM_UP_S)
     begin_s, cpu_s, emulator_cpu_s = time.monotonic(), time.process_time(), float(server.send("cpu"))
     time.sleep(seconds)

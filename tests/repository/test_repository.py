@@ -25,7 +25,8 @@ EXTRAS = PROJECT["project"]["optional-dependencies"]
 OPTIONAL = [line for extra in EXTRAS.values() for line in extra]
 
 #: Most entries of a folder, and folders that have one entry of each kind and may have more.
-MAX_ENTRIES = 15
+MAX_ENTRIES = 14
+MARKERS = "__init__.py", "__main__.py", "py.typed"
 COLLECTIONS = (
     "abs_service",
     "docs/decisions",
@@ -33,6 +34,7 @@ COLLECTIONS = (
     "drivers",
     "examples/rigs",
     "proto/absmsg/v1",
+    "tests/abs_service",
     "tests/drivers",
 )
 
@@ -122,7 +124,7 @@ def test_files_and_functions_are_short_enough_to_read_at_once() -> None:
 
 def test_a_folder_is_short_enough_to_read_at_once() -> None:
     entries: dict[str, set[str]] = {}
-    for path in (Path(name) for name, _ in _tracked_texts() if not name.endswith("__init__.py")):
+    for path in (Path(name) for name, _ in _tracked_texts() if not name.endswith(MARKERS)):
         for folder in path.parents[:-1]:
             entries.setdefault(folder.as_posix(), set()).add(path.relative_to(folder).parts[0])
     long = [f"{folder} has {len(names)} entries" for folder, names in entries.items() if len(names) > MAX_ENTRIES]
@@ -154,6 +156,14 @@ def test_what_the_packages_import_is_required_by_name() -> None:
         if module in distributions and not declared & set(map(_normal, distributions[module]))
     }
     assert undeclared == set()
+
+
+def test_the_evaluation_imports_no_tests_but_in_its_benchmarks() -> None:
+    """Tests judge by its scenes; the benchmarks are tests."""
+    folder = ROOT / "evaluation"
+    modules = [path for path in folder.rglob("*.py") if folder / "benchmarks" not in path.parents]
+    assert modules
+    assert [path for path in modules if "tests" in _imported(path)] == []
 
 
 @functools.cache

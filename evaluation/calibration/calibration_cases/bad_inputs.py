@@ -9,7 +9,7 @@ from abs_service.commands.calibrate.inputs import calibrations
 from calib.board.views import CornerView
 from evaluation.calibration.calibration_cases.case import Bench, Case, Outcome
 from evaluation.experiment import at_least, at_most
-from tests.calib.solve import board_views
+from evaluation.scenes.boards import board_views
 
 _BOARD = 'kind = "chessboard"\ncolumns = 9\nrows = 7\nsquare_mm = 40\n'
 

@@ -16,10 +16,10 @@ from abs_service.report.provenance import Provenance
 from calib.board.target import Chessboard, Target
 from calib.board.views import CornerView, PlaneView
 from evaluation.experiment import Goal, UnavailableError
-from tests.calib.solve import board_views
-from tests.calib.solve.board_views import Head
+from evaluation.scenes.boards import board_views
+from evaluation.scenes.boards.board_views import Head
 
-#: Board of `tests.calib.solve.board_views`, which the simulated sets show.
+#: Board of `evaluation.scenes.boards.board_views`, which the simulated sets show.
 BOARD = Chessboard(board_views.COLUMNS, board_views.ROWS, board_views.SQUARE)
 
 #: Longest time that a command may take [s].

@@ -11,7 +11,7 @@ from calib.board.target import Chessboard
 from calib.camera import Camera
 from evaluation.calibration.calibration_cases.case import Bench, Case, Outcome, Said
 from evaluation.experiment import at_least, at_most
-from tests.calib.solve.board_views import Head, Seen, look, random_boards, three_heads
+from evaluation.scenes.boards.board_views import Head, Seen, look, random_boards, three_heads
 
 #: Share by which the simulated distances are too long.
 _SCALE = 0.01

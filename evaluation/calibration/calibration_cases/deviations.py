@@ -15,8 +15,8 @@ from calib.solve.calibrate import calibrate
 from evaluation.calibration import bootstrap, published_boards
 from evaluation.calibration.calibration_cases.case import Bench, Case, Outcome
 from evaluation.experiment import at_least, at_most
-from tests.calib.solve import board_views
-from tests.calib.solve.bent import bent
+from evaluation.scenes.boards import board_views
+from evaluation.scenes.boards.bent import bent
 
 #: Ratios of scatter to ±, smallest and largest, and the known reasons for others.
 _LOW, _HIGH = 0.8, 1.3

@@ -10,8 +10,8 @@ from calib.board.views import CornerView
 from evaluation.calibration import published_boards
 from evaluation.calibration.calibration_cases.case import Bench, Case, Outcome
 from evaluation.experiment import at_least, at_most
-from tests.calib.solve import board_views
-from tests.calib.solve.bent import bent
+from evaluation.scenes.boards import board_views
+from evaluation.scenes.boards.bent import bent
 
 _SIGMA_PX = 0.1
 

@@ -10,12 +10,12 @@ from calib import pose
 from calib.board.april_grid import AprilGrid
 from calib.board.target import Charuco, Target
 from calib.board.views import CornerView
-from evaluation.calibration import published_boards
+from evaluation.calibration import mrcal_comparison, published_boards
 from evaluation.calibration.calibration_cases.case import Bench, Case, Outcome
 from evaluation.experiment import UnavailableError, at_least, at_most
-from tests.calib.board.boards import VGA, as_bytes, centered, photograph
-from tests.calib.solve import beside_mrcal, board_views
-from tests.calib.solve.board_views import Head
+from evaluation.scenes.boards import board_views
+from evaluation.scenes.boards.board_images import VGA, as_bytes, centered, photograph
+from evaluation.scenes.boards.board_views import Head
 
 _BOARDS = {
     "AprilGrid of 6 × 5 tags": AprilGrid(6, 5, 0.03, 0.009),
@@ -120,10 +120,10 @@ def wide(bench: Bench) -> Outcome:
 def oracle(bench: Bench) -> Outcome:
     """Projections and their uncertainty, where boards were seen."""
     images = bench.real("calib_opencv_stereo")
-    if not beside_mrcal.is_installed():
+    if not mrcal_comparison.is_installed():
         raise UnavailableError("needs Debian's python3-mrcal")
     views = [view for view in published_boards.stereo(images) if view.sensor == "left"]
-    found = beside_mrcal.compared(views, (640, 480), published_boards.CHESSBOARD.square)
+    found = mrcal_comparison.compared(views, (640, 480), published_boards.CHESSBOARD.square)
     own, other, apart = (float(np.median(each)) for each in (found.own, found.other, found.differences))
     return Outcome(
         f"projections differ by {apart:.4f} px (median); known to {own:.3f} px as we say, {other:.3f} px as mrcal says",

@@ -10,8 +10,8 @@ import numpy as np
 from calib.board.target import Chessboard
 from evaluation.calibration import published_boards
 from evaluation.calibration.calibration_cases.case import Bench, Case, Outcome, Said
+from evaluation.calibration.simulated_board import scene
 from evaluation.experiment import at_least, at_most
-from tests.abs_service.calibration.simulated import scene
 
 #: Shots of OpenCV's stereo pair.
 _SHOTS = (1, 2, 3, 4, 5, 6, 7, 8, 9, 11, 12, 13, 14)

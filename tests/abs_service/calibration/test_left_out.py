@@ -11,7 +11,7 @@ from abs_service.calibration.files import corner_file, target_file
 from abs_service.calibration.shots.corner_extraction import BoardObservations
 from calib.board.target import Chessboard
 from calib.solve.start import start
-from tests.calib.solve.board_views import COLUMNS, ROWS, SQUARE, Head, look, random_boards, three_heads
+from evaluation.scenes.boards.board_views import COLUMNS, ROWS, SQUARE, Head, look, random_boards, three_heads
 
 
 @pytest.mark.slow

@@ -13,8 +13,8 @@ from abs_service.calibration.shots.corner_extraction import BoardObservations
 from abs_service.commands.calibrate.inputs import calibrations
 from calib import pose
 from calib.board.target import Chessboard
-from tests.abs_service.calibration.simulated import Filmed, record, scene
-from tests.calib.solve.board_views import COLUMNS, ROWS, SQUARE, look, random_boards, three_heads
+from evaluation.calibration.simulated_board import Filmed, record, scene
+from evaluation.scenes.boards.board_views import COLUMNS, ROWS, SQUARE, look, random_boards, three_heads
 
 BOARD = scene(
     "chessboard",

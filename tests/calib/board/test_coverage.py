@@ -13,7 +13,7 @@ from calib.board.target import Chessboard
 from calib.board.views import CornerView
 from drivers.simulated.address import parse
 from drivers.simulated.shapes.printed import TARGETS, board_pose
-from tests.calib.board.boards import VGA, centered
+from evaluation.scenes.boards.board_images import VGA, centered
 
 BOARD = Chessboard(9, 6, 0.03)
 SIZES = {"color": (640, 480)}

@@ -13,7 +13,7 @@ from calib.board.corners.errors import NothingFoundError, OtherBoardError
 from calib.board.corners.other_discs import other_discs
 from calib.board.corners.to_8bit import grey
 from calib.board.target import AprilGrid, AsymmetricCircles, Charuco, Chessboard, Circles, Dictionary
-from tests.calib.board.boards import VGA, as_bytes, centered, photograph
+from evaluation.scenes.boards.board_images import VGA, as_bytes, centered, photograph
 
 GRID = AprilGrid(6, 5, 0.03, 0.009)
 

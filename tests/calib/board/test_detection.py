@@ -9,7 +9,7 @@ from calib.board.april_grid import AprilGrid
 from calib.board.corners import errors
 from calib.board.corners.detection import detect
 from calib.board.target import AsymmetricCircles, Charuco, Chessboard, Circles, Target
-from tests.calib.board.boards import TOF, VGA, as_bytes, centered, photograph, photograph_by_fisheye
+from evaluation.scenes.boards.board_images import TOF, VGA, as_bytes, centered, photograph, photograph_by_fisheye
 
 CHESSBOARD = Chessboard(9, 6, 0.03)
 CHARUCO = Charuco(10, 7, 0.03, 0.0225, "4x4_100")

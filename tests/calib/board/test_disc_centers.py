@@ -5,7 +5,7 @@ import pytest
 
 from calib.board.corners.detection import detect
 from calib.board.target import AsymmetricCircles, Circles
-from tests.calib.board.boards import as_bytes, centered, photograph_by_fisheye
+from evaluation.scenes.boards.board_images import as_bytes, centered, photograph_by_fisheye
 
 
 @pytest.mark.parametrize("target", [Circles(9, 7, 0.03, 0.018), AsymmetricCircles(4, 11, 0.02, 0.016)], ids=repr)

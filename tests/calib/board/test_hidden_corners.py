@@ -10,7 +10,7 @@ from calib.board.corners import errors
 from calib.board.corners.detection import detect
 from calib.board.target import AprilGrid, Charuco, Chessboard, Circles, Target
 from calib.camera import Camera
-from tests.calib.board.boards import VGA, as_bytes, board_pose, centered, photograph
+from evaluation.scenes.boards.board_images import VGA, as_bytes, board_pose, centered, photograph
 
 BOARDS = [Chessboard(9, 6, 0.03), Charuco(10, 7, 0.03, 0.0225, "4x4_100")]
 

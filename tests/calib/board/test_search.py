@@ -7,7 +7,7 @@ import pytest
 from calib.board.corners.detection import detect
 from calib.board.corners.search import chessboard_size, find
 from calib.board.target import Charuco, Chessboard
-from tests.calib.board.boards import VGA, as_bytes, centered, photograph
+from evaluation.scenes.boards.board_images import VGA, as_bytes, centered, photograph
 
 CHESSBOARD = Chessboard(9, 6, 0.03)
 

@@ -10,7 +10,7 @@ from calib.calibration_check.stored import Stored, Views
 from calib.solve.bundle.adjustment import NotSolvedError
 from calib.solve.bundle.parameters.state import SensorState
 from calib.solve.validation.unlike_shots.contradictions import Contradiction, contradictions
-from tests.calib.solve.board_views import look, random_boards, three_heads
+from evaluation.scenes.boards.board_views import look, random_boards, three_heads
 
 
 @pytest.fixture

@@ -14,7 +14,7 @@ from calib.calibration_check.stored import CalibrationCheckError, Stored, Views,
 from calib.camera import Camera
 from calib.solve.bundle.parameters.layout import POSE
 from calib.solve.bundle.parameters.state import SensorState
-from tests.calib.solve.board_views import Head, look, random_boards, three_heads
+from evaluation.scenes.boards.board_views import Head, look, random_boards, three_heads
 
 SIGMAS = {"light": (2e-4, 2e-4), "color": (2e-4, 2e-4)}
 

@@ -14,7 +14,7 @@ from calib.camera import Camera
 from calib.solve.bundle.parameters.layout import POSE
 from calib.solve.bundle.tasks import SensorTask, Task
 from calib.solve.calibrate import calibrate
-from tests.calib.solve.board_views import Head, look, random_boards
+from evaluation.scenes.boards.board_views import Head, look, random_boards
 
 #: Where the boards are: at calibration, and at checks much nearer, much further, and there again [m].
 CALIBRATED = (0.7, 1.3)

@@ -13,7 +13,7 @@ from calib.solve.bundle.tasks import SensorTask, Task
 from calib.solve.bundle.uncertainty import pose_covariance
 from calib.solve.calibrate import calibrate
 from calib.solve.solution import Solution
-from tests.calib.solve import board_views
+from evaluation.scenes.boards import board_views
 
 TRUE = Camera(640, 480, 536.0, 537.5, 331.0, 236.0, Lens(np.array([-0.28, 0.09, 0.0006, -0.0004, 0.0])))
 RIGS, POSES, NOISE_PX = 12, 8, 0.1

@@ -14,8 +14,8 @@ from calib.solve.bundle.tasks import SensorTask, Task
 from calib.solve.calibrate import calibrate
 from calib.solve.solution import Solution
 from calib.solve.validation.verdict import assess
-from tests.calib.solve import board_views
-from tests.calib.solve.board_views import Head, Seen
+from evaluation.scenes.boards import board_views
+from evaluation.scenes.boards.board_views import Head, Seen
 
 
 def task_of(heads: Mapping[str, Head], seen: Seen, **changes: object) -> Task:

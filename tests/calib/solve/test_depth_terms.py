@@ -11,7 +11,7 @@ from calib.solve.calibrate import calibrate
 from calib.solve.solution import Parameter, Solution
 from calib.solve.validation.verdict import assess
 from calib.solve.validation.weak_directions import weak_directions
-from tests.calib.solve.board_views import Head, look, random_boards, three_heads
+from evaluation.scenes.boards.board_views import Head, look, random_boards, three_heads
 
 SCALE = 0.015
 

@@ -18,8 +18,8 @@ from calib.solve.diagnoses import MixedUpError, SquareSizeError, ViewsError
 from calib.solve.start import extrinsics_graph
 from calib.solve.start.extrinsics_graph import ContradictionError, NotConnectedError
 from calib.solve.validation.other_lens import other_lenses
-from tests.calib.solve import board_views
-from tests.calib.solve.board_views import Head
+from evaluation.scenes.boards import board_views
+from evaluation.scenes.boards.board_views import Head
 
 SHOTS = 12
 

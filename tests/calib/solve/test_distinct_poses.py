@@ -14,8 +14,8 @@ from calib.solve.diagnoses import ViewsError
 from calib.solve.solution import Solution
 from calib.solve.validation.cross_validation import TooFewToSplitError, cross_validate
 from calib.solve.validation.verdict import Assessment, assess
-from tests.calib.solve import board_views
-from tests.calib.solve.bent import bent
+from evaluation.scenes.boards import board_views
+from evaluation.scenes.boards.bent import bent
 
 SHOTS = 18
 

@@ -17,7 +17,7 @@ from calib.solve.bundle.parameters.lens_parameters import BROWN_CONRADY, FISHEYE
 from calib.solve.bundle.parameters.state import SensorState, State
 from calib.solve.bundle.tasks import SensorTask, Task
 from calib.solve.validation import projection_uncertainty
-from tests.calib.solve import board_views
+from evaluation.scenes.boards import board_views
 
 KINDS = {"tof": BROWN_CONRADY, "light": RATIONAL, "color": FISHEYE}
 

@@ -11,7 +11,7 @@ from calib.solve.bundle.tasks import SensorTask, Task, TaskError
 from calib.solve.calibrate import calibrate
 from calib.solve.start.start import start
 from calib.solve.validation import projection_uncertainty
-from tests.calib.solve import board_views
+from evaluation.scenes.boards import board_views
 
 HEAD = board_views.three_heads()["color"]
 

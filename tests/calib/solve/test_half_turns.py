@@ -12,8 +12,8 @@ from calib.pose import Pose
 from calib.solve.bundle.tasks import SensorTask, Task
 from calib.solve.calibrate import calibrate
 from calib.solve.start.half_turns import numbered_alike
-from tests.calib.solve import board_views
-from tests.calib.solve.board_views import Head
+from evaluation.scenes.boards import board_views
+from evaluation.scenes.boards.board_views import Head
 
 
 def from_the_left(view: CornerView) -> CornerView:

@@ -7,7 +7,7 @@ import numpy as np
 from calib.solve.bundle.parameters.lens_parameters import KINDS
 from calib.solve.bundle.tasks import SensorTask, Task
 from calib.solve.start import start as module
-from tests.calib.solve.board_views import look, random_boards, three_heads
+from evaluation.scenes.boards.board_views import look, random_boards, three_heads
 
 
 def test_views_without_a_pose_of_the_board_are_counted(monkeypatch) -> None:

@@ -18,9 +18,9 @@ from drivers.contract.discovery import Availability
 from drivers.contract.frame import Frame
 from drivers.kinect1 import discover, open_device, unpacking
 from drivers.kinect1.reference_plane import ReferencePlane
+from evaluation.service.kinect1_emulation.emulated_camera import noise
+from evaluation.service.kinect1_emulation.testbed import SERIALS, Server
 from tests.drivers.conformance.bench import resources
-from tests.drivers.kinect1.emulation.emulated_camera import noise
-from tests.drivers.kinect1.emulation.testbed import SERIALS, Server
 from tests.drivers.recording_sink import RecordingSink
 from tests.waiting import eventually
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from drivers.kinect1.assembly import CAUSES, LONGEST_GAP, PLACE, SEQ, STATE_SIZE, Assembler, assemble
 from drivers.kinect1.transport.packets import COLOR, DEPTH, INFRARED, PACKET_BYTES, PacketFormat
-from tests.drivers.kinect1.emulation.packet_stream import PacketStream, begin
+from evaluation.service.kinect1_emulation.packet_stream import PacketStream, begin
 
 #: Images of 4 packets, so that short examples contain several images.
 TINY = PacketFormat(endpoint=0x82, base=0x70, payload=20, width=8, height=9, bits=8)

@@ -10,7 +10,7 @@ from drivers.contract.device import DeviceError
 from drivers.kinect1.camera import LINE_S, LONGEST_LINES, KinectCamera, Stream
 from drivers.kinect1.reference_plane import ReferencePlane
 from drivers.kinect1.transport.commands import ANSWER_BYTES, TIMEOUT_S, Commands, ProtocolError
-from tests.drivers.kinect1.emulation.emulated_camera import EmulatedKinect
+from evaluation.service.kinect1_emulation.emulated_camera import EmulatedKinect
 
 
 class Pipe:

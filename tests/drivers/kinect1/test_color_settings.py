@@ -6,8 +6,8 @@ import pytest
 
 from drivers.kinect1.camera import Stream
 from drivers.kinect1.color_settings import CONDITION
-from tests.drivers.kinect1.emulation.emulated_camera import noise
-from tests.drivers.kinect1.emulation.fake_usb import FakeDevice
+from evaluation.service.kinect1_emulation.emulated_camera import noise
+from tests.drivers.kinect1.fake_usb import FakeDevice
 from tests.drivers.kinect1.test_device import SERIAL, opened
 from tests.drivers.recording_sink import RecordingSink
 

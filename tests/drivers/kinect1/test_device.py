@@ -22,10 +22,10 @@ from drivers.kinect1.camera import Stream
 from drivers.kinect1.device import Kinect1Device
 from drivers.kinect1.opening import find, open_camera
 from drivers.kinect1.reference_plane import ReferencePlane
-from tests.drivers.kinect1.emulation import usb_descriptors
-from tests.drivers.kinect1.emulation.bit_packing import unpack
-from tests.drivers.kinect1.emulation.emulated_camera import EmulatedKinect, noise
-from tests.drivers.kinect1.emulation.fake_usb import FakeBackend, FakeDevice, FakeReader
+from evaluation.service.kinect1_emulation import usb_descriptors
+from evaluation.service.kinect1_emulation.bit_packing import unpack
+from evaluation.service.kinect1_emulation.emulated_camera import EmulatedKinect, noise
+from tests.drivers.kinect1.fake_usb import FakeBackend, FakeDevice, FakeReader
 from tests.drivers.recording_sink import RecordingSink
 from tests.waiting import eventually
 

@@ -10,7 +10,7 @@ from drivers.kinect1.reference_plane import ReferencePlane
 from drivers.kinect1.stream_decoder import StreamDecoder
 from drivers.kinect1.transport.packets import DEPTH
 from drivers.kinect1.transport.transfer import Transfer
-from tests.drivers.kinect1.emulation.packet_stream import begin
+from evaluation.service.kinect1_emulation.packet_stream import begin
 from tests.drivers.kinect1.test_assembly import TINY, stream_of
 
 PLANE = ReferencePlane()

@@ -4,7 +4,7 @@ import sys
 
 import pytest
 
-from tests.drivers.kinect1.emulation import testbed
+from evaluation.service.kinect1_emulation import testbed
 from tests.drivers.kinect1.scenarios import STORIES
 
 pytestmark = [

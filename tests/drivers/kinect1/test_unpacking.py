@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.kinect1 import unpacking
-from tests.drivers.kinect1.emulation.bit_packing import pack, unpack
+from evaluation.service.kinect1_emulation.bit_packing import pack, unpack
 
 IDENTITY = np.arange(2048, dtype=np.uint16)
 

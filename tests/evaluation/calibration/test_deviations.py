@@ -10,8 +10,8 @@ from calib.board.views import CornerView
 from calib.solve.bundle.tasks import SensorTask, Task
 from calib.solve.calibrate import calibrate
 from evaluation.calibration import bootstrap, published_boards
-from tests.calib.solve import board_views
-from tests.calib.solve.bent import bent
+from evaluation.scenes.boards import board_views
+from evaluation.scenes.boards.bent import bent
 
 DRAWS = 100
 

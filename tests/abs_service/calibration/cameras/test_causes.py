@@ -15,7 +15,7 @@ from calib import pose
 from calib.calibration_check.comparison import Comparison, Explanation
 from calib.calibration_check.hypotheses import Hypothesis, Kind
 from calib.pose import Pose
-from tests.calib.solve.board_views import Head, look, random_boards, three_heads
+from evaluation.scenes.boards.board_views import Head, look, random_boards, three_heads
 
 ORIGIN = Provenance("x", "2026-11-21")
 

@@ -18,7 +18,7 @@ from calib.calibration_check.stored import Views
 from calib.lenses.lens import Lens
 from calib.pose import Pose
 from calib.solve.start.board_poses import pose_candidates
-from tests.calib.solve.board_views import Head, board_points, look, random_boards, three_heads
+from evaluation.scenes.boards.board_views import Head, board_points, look, random_boards, three_heads
 
 ORIGIN = Provenance("x", "2026-11-21")
 

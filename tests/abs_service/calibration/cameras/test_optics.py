@@ -14,7 +14,7 @@ from abs_service.report.provenance import Provenance
 from calib.camera import Camera
 from calib.solve.bundle.tasks import SensorTask, Task
 from calib.solve.calibrate import calibrate
-from tests.calib.solve.board_views import Head, look, random_boards, three_heads
+from evaluation.scenes.boards.board_views import Head, look, random_boards, three_heads
 
 ORIGIN = Provenance("x", "2026-11-28")
 CAMERA = replace(three_heads()["color"].camera, T_rs=np.eye(4))

@@ -16,7 +16,7 @@ from abs_service.report.provenance import Provenance
 from abs_service.supervision.exit_codes import Exit
 from calib.camera import Camera
 from drivers.replay import Recording
-from tests.abs_service.calibration.simulated import Filmed, record, scene
+from evaluation.calibration.simulated_board import Filmed, record, scene
 
 SCENE = scene("chessboard", "sensors=tof,structured_light,color", "rate=2", "seed=4", "color=640x480")
 SENSORS = ("tof", "structured_light", "color")

@@ -16,7 +16,7 @@ from abs_service.commands.calibrate.inputs import calibrations
 from abs_service.report.provenance import Provenance
 from calib.board.target import Chessboard
 from calib.formats import vnl
-from tests.calib.solve import board_views
+from evaluation.scenes.boards import board_views
 
 BOARD = Chessboard(board_views.COLUMNS, board_views.ROWS, board_views.SQUARE)
 

@@ -17,7 +17,7 @@ from calib.sequences import reference
 from calib.sequences.reference import Kind
 from calib.sequences.static import reduce
 from evaluation.calibration.noise_board import ERRORS, calibrate, scene_of, static_sequence, true_distances
-from tests.abs_service.calibration.simulated import Filmed, record, scene
+from evaluation.calibration.simulated_board import Filmed, record, scene
 
 
 @pytest.mark.parametrize(

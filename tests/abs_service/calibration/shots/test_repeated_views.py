@@ -9,7 +9,7 @@ from abs_service.calibration.cameras import verification
 from abs_service.calibration.files import rig_file
 from abs_service.calibration.shots.corner_extraction import BoardObservations
 from abs_service.report.provenance import Provenance
-from tests.calib.solve.board_views import look, random_boards, three_heads
+from evaluation.scenes.boards.board_views import look, random_boards, three_heads
 
 TIMES = 5
 

@@ -19,8 +19,8 @@ from calib.pose import Pose
 from drivers.contract.frame import Reference
 from drivers.opening import open_device
 from drivers.replay.recording import Recording
-from tests.abs_service.calibration.simulated import Filmed, record, scene
-from tests.calib.board.boards import VGA, as_bytes, centered, photograph
+from evaluation.calibration.simulated_board import Filmed, record, scene
+from evaluation.scenes.boards.board_images import VGA, as_bytes, centered, photograph
 
 CHESSBOARD = scene("chessboard", "sensors=tof,structured_light,color", "rate=6", "seed=2", "color=640x480", "hold=1")
 

@@ -13,8 +13,8 @@ from abs_service.calibration.files import target_file
 from abs_service.calibration.shots import unseen
 from abs_service.calibration.shots.shots import SensorShot, Shot
 from calib.board.target import AprilGrid, Charuco, Chessboard, Target
-from tests.abs_service.calibration.simulated import scene
-from tests.calib.board.boards import VGA, as_bytes, centered, photograph
+from evaluation.calibration.simulated_board import scene
+from evaluation.scenes.boards.board_images import VGA, as_bytes, centered, photograph
 
 
 @pytest.fixture

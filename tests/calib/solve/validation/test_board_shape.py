@@ -14,7 +14,7 @@ from calib.solve.calibrate import calibrate
 from calib.solve.solution import Solution
 from calib.solve.validation.board_shape import Shape, shape_errors
 from calib.solve.validation.verdict import MAX_RATIO, RADIUS_95, assess
-from tests.calib.solve import board_views
+from evaluation.scenes.boards import board_views
 
 
 @cache

@@ -18,8 +18,8 @@ from calib.solve.start.start import start
 from calib.solve.validation.unlike_shots.contradictions import contradictions
 from calib.solve.validation.unlike_shots.scatter import scatter
 from calib.solve.validation.verdict import assess
-from tests.calib.solve import board_views
-from tests.calib.solve.board_views import Head
+from evaluation.scenes.boards import board_views
+from evaluation.scenes.boards.board_views import Head
 
 HEADS = {name: head for name, head in board_views.three_heads().items() if name != "tof"}
 BOARDS = board_views.random_boards(20, np.random.default_rng(5))

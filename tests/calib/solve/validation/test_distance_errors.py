@@ -15,7 +15,7 @@ from calib.solve.calibrate import calibrate
 from calib.solve.solution import Solution
 from calib.solve.validation.distance_errors import Displaced, Misread, distance_errors
 from calib.solve.validation.verdict import assess
-from tests.calib.solve import board_views
+from evaluation.scenes.boards import board_views
 
 HEADS = {name: head for name, head in board_views.three_heads().items() if name != "light"}
 Spoil = Callable[[PlaneView, Camera], PlaneView]

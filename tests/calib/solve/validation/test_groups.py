@@ -14,7 +14,7 @@ from calib.solve.solution import Solution
 from calib.solve.validation.free_shape import free_shape
 from calib.solve.validation.unlike_shots.groups import groups
 from calib.solve.validation.verdict import assess
-from tests.calib.solve import board_views
+from evaluation.scenes.boards import board_views
 from tests.calib.solve.validation.test_steadiness import SIZE, views
 
 ODD = (2, 3, 7, 11, 12, 16, 20, 21)

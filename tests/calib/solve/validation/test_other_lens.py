@@ -12,7 +12,7 @@ from calib.solve.bundle.tasks import SensorTask, Task
 from calib.solve.calibrate import calibrate
 from calib.solve.validation.other_lens import other_lenses, undescribed
 from calib.solve.validation.verdict import assess
-from tests.calib.solve import board_views
+from evaluation.scenes.boards import board_views
 
 WIDE = Camera(1024, 768, 420.0, 421.0, 515.0, 380.0, Lens(np.array([0.9, 0.25, 2e-4, -3e-4, 0.02, 1.25, 0.5, 0.06])))
 

@@ -12,7 +12,7 @@ from calib.solve.calibrate import calibrate
 from calib.solve.solution import Solution
 from calib.solve.validation.square_pixels import not_square
 from calib.solve.validation.verdict import assess
-from tests.calib.solve import board_views
+from evaluation.scenes.boards import board_views
 
 TRUE = Camera(640, 480, 536.0, 537.5, 331.0, 236.0, Lens(np.array([-0.28, 0.09, 0.0006, -0.0004, 0.0])))
 READOUT_S = 1 / 30

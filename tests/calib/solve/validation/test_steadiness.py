@@ -20,7 +20,7 @@ from calib.solve.validation.unlike_shots.steadiness import (
     unseen_change,
 )
 from calib.solve.validation.verdict import assess
-from tests.calib.solve import board_views
+from evaluation.scenes.boards import board_views
 
 HEADS = {name: head for name, head in board_views.three_heads().items() if name != "tof"}
 SIZE = (1280, 720)

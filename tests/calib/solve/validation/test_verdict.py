@@ -8,7 +8,7 @@ from calib import pose
 from calib.solve.bundle.tasks import SensorTask, Task
 from calib.solve.calibrate import calibrate
 from calib.solve.validation.verdict import Assessment, assess
-from tests.calib.solve import board_views
+from evaluation.scenes.boards import board_views
 
 CAMERA = replace(board_views.three_heads()["color"].camera, T_rs=np.eye(4))
 

@@ -7,10 +7,10 @@ from contextlib import contextmanager
 import numpy as np
 
 from drivers.contract.device import Device
+from evaluation.service.kinect1_emulation.bit_packing import pack
+from evaluation.service.kinect1_emulation.emulated_camera import FORMS, EmulatedKinect, noise
+from evaluation.service.kinect1_emulation.packet_stream import PacketStream, begin
 from tests.drivers.conformance.bench import BEFORE, Fault
-from tests.drivers.kinect1.emulation.bit_packing import pack
-from tests.drivers.kinect1.emulation.emulated_camera import FORMS, EmulatedKinect, noise
-from tests.drivers.kinect1.emulation.packet_stream import PacketStream, begin
 
 SERIALS = ("A00363A01234040A", "A00363A05678041A")
 
@@ -31,7 +31,7 @@ class KinectBench:
     def _open(self, serial: str, fault: Fault) -> Device:
         from drivers.kinect1.address import Address
         from drivers.kinect1.opening import open_camera
-        from tests.drivers.kinect1.emulation.fake_usb import FakeBackend, FakeDevice, FakeReader
+        from tests.drivers.kinect1.fake_usb import FakeBackend, FakeDevice, FakeReader
 
         fake = FakeDevice(_empty() if fault == Fault.NAN else noise(2), serial)
         fake.pace = _PACE

@@ -23,11 +23,11 @@ from pathlib import Path
 
 import numpy as np
 
-from tests.drivers.kinect1.emulation.emulated_camera import FORMS, EmulatedKinect, noise
-from tests.drivers.kinect1.emulation.packet_stream import RATE_HZ, PacketStream
-from tests.drivers.kinect1.emulation.testbed import NAMES, NUMBERS, SERIALS
-from tests.drivers.kinect1.emulation.umockdev import Program
-from tests.drivers.kinect1.emulation.usbfs import BEGIN_S, Connection, Socketed
+from evaluation.service.kinect1_emulation.emulated_camera import FORMS, EmulatedKinect, noise
+from evaluation.service.kinect1_emulation.packet_stream import RATE_HZ, PacketStream
+from evaluation.service.kinect1_emulation.testbed import NAMES, NUMBERS, SERIALS
+from evaluation.service.kinect1_emulation.umockdev import Program
+from evaluation.service.kinect1_emulation.usbfs import BEGIN_S, Connection, Socketed
 
 
 class Bus:

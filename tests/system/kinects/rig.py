@@ -4,7 +4,7 @@ The emulated cameras play sequences that were rendered from the scene of the sim
 its first exposure, which this process waits for on the bus to start the sequences. The sheet moves slowly, because the
 sequences have a low frame rate, and a busy machine must not display an outdated pose.
 
-  umockdev-run … -- python -m tests.system.kinects FOLDER ENDPOINT      prints every estimate as `run` does
+  umockdev-run … -- python -m tests.system.kinects.rig FOLDER ENDPOINT      prints every estimate as `run` does
 """
 
 import signal
@@ -15,8 +15,8 @@ from pathlib import Path
 
 from calib import pose
 from drivers.simulated import address
-from tests.drivers.kinect1.emulation import rendered_images
-from tests.drivers.kinect1.emulation.testbed import SERIALS, Server
+from evaluation.service.kinect1_emulation import rendered_images
+from evaluation.service.kinect1_emulation.testbed import SERIALS, Server
 from tests.system.running import START_S, RigListener, wait_until
 
 SCENE = "simulated://sheet?seed=1&sensors=tof&speed=0.05"

@@ -12,8 +12,8 @@ import usb.backend
 import usb.core
 
 from drivers.kinect1.transport.transfer import MICROFRAME_NS, DisconnectedError, Transfer
-from tests.drivers.kinect1.emulation import usb_descriptors
-from tests.drivers.kinect1.emulation.emulated_camera import EmulatedKinect
+from evaluation.service.kinect1_emulation import usb_descriptors
+from evaluation.service.kinect1_emulation.emulated_camera import EmulatedKinect
 
 
 class FakeDevice:

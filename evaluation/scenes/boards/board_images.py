@@ -17,6 +17,7 @@ _FISHEYE_PX, _FISHEYE_CENTER = 220.0, (319.5, 239.5)
 
 
 def board_pose(rotation: tuple[float, float, float], translation: tuple[float, float, float]) -> Pose:
+    """Pose `T_sb` from a rotation vector [rad] and a translation [m]."""
     return pose.from_rotation_vector(rotation, translation)
 
 
@@ -63,6 +64,7 @@ def photograph(
 
 
 def as_bytes(image: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """Levels rounded to 8 bits."""
     return np.clip(np.rint(image), 0, 255).astype(np.uint8)
 
 

@@ -13,10 +13,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tests.drivers.kinect1.emulation import usb_descriptors
-from tests.drivers.kinect1.emulation.emulated_camera import EmulatedKinect
-from tests.drivers.kinect1.emulation.packet_stream import MICROFRAMES_HZ, images_of
-from tests.drivers.kinect1.emulation.umockdev import Program
+from evaluation.service.kinect1_emulation import usb_descriptors
+from evaluation.service.kinect1_emulation.emulated_camera import EmulatedKinect
+from evaluation.service.kinect1_emulation.packet_stream import MICROFRAMES_HZ, images_of
+from evaluation.service.kinect1_emulation.umockdev import Program
 
 # struct usbdevfs_urb, and struct usbdevfs_iso_packet_desc behind it: length, actual length, status.
 _URB = struct.Struct("<BBxxiIxxxxQiiiiiIQ")

@@ -7,8 +7,8 @@ from functools import cache
 import numpy as np
 
 from drivers.kinect1.transport.packets import COLOR, DEPTH, INFRARED, PacketFormat
-from tests.drivers.kinect1.emulation.bit_packing import pack
-from tests.drivers.kinect1.emulation.packet_stream import PacketStream
+from evaluation.service.kinect1_emulation.bit_packing import pack
+from evaluation.service.kinect1_emulation.packet_stream import PacketStream
 
 #: Baselines, distance and pixel of the emulated calibration [cm], and its shift.
 PLANE_CM, SHIFT = (7.5, 2.3, 120.0, 0.1042), 200

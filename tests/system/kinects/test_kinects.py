@@ -8,8 +8,8 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from tests.drivers.kinect1.emulation import testbed
-from tests.system.kinects import ESTIMATES
+from evaluation.service.kinect1_emulation import testbed
+from tests.system.kinects.rig import ESTIMATES
 
 #: Cores that three cameras in real time need, two of them emulated packet by packet; with two cores one estimate in 600
 #: has all cameras.
@@ -24,7 +24,7 @@ pytestmark = [
 
 
 def test_two_kinects_and_a_time_of_flight_camera_track_the_sheet_that_all_of_them_see(tmp_path, endpoint) -> None:
-    program = [sys.executable, "-m", "tests.system.kinects", str(tmp_path), endpoint]
+    program = [sys.executable, "-m", "tests.system.kinects.rig", str(tmp_path), endpoint]
     done = testbed.run(program, cameras=2, timeout_s=280)
     print(done.stderr)
     assert done.returncode == 0, done.stderr

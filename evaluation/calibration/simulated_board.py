@@ -24,34 +24,48 @@ class Filmed:
 
     @property
     def cameras(self) -> Mapping[str, Camera]:
+        """Cameras by sensor."""
         return {name: head.camera for name, head in self.simulation.heads.items()}
 
     def frames(self) -> Iterator[Frame]:
+        """Frames of all exposures, in order."""
         for k in range(self.exposures):
             yield from self.simulation.frames(k)
 
 
 @dataclass(frozen=True)
 class Scene:
+    """A moving board in front of the simulated device.
+
+    Attributes:
+        board: name of the target, a key of `TARGETS`.
+        uri: address of the simulated device.
+    """
+
     board: str
     uri: str
 
     @property
     def target(self) -> Target:
+        """The board."""
         return TARGETS[self.board]
 
     @property
     def simulation(self) -> Simulation:
+        """A new simulation of the address."""
         return parse(self.uri).build()
 
     def true_pose(self, simulation: Simulation, t_s: float) -> Pose:
+        """Pose of the board at a time [s]."""
         return board_pose(simulation.scene.surfaces[0], self.target, t_s)
 
 
 def scene(board: str, *more: str) -> Scene:
+    """The scene of a board, with more parts `KEY=VALUE` of its address."""
     return Scene(board, "&".join([f"simulated://target?board={board}", *more]))
 
 
 def record(filmed: Filmed, path: Path) -> Path:
+    """Writes the exposures as a recording, and returns its path."""
     import_file.write(path, "board", filmed, b"")
     return path

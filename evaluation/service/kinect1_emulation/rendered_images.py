@@ -13,7 +13,7 @@ from drivers.simulated.sensors.bayer import Bayer
 from drivers.simulated.sensors.color import Picture
 from drivers.simulated.sensors.exposure import Exposure
 from drivers.simulated.sensors.structured_light import StructuredLight, StructuredLightNoise
-from tests.drivers.kinect1.emulation.bit_packing import pack
+from evaluation.service.kinect1_emulation.bit_packing import pack
 
 PLANE = ReferencePlane()
 

@@ -1,6 +1,6 @@
 """Emulated cameras on an emulated USB for unmodified programs: umockdev around the program, a server process behind it.
 
-  python -m tests.drivers.kinect1.emulation.testbed PROGRAM…  describes the cameras and runs a program under umockdev
+  python -m evaluation.service.kinect1_emulation.testbed PROGRAM…    runs a program under umockdev
 
 The program starts the server (`Server`), for only it knows where umockdev has put its files.
 """
@@ -13,7 +13,7 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from tests.drivers.kinect1.emulation import usb_descriptors
+from evaluation.service.kinect1_emulation import usb_descriptors
 
 SERIALS = ("A00363A01234040A", "A00363A05678041A")
 
@@ -97,13 +97,13 @@ class Server:
     """The process that emulates the cameras of the testbed in which this program runs.
 
     Args:
-        arguments: of `tests.drivers.kinect1.emulation.server`.
+        arguments: of `evaluation.service.kinect1_emulation.server`.
     """
 
     def __init__(self, *arguments: str) -> None:
         self.root = Path(os.environ["UMOCKDEV_DIR"])
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "tests.drivers.kinect1.emulation.server", str(self.root), *arguments],
+            [sys.executable, "-m", "evaluation.service.kinect1_emulation.server", str(self.root), *arguments],
             # Without umockdev's library the server sees its files as they are, and costs less.
             env={name: value for name, value in os.environ.items() if name != "LD_PRELOAD"},
             stdin=subprocess.PIPE,
@@ -113,7 +113,7 @@ class Server:
         self._listen()
 
     def send(self, command: str) -> str:
-        """Does what `tests.drivers.kinect1.emulation.server` understands; returns its answer."""
+        """Does what `evaluation.service.kinect1_emulation.server` understands; returns its answer."""
         assert self._process.stdin is not None
         self._process.stdin.write(command + "\n")
         self._process.stdin.flush()
