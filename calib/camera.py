@@ -52,7 +52,7 @@ class Camera:
                 raise CameraError(f"{name} = {size!r}: must be a whole number of pixels, 1 to {LARGEST_SIDE}")
         for name in ("fx", "fy", "cx", "cy"):
             _check_number(name, getattr(self, name), positive=name in ("fx", "fy"))
-        # The first of them is told by its class; all that a protocol asks for takes fifty times as long to see.
+        # The first of them is recognised by its class; all that a protocol asks for takes fifty times as long to see.
         if not isinstance(self.lens, (Lens, LensModel)):
             raise CameraError(f"lens = {self.lens!r}: must be a lens model, such as Lens(…) or Fisheye(…)")
         object.__setattr__(self, "T_rs", _pose(self.T_rs))
@@ -119,8 +119,12 @@ class Camera:
         return np.asarray(np.hypot(x, y) < self.field_radius * depth)
 
     def project(self, points_r: NDArray[np.floating]) -> NDArray[np.float64]:
-        """Pixel coordinates (…, 2) of rig points (…, 3) [m], eq. 10; NaN for points on or behind the camera plane."""
-        points_s = pose.transform(self.T_sr, np.asarray(points_r, np.float64))
+        """Pixel coordinates (…, 2) of rig points (…, 3) [m], eq. 10; NaN for points on or behind the camera plane.
+
+        Raises:
+            CameraError: the points are no array of three coordinates each.
+        """
+        points_s = pose.transform(self.T_sr, _points("points_r", points_r))
         depth = points_s[..., 2:]
         with np.errstate(divide="ignore", invalid="ignore"):
             ideal = np.where(depth > 0, points_s[..., :2] / depth, np.nan)
@@ -138,8 +142,8 @@ class Camera:
         return (by_point.reshape(-1, 3) @ self.T_rs[:3, :3].T).reshape(by_point.shape)
 
     def distance(self, points_r: NDArray[np.floating]) -> NDArray[np.float64]:
-        """Radial distance (…,) [m] from the camera centre, eq. 11."""
-        return np.linalg.norm(np.asarray(points_r, np.float64) - self.center, axis=-1)
+        """Radial distance (…,) [m] from the camera centre, eq. 11; CameraError as of `project`."""
+        return np.linalg.norm(_points("points_r", points_r) - self.center, axis=-1)
 
     def rays(self) -> NDArray[np.float64]:
         """Unit direction of every pixel's line of sight in sensor coordinates, shape (height, width, 3).
@@ -160,8 +164,26 @@ class Camera:
         return directions / np.linalg.norm(directions, axis=-1, keepdims=True)
 
     def unproject(self, distance: NDArray[np.floating]) -> NDArray[np.float64]:
-        """Rig points (height, width, 3) [m] of a radial distance image [m]; NaN stays NaN."""
+        """Rig points (height, width, 3) [m] of a radial distance image [m]; NaN stays NaN.
+
+        Raises:
+            CameraError: the image is not of the camera's size.
+        """
+        if np.shape(distance) != (self.height, self.width):
+            allowed = f"must be {(self.height, self.width)}, (height, width)"
+            raise CameraError(f"distance has shape {np.shape(distance)}: {allowed}")
         return pose.transform(self.T_rs, self.lookup.rays * np.asarray(distance, np.float64)[..., None])
+
+
+def _points(name: str, given: object) -> NDArray[np.float64]:
+    """Points (…, 3) as an array; CameraError if they are none."""
+    try:
+        points = np.asarray(given, np.float64)
+    except (TypeError, ValueError) as error:
+        raise CameraError(f"{name} = {given!r}: must be an array (…, 3) of metres") from error
+    if points.shape[-1:] != (3,):
+        raise CameraError(f"{name} has shape {points.shape}: must be (…, 3), x, y and z in metres")
+    return points
 
 
 def _check_number(name: str, value: object, *, positive: bool) -> None:

@@ -56,7 +56,8 @@ class FrameBuilder:
         self._arguments = {name: f"{reference}/{kind}" for name, kind in own.items()}
         self._arguments = {name: stream for name, stream in self._arguments.items() if stream in self._streams}
         if "depth_m" not in self._arguments:
-            raise ArgumentError(f'noise: sensor "{reference}" finds the object, so it needs a noise model of distances')
+            needed = f'"{reference}" finds the object, so it needs a model of distances, such as noise.Constant(0.001)'
+            raise ArgumentError(f"noise = {rig.sensors[reference].noise}: {needed}")
         self._grey = {sensor.head for sensor in rig.sensors.values() if isinstance(sensor.noise, GaussianGrey)}
         if len(pictures) == 1:
             self._arguments["image"] = pictures[0]

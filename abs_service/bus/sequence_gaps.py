@@ -19,7 +19,7 @@ class SequenceGaps:
 
     def __init__(self) -> None:
         self._lost: Counter[str] = Counter()
-        self._latest: dict[str, dict[str, int]] = {}  # by topic and publisher, the one heard last at the end
+        self._latest: dict[str, dict[str, int]] = {}  # by topic and publisher, the one received last at the end
 
     @property
     def lost(self) -> Mapping[str, int]:

@@ -30,7 +30,7 @@ from drivers.contract.device import Device
 from drivers.contract.discovery import Found
 
 RULES = "60-abs-service.rules"
-#: Time between two looks with --watch [s].
+#: Time between two searches with --watch [s].
 PERIOD_S = 1.0
 
 

@@ -27,11 +27,11 @@ _log = logging.getLogger(__name__)
 
 #: Timeout of the queries at the start [s].
 QUERY_S = 1.0
-#: Longest time between two looks at the disk, at the place of the open file, and at its size and age [s].
-LOOK_S = 1.0
+#: Longest time between two checks of the disk, of the place of the open file, and of its size and age [s].
+POLL_S = 1.0
 #: Time between two attempts to record after a failure [s].
 RETRY_S = 1.0
-#: Time between two looks whether there is something to record [s].
+#: Time between two checks whether there is something to record [s].
 IDLE_S = 0.05
 #: Why a file ends when the trigger does.
 ENDED = "trigger"
@@ -194,11 +194,11 @@ class Recorder:
     def _fill(self, take: Take, started_ns: int) -> str:
         """Records until a reason to end the file, which is returned."""
         settings, flush_ns = self._settings, int(self._settings.flush_s * 1e9)
-        look_ns = min(flush_ns, int(LOOK_S * 1e9))
-        next_flush_ns, next_look_ns, next_look_size = started_ns + flush_ns, started_ns + look_ns, 0
+        poll_ns = min(flush_ns, int(POLL_S * 1e9))
+        next_flush_ns, next_poll_ns, next_poll_size = started_ns + flush_ns, started_ns + poll_ns, 0
         while True:
             self.stall.alive()
-            sample = self._queue.take(max(0.0, (next_look_ns - self._clock.monotonic()) / 1e9))
+            sample = self._queue.take(max(0.0, (next_poll_ns - self._clock.monotonic()) / 1e9))
             if sample is not None:
                 self._writer.write(take, sample)
             elif self._queue.is_drained:
@@ -206,9 +206,9 @@ class Recorder:
             elif not self._pre_roll.is_open:
                 return ENDED
             now_ns = self._clock.monotonic()
-            if now_ns < next_look_ns and take.size < next_look_size:
+            if now_ns < next_poll_ns and take.size < next_poll_size:
                 continue
-            next_look_ns = now_ns + look_ns
+            next_poll_ns = now_ns + poll_ns
             if take.fate:
                 return "gone"
             if now_ns >= next_flush_ns:
@@ -219,7 +219,7 @@ class Recorder:
             if room < 0:
                 return "low space"
             # What has waited in memory may fill a disk within a second.
-            next_look_size = min(take.size + room // 2, settings.rotate_bytes)
+            next_poll_size = min(take.size + room // 2, settings.rotate_bytes)
             if take.size >= settings.rotate_bytes or now_ns - started_ns >= settings.rotate_s * 1e9:
                 return "rotated"
 

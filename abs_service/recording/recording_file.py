@@ -76,7 +76,7 @@ class RecordingFile:
         self.path = path
         self._active = self.path.with_name(self.path.name + ACTIVE)
         self._whole = 0  # size of the finished file
-        self._begun = 0  # size up to which the disk has been told to write
+        self._begun = 0  # size up to which writing to the disk has begun
         self._stream = _Counted(open_file(self._active))
         try:
             fcntl.flock(self._stream.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)

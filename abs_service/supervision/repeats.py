@@ -59,7 +59,7 @@ class Repeats:
 
 def counted(text: str, left_out: int) -> str:
     """A text, with the number of times that it was left out."""
-    return f"{text} ({left_out} more of these since the last one that was told)" if left_out else text
+    return f"{text} ({left_out} more of these since the last one that was reported)" if left_out else text
 
 
 class Tracebacks:

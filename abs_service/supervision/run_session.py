@@ -25,7 +25,7 @@ from abs_service.wire.sole_publishers import SolePublishers
 
 #: Messages per topic that may wait to be shown.
 DEPTH = 64
-#: Time between two looks at the children, at most [s].
+#: Time between two checks of the children, at most [s].
 PERIOD_S = 0.05
 #: Period and timeout of queries for lost topologies [s].
 QUERY_PERIOD_S, QUERY_TIMEOUT_S = 1.0, 0.2

@@ -7,7 +7,7 @@ import logging
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from abs_service.supervision.children.child import FIRST_BACKOFF_NS, FIRST_LOOK_NS, Child, ChildState, exit_reason
+from abs_service.supervision.children.child import FIRST_BACKOFF_NS, FIRST_POLL_NS, Child, ChildState, exit_reason
 from abs_service.supervision.children.child_process import NO_PROCESS, Spawn
 from abs_service.supervision.exit_codes import Exit
 from abs_service.supervision.repeats import Repeats, counted
@@ -98,7 +98,7 @@ class Supervisor:
         """Ends a process in order, and starts it again, which is no failure; also one that was given up."""
         child = self.children[component]
         if child.state is ChildState.RENEWED:
-            return  # it has been told, and a second SIGTERM would end it on the spot
+            return  # it has been signalled, and a second SIGTERM would end it on the spot
         child.process.terminate()
         child.exits_ns.clear()
         child.state, child.reason = ChildState.RENEWED, "starts again with the configuration that was read"
@@ -146,7 +146,7 @@ class Supervisor:
         for number, stage in enumerate(stages):
             children = [child for child in self.children.values() if child.stage == stage]
             for child in children:
-                if child.state is not ChildState.RENEWED:  # which has been told
+                if child.state is not ChildState.RENEWED:  # which has been signalled
                     child.process.terminate()
             # Equal time for each of the earlier stages; the last one, which drains to disk, has all that is left.
             share = (number + 1) / (len(stages) + 1) if number + 1 < len(stages) else 1.0
@@ -170,7 +170,7 @@ class Supervisor:
     def _expect_health(self, child: Child, now_ns: int, busy: bool) -> None:
         child.received_ns, child.busy, child.limit_ns = now_ns, busy, now_ns + self._limits.startup_ns
         child.deadline_ns = child.limit_ns if busy else now_ns + self._limits.stall_ns
-        child.overdue_ns = now_ns + (FIRST_LOOK_NS if busy else OVERDUE_NS)
+        child.overdue_ns = now_ns + (FIRST_POLL_NS if busy else OVERDUE_NS)
 
     def _start(self, child: Child, now_ns: int) -> None:
         child.end()

@@ -94,7 +94,7 @@ class Tracker:
         self._followed = 0
 
     def _minimize(self, frame: FramePosterior, search: Search, budget: Budget) -> Outcome:
-        """Analysis by synthesis: ask, deform, synthesise and score, tell, until the search returns."""
+        """Analysis by synthesis: ask, deform, synthesise, score, tell, until budget or convergence ends the search."""
         thetas = next(search)  # ask: candidates (population, dim)
         while True:
             surface = frame.surfaces.deform(thetas)  # deform: eqs. 2–8
@@ -111,9 +111,9 @@ class Tracker:
         motion = self._posterior.motion.update(frame.motion, optimum.theta, optimum.inverse_curvature)
         covariance = self._theta_covariance.update(optimum, frame.motion, motion)
         vertex_covariance = self._vertex_covariance.update(optimum, frame, covariance)
-        unheld, without_outline = self._slides.deviations(optimum)
-        unheld = max(single_frame_deviation(optimum, frame.motion), unheld)
-        shape = self._shape.compare(optimum.vertices, vertex_covariance, unheld, without_outline)
+        slide_m, no_outline_m = self._slides.deviations(optimum)
+        single_frame_m = max(single_frame_deviation(optimum, frame.motion), slide_m)
+        shape = self._shape.compare(optimum.vertices, vertex_covariance, single_frame_m, no_outline_m)
         fits = outcome.compared(frame).fits
         frame.learn(optimum.surface)
         verdict, reasons = status.judge(

@@ -165,7 +165,7 @@ def _missing(
     sensors = dict.fromkeys(far[shot][1] for shot in run)
     numbers = f"shots {run[0]} to {run[-1]}" if len(run) > 1 else f"shot {run[0]}"
     miss, median = float(np.median([far[shot][0] for shot in run])), max(typical[name] for name in sensors)
-    said = f"{numbers} of {' and '.join(sensors)} by {miss:.2g} px, {median:.2g} px are usual"
+    said = f"{numbers} of {' and '.join(sensors)} by {miss:.2g} px, {median:.2g} px are typical"
     if len(run) < MIN_VIEWS or (run[0] > shots[0]) == (run[-1] < shots[-1]):
         return said
     moment = f"before shot {run[0]}" if run[0] > shots[0] else f"after shot {run[-1]}"

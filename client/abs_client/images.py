@@ -18,7 +18,7 @@ from abs_client.errors import MalformedError
 from abs_client.stream import Stream
 
 #: Longest time that a reader waits for a signal before it looks again [s].
-LOOK_S = 1.0
+POLL_S = 1.0
 
 _PIXELS = {
     "mono8": ("u1", 1),
@@ -90,7 +90,7 @@ class _ImageSource:
             return newest
 
     def due_s(self) -> float:
-        return LOOK_S
+        return POLL_S
 
 
 def images(link: Link, sensor: str, stream: str) -> Stream[Image]:

@@ -44,7 +44,7 @@ def subscribe(
     Args:
         endpoint: `bus.endpoint` of the rig.
         rig, tracker: their names.
-        largest_age_s: age beyond which an estimate is not given [s]; infinite: all are given, silence is not told.
+        largest_age_s: age beyond which an estimate is not given [s]; infinite: all are given, silence is not reported.
         tls: for a rig with `[bus.tls]`.
 
     Raises:

@@ -20,7 +20,7 @@ from drivers.contract.frame_gate import FrameGate
 from drivers.contract.frame_queue import FrameQueue
 
 #: Polling interval of the stop event [ms].
-_LOOK_MS = 100
+_POLL_MS = 100
 
 
 @dataclass(slots=True)
@@ -161,7 +161,7 @@ class AzureDevice:
         library.forget()
         while not run.stop.is_set():
             try:
-                capture = self._kinect.capture(_LOOK_MS)
+                capture = self._kinect.capture(_POLL_MS)
             except DeviceError as error:
                 run.colors.end(str(error))
                 return
@@ -178,7 +178,7 @@ class AzureDevice:
 
     def _decode(self, run: _Run) -> None:
         while not run.stop.is_set():
-            item = run.colors.take(_LOOK_MS / 1000)
+            item = run.colors.take(_POLL_MS / 1000)
             overrun = run.colors.dropped()
             self._gate.drop("overrun", overrun)
             if item is not None:

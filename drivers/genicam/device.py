@@ -15,7 +15,7 @@ from drivers.genicam.features import Distances
 from drivers.genicam.link import CameraLink, Shot
 
 #: Interval at which images are looked for [s].
-_LOOK_S = 0.002
+_POLL_S = 0.002
 #: Numbers of GigE Vision's images of 16 bits, of which 0 is none.
 _NUMBERS = 65535
 
@@ -112,7 +112,7 @@ class GenicamDevice:
             while not stop.is_set():
                 shot = self._link.take()
                 if shot is None:
-                    stop.wait(_LOOK_S)
+                    stop.wait(_POLL_S)
                 else:
                     self._deliver(run, shot, self._clock())
         except DeviceError as error:

@@ -22,7 +22,7 @@ from drivers.o3r.head_link import HeadLink, end
 from drivers.o3r.library import reason
 
 #: Polling interval of the stop event [s].
-_LOOK_S = 0.1
+_POLL_S = 0.1
 #: Longest wait for the thread [s]; it ends later by itself if the network has gone while ifm3d connects.
 _JOIN_S = 5.0
 
@@ -104,7 +104,7 @@ class O3rDevice:
     def _pump(self, stop: threading.Event, grabber: Any, queue: FrameQueue[tuple[Any, int]]) -> None:
         latest = None
         while not stop.is_set():
-            item = queue.take(_LOOK_S)
+            item = queue.take(_POLL_S)
             overrun = queue.dropped()
             self._gate.drop("overrun", overrun * len(self.capabilities.streams))
             if item is not None:

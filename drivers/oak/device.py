@@ -19,7 +19,7 @@ from drivers.oak.source.connection import CLOCK, Connection, HostTimes
 #: Timeout for the first image of a stream, exposure settling included [s].
 FIRST_S = 10.0
 #: Polling interval of the stop event [s].
-_LOOK_S = 0.1
+_POLL_S = 0.1
 
 
 class OakDevice:
@@ -124,7 +124,7 @@ class OakDevice:
             queue.clear()
             while not stop.is_set():
                 try:
-                    picture = queue.get(_LOOK_S)
+                    picture = queue.get(_POLL_S)
                     if picture is not None and not stop.is_set():
                         self._deliver(role, picture)
                 except PictureError:

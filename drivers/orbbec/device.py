@@ -26,7 +26,7 @@ from drivers.orbbec.streams import Role, Stream
 _log = logging.getLogger(__name__)
 
 #: Polling interval of the stop event [s].
-_LOOK_S = 0.1
+_POLL_S = 0.1
 #: Time without images after which the origin is asked whether it has ended [s].
 _SILENT_S = 1.0
 
@@ -169,7 +169,7 @@ class OrbbecDevice:
     def _pump(self, origin: Origin, stop: threading.Event, queue: FrameQueue[_Arrival]) -> None:
         latest = time.monotonic()
         while not stop.is_set():
-            item = queue.take(_LOOK_S)
+            item = queue.take(_POLL_S)
             self._gate.drop("overrun", queue.dropped())
             if item is not None:
                 latest = time.monotonic()

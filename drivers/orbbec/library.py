@@ -13,7 +13,7 @@ from drivers.contract.device import SdkMissingError
 from drivers.contract.discovery import UDEV_REMEDY
 from drivers.contract.errors import translated_sdk_errors
 
-#: Threads of a context begin within this time [s]. One that has not when the context ends is not told, and the end
+#: Threads of a context begin within this time [s]. One that has not when the context ends is not notified, and the end
 #: waits for it for 60 s (SDK 2.9).
 _BEGINS_S = 0.1
 

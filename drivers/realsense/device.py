@@ -27,7 +27,7 @@ from drivers.realsense.streams import Role
 _log = logging.getLogger(__name__)
 
 #: Polling interval of the stop event [s].
-_LOOK_S = 0.1
+_POLL_S = 0.1
 #: Time without images after which the connection is checked [s].
 _SILENT_S = 1.0
 _NO_METADATA = (
@@ -176,7 +176,7 @@ class RealsenseDevice:
     def _pump(self, stop: threading.Event, queue: FrameQueue[tuple[Role, Any, int]]) -> None:
         latest = time.monotonic()
         while not stop.is_set():
-            item = queue.take(_LOOK_S)
+            item = queue.take(_POLL_S)
             self._gate.drop("overrun", queue.dropped())
             if item is not None:
                 latest = time.monotonic()

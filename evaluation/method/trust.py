@@ -64,7 +64,7 @@ SCENES: dict[str, ModelSettings] = {
     "strip": gravity.Settings(length_m=0.3),
 }
 
-#: Parts of a sequence whose coverage is told.
+#: Parts of a sequence whose coverage is reported.
 QUARTERS = 4
 
 

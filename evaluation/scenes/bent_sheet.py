@@ -26,7 +26,7 @@ CAMERA = Camera(176, 144, 183.0, 183.0, 87.5, 71.5)
 #: What is behind the sheet.
 WALL = Wall(1.6)
 
-#: Below this angle an arc is told as its series: the formula would divide rounding errors by next to nothing [rad].
+#: Below this angle an arc is computed as its series: the formula would divide rounding errors by next to nothing [rad].
 _FLAT = 1e-6
 
 

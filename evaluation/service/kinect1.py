@@ -1,7 +1,7 @@
 """CPU time and losses of receiving a Kinect v1, through unmodified libusb from an emulated camera.
 
 Statistic: share of the shown images that arrived, where no packet was lost; CPU time of a stream. Images that came too
-late, because this process was not scheduled, are lost like any other, and told beside.
+late, because this process was not scheduled, are lost like any other, and reported beside.
 Goal: at least 99 % in every case.
 Seeds: none; one run of 20 s for each case.
 """

@@ -1,7 +1,7 @@
 """Hours of faults: one after the other, at random times, made to one running rig.
 
 Statistic: depth images that were sent more than a second before a fault, or between two, and are in no recording;
-faults that no health told within 2 s; faults after which the rig was not well within half a minute; slopes of each
+faults that no health reported within 2 s; faults after which the rig was not well within half a minute; slopes of each
 process's private memory and number of open files, upper ends of their intervals of 95 % confidence.
 Goals: none of the first three; the bounds below for the slopes, of runs of ten minutes at least.
 Seeds: the context's seed chooses faults and times.
@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from abs_service.recording.disk import disk_watch
+from abs_service.recording.disk import disk_monitor
 from abs_service.report.content import Column, Section, Table
 from evaluation.experiment import Context, Findings, Goal, UnavailableError, at_most
 from evaluation.service.faults import fault, folders, messages, processes
@@ -37,7 +37,7 @@ FAULTS = tuple(
 LOST_S = 1.0
 #: Data rate of the recordings [bytes/s].
 RECORDED_BYTES_S = 11_000_000
-#: Bounds of the slopes: memory [MB/min] and open files [1/min]; shortest run in which they can be told [min].
+#: Bounds of the slopes: memory [MB/min] and open files [1/min]; shortest run in which they can be measured [min].
 GROWTH_MB_MIN, GROWTH_FILES_MIN, MIN_DURATION_MIN = 0.3, 0.3, 10.0
 
 
@@ -149,7 +149,7 @@ def _flat(name: str, slope: tuple[float, float]) -> tuple[Goal, Goal]:
 
 def _check_room(folder: Path, minutes: float) -> None:
     # With less than an hour's room, the recorder warns of a full disk, and no fault ends.
-    needed, free = round((minutes * 60 + disk_watch.WARN_S) * RECORDED_BYTES_S), shutil.disk_usage(folder).free
+    needed, free = round((minutes * 60 + disk_monitor.WARN_S) * RECORDED_BYTES_S), shutil.disk_usage(folder).free
     if needed > free:
         raise UnavailableError(
             f"{folder.parent}: {free / 1e9:.1f} GB are free, the recordings need {needed / 1e9:.1f} GB; make room, or "

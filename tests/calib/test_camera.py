@@ -142,6 +142,20 @@ def test_numbers_that_describe_no_camera_are_named(change, message):
         dataclasses.replace(CAMERA, **change)
 
 
+@pytest.mark.parametrize(
+    ("call", "given", "message"),
+    [
+        (CAMERA.project, np.zeros((5, 2)), r"points_r has shape \(5, 2\): must be \(…, 3\)"),
+        (CAMERA.project, "x", r"points_r = 'x': must be an array \(…, 3\)"),
+        (CAMERA.distance, 1.0, r"points_r has shape \(\): must be \(…, 3\)"),
+        (CAMERA.unproject, np.zeros((3, 3)), r"distance has shape \(3, 3\): must be \(\d+, \d+\), \(height, width\)"),
+    ],
+)
+def test_points_and_images_that_do_not_fit_are_named(call, given, message):
+    with pytest.raises(CameraError, match=f"^{message}"):
+        call(given)
+
+
 def test_a_pose_may_be_nested_lists():
     camera = dataclasses.replace(CAMERA, T_rs=CAMERA.T_rs.tolist())
     assert camera.calib_id == CAMERA.calib_id

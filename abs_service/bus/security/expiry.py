@@ -8,7 +8,7 @@ from abs_service.bus.security.mutual_tls import Certificate, MutualTls, NoSecuri
 
 #: Time before the end of a certificate from which on it is warned of.
 ENDS = timedelta(days=30)
-#: Time between two looks at the files [ns].
+#: Time between two checks of the files [ns].
 PERIOD_NS = 600 * 10**9
 #: What is left to do for a router.
 RENEWED = "a new one is in its place, for which this process has to be started again"

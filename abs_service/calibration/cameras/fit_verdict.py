@@ -21,10 +21,10 @@ def of_fit(name: str, fit: CornerFit, expected_px: float, optics: OpticsChange |
         name: of the sensor.
         fit: residuals of its corners.
         expected_px: their root mean square at calibration [px].
-        optics: change of its focal length and principal point; None if that cannot be told.
+        optics: change of its focal length and principal point; None if that is unknown.
         likelier: another sensor whose camera fits the corners better; "" if there is none.
     """
-    said = f"corners miss by {fit.rms:.2f} px; {expected_px:.2f} px are usual for it."
+    said = f"corners miss by {fit.rms:.2f} px; {expected_px:.2f} px are typical for it."
     level = Level.GOOD
     if fit.rms > DOUBTFUL_RATIO * expected_px and fit.rms >= UNNOTICED_PX:
         level = Level.BAD if fit.rms > BAD_RATIO * expected_px else Level.DOUBTFUL

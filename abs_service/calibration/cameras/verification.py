@@ -40,7 +40,7 @@ class Verification:
 
     Attributes:
         fits: residuals of sensors with corners, by sensor.
-        optics: changes of their focal lengths and principal points, where those can be told.
+        optics: changes of their focal lengths and principal points, where those are known.
         focal_px: their focal lengths.
         expected_px: their reprojection errors at calibration.
         biases: distance bias of sensors with corners and distances.

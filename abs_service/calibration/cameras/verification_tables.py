@@ -21,7 +21,7 @@ def sensors(
 ) -> Section:
     """Table of each sensor alone."""
     columns = (
-        Column("sensor"), Column("views"), Column("corners miss by", "px", ".3f"), Column("usual", "px", ".3f"),
+        Column("sensor"), Column("views"), Column("corners miss by", "px", ".3f"), Column("typical", "px", ".3f"),
         Column("distances exceed by", "mm", ".2f"), Column("±", "mm", ".2f"),
     )  # fmt: skip
     rows = tuple(

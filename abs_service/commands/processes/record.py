@@ -21,7 +21,7 @@ from abs_service import config
 from abs_service.bus.health import Health, Level
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.commands.parts import disk, rig_process
-from abs_service.recording.disk.disk_watch import DiskWatch
+from abs_service.recording.disk.disk_monitor import DiskMonitor
 from abs_service.recording.recorder import Recorder
 from abs_service.recording.recorder_settings import RecorderSettings
 from abs_service.recording.recovery import InUseError, RecoveryError, leftovers, recover, remove_interrupted, set_aside
@@ -41,7 +41,7 @@ _log = logging.getLogger(__name__)
 DRAIN_S = 2.5
 #: Age of an unfinished file below which the recorder before this one was killed while it recorded [s].
 INTERRUPTED_S = 60.0
-#: Time between two looks whether something is to be recovered [s].
+#: Time between two checks whether something is to be recovered [s].
 RECOVERY_S = 10.0
 #: By so much a file system's clock may be behind: it has the time of the last tick of the system.
 TICK_S = 0.1
@@ -81,8 +81,8 @@ def run(arguments: argparse.Namespace) -> int:
             recovery.start()
         commands.answer_record(bus, headers, health, recorder.ask)
         process_tuning.freeze_loaded_objects()
-        watch = DiskWatch(disk.recordings(rig), disk.estimates(rig), settings.minimum_free_bytes, health, clock)
-        watch.start(lambda: recorder.written, stop)
+        monitor = DiskMonitor(disk.recordings(rig), disk.estimates(rig), settings.minimum_free_bytes, health, clock)
+        monitor.start(lambda: recorder.written, stop)
         while not stop.wait(0.2):
             recorder.stall.report()
             health.label("tracking", "" if tracking.seen.is_set() else "nothing is tracked yet")

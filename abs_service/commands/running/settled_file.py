@@ -16,8 +16,8 @@ SETTLED_S = 0.5
 LONG_SETTLED_S = 3.0
 #: Longest wait for that [s].
 PATIENCE_S = 15.0
-#: Time between two looks [s].
-LOOK_S = 0.05
+#: Time between two checks [s].
+POLL_S = 0.05
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ def _stays(path: Path, state: tuple[int, int, int], settled_s: float, time_: Tim
     while _state(path) == state:
         if time_.monotonic() - begin_s >= settled_s or time_.wall() - state[2] * 1e-9 > settled_s:
             return True
-        time_.sleep(LOOK_S)
+        time_.sleep(POLL_S)
     return False
 
 

@@ -77,7 +77,7 @@ class Feed:
 
     Args:
         source: of the messages.
-        clock: time [ns] that the ages of messages are told from.
+        clock: time [ns] from which the ages of messages are computed.
 
     Attributes:
         malformed: messages that could not be parsed.

@@ -50,7 +50,7 @@ class Page:
 
     Args:
         feed: of the rig.
-        silence: what to do while nothing is heard of the rig, in words.
+        silence: what to do while nothing is received from the rig, in words.
         port: to listen at; the next free one is taken.
         view_only: True leaves out everything that acts on the rig.
         commands: to the rig.

@@ -40,7 +40,7 @@ class Panel:
         self._tracker = gui.add_dropdown("Tracker", list[str](["–"]), visible=False)
         self._tabs = tabs = gui.add_tab_group()
         with tabs.add_tab("View"):
-            # First, so that they stay where they are whatever is told below them.
+            # First, so that they stay where they are whatever is shown below them.
             self._buttons = {label: gui.add_button(label, hint=button.hint) for label, button in buttons.items()}
             self._reason = gui.add_markdown("", visible=False)
             self._answer = gui.add_markdown("", visible=False)

@@ -44,7 +44,7 @@ class Listener:
 class Playback:
     """Delivers the messages of a recording to subscribers, from `advance`, up to a time that moves with a clock.
 
-    A new subscriber is told what is there at the present time. All methods are for one thread.
+    A new subscriber gets what is there at the present time. All methods are for one thread.
 
     Args:
         path: of the file.

@@ -8,8 +8,8 @@ from abs_service.bus.health import Health, Level
 from abs_service.recording.disk import folder
 from abs_service.recording.disk.space import Space
 
-#: Time between two looks while nothing is recorded [ns].
-LOOK_NS = 1_000_000_000
+#: Time between two checks while nothing is recorded [ns].
+POLL_NS = 1_000_000_000
 
 
 class Readiness:
@@ -48,7 +48,7 @@ class Readiness:
         """
         if self._clock() < self._next_ns:
             return False
-        self._next_ns = self._clock() + LOOK_NS
+        self._next_ns = self._clock() + POLL_NS
         try:
             self._check()
             if not os.access(self._directory, os.W_OK | os.X_OK):

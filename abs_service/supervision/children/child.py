@@ -14,9 +14,9 @@ PROCESS = "process."
 
 #: First backoff before a restart [ns].
 FIRST_BACKOFF_NS = 200_000_000
-#: Time between two looks whether a process that starts or compiles does anything; the first is earlier than its next
+#: Time between two checks whether a process that starts or compiles does anything; the first is earlier than its next
 #: health is due, so that the second still reports within two seconds [ns].
-FIRST_LOOK_NS, LOOK_NS = 1_000_000_000, 800_000_000
+FIRST_POLL_NS, POLL_NS = 1_000_000_000, 800_000_000
 
 
 class ChildState(StrEnum):
@@ -93,7 +93,7 @@ class Child:
         if now_ns < self.overdue_ns or not self.busy:
             return now_ns >= self.overdue_ns
         before, self.looked_at = self.looked_at, self.process.threads()
-        self.overdue_ns = now_ns + LOOK_NS
+        self.overdue_ns = now_ns + POLL_NS
         runs = self.looked_at != before or any(thread.runnable for thread in self.looked_at.values())
         if not self.looked_at or runs:
             self.deadline_ns = self.limit_ns

@@ -46,7 +46,7 @@ class RigState:
         self.received: dict[str, Received] = {}
         self.malformed = 0
         self._removed: frozenset[str] = frozenset()  # components, whose last words come later
-        # Counters by component and process, the one heard last at the end; and those of processes long not heard.
+        # Counters by component and process, the one received last at the end; and those of silent processes.
         self._counted: defaultdict[str, dict[str, Mapping[str, int]]] = defaultdict(dict)
         self._ended: defaultdict[str, Counter[str]] = defaultdict(Counter)
         self._clock = clock

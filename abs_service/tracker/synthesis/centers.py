@@ -25,6 +25,6 @@ def at_centers(
         rights, downs = steps[0, k], steps[1, k]
         for channel in range(values.shape[0]):
             own, right, down = values[channel], gradients[channel, 0], gradients[channel, 1]
-            looks = result[k, channel]
-            for v in range(np.uintp(looks.size)):
-                looks[v] = own[v] + right[v] * rights[v] + down[v] * downs[v]
+            attributes = result[k, channel]
+            for v in range(np.uintp(attributes.size)):
+                attributes[v] = own[v] + right[v] * rights[v] + down[v] * downs[v]

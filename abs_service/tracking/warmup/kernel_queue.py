@@ -8,7 +8,8 @@ from typing import Any
 
 from calib.jit import Kernel
 
-#: The time for the rest is told once this share of all code is compiled: before, it is mostly the start of the workers.
+#: The time for the rest is estimated once this share of all code is compiled: before, it is mostly the start of the
+#: workers.
 _TELLING_SHARE = 0.05
 
 #: A kernel, and the types of its arguments.

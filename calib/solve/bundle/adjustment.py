@@ -50,7 +50,7 @@ class NotSolvedError(ValueError):
 
     Args:
         message: the reason, for people.
-        unfinished: where it ended, from which shots that contradict the rest can be told; None if it could not begin.
+        unfinished: where it ended, from which shots that contradict the rest can be found; None if it could not begin.
     """
 
     def __init__(self, message: str, unfinished: "Adjustment | None" = None) -> None:

@@ -26,8 +26,8 @@ from abs_client.stream import Stream
 
 #: Of /tf_static: the newest, for every node that comes later.
 LATCHED = Qos(depth=1, transient_local=True)
-#: Pause between two looks for trackers that began later [s].
-LOOK_S = 1.0
+#: Pause between two searches for trackers that began later [s].
+POLL_S = 1.0
 #: By when the threads that publish estimates have ended after their link has [s].
 END_S = 2.0
 
@@ -68,7 +68,7 @@ class Republisher:
 
     def run(self, end: threading.Event) -> None:
         """Searches for trackers, and publishes its own counters, once a second until `end`; then closes the link."""
-        while not end.wait(LOOK_S):
+        while not end.wait(POLL_S):
             for tracker in self._link.trackers() - self._trackers.keys():
                 stream = states.states(self._link, tracker, self._largest_age_s)
                 self._trackers[tracker] = threading.Thread(target=self._follow, args=(tracker, stream), daemon=True)

@@ -66,7 +66,7 @@ def files(path: Path) -> dict[Path, Role]:
     found = sorted(path.glob("*.mcap")) if path.is_dir() else [path]
     strange = [file for file in found if file.stem not in ROLES]
     if strange or not found:
-        what = f"{strange[0]}: what it holds is told by its name" if strange else f"{path}: there is no MCAP file in it"
+        what = f"{strange[0]}: its name says what it holds" if strange else f"{path}: there is no MCAP file in it"
         raise ForeignRecordingError(f"{what}; it must be one of {', '.join(f'{name}.mcap' for name in ROLES)}")
     return {file: ROLES[file.stem] for file in found}
 

@@ -59,7 +59,7 @@ def run(settings: Settings, context: Context) -> Findings:
     """Does every case again."""
     rows: list[tuple[Cell, ...]] = []
     goals: list[Goal] = []
-    for case in (each for each in _cases(settings) if each.brief or not settings.brief):
+    for case in (each for each in all_cases(settings) if each.brief or not settings.brief):
         context.progress(case.name)
         try:
             outcome = _measured(case, context.data)
@@ -79,7 +79,8 @@ def run(settings: Settings, context: Context) -> Findings:
     return Findings(tuple(goals), (Section("Before and after", (text, table)),), values)
 
 
-def _cases(settings: Settings) -> Iterator[Case]:
+def all_cases(settings: Settings) -> Iterator[Case]:
+    """Every case, also those that are left out of the quick form."""
     yield from duplicates.cases()
     yield from noise.cases(settings.units_mm)
     yield from conversion.cases()

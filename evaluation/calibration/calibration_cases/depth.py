@@ -46,7 +46,7 @@ def long_at_one_distance(bench: Bench) -> Outcome:
     """Boards at one distance, where a scale looks like an offset."""
     found = _verified(bench, 0.95, 1.05)
     reported = "cannot tell" in (bench.folder / "said.txt").read_text(encoding="utf-8")
-    return replace(found, goals=(*found.goals, at_least("says what cannot be told apart", reported, 1)))
+    return replace(found, goals=(*found.goals, at_least("says what cannot be distinguished", reported, 1)))
 
 
 def _verified(bench: Bench, near: float, far: float) -> Outcome:

@@ -141,7 +141,7 @@ FAULTS = (
     Elsewhere(
         "a folder with 100,000 recordings",
         "recording goes on while old ones are looked for",
-        "tests/abs_service/recording/disk/test_disk_watch.py",
+        "tests/abs_service/recording/disk/test_disk_monitor.py",
     ),
     Elsewhere(
         "truncated or flipped bytes in a recording",

@@ -65,7 +65,7 @@ def measure(trackers: Sequence[int], duration_s: float, seed: int, progress: Cal
             number: {command: 1e3 * cores / slow[number].rate_hz for command, cores in one.cores.items()}
             for number, one in seen.items()
         }
-        costs = _costs(by_trackers)
+        costs = costs_of(by_trackers)
         return Services(by_trackers, costs, _side_by_side(take, _carried(costs), duration_s, progress))
 
 
@@ -106,7 +106,8 @@ def values(services: Services) -> dict[str, Any]:
     return {"by_trackers": services.by_trackers, "side_by_side": beside}
 
 
-def _costs(by_trackers: Mapping[int, Mapping[str, float]]) -> Costs:
+def costs_of(by_trackers: Mapping[int, Mapping[str, float]]) -> Costs:
+    """Costs of an exposure: the law of `track`, and means of the other processes, by the number of trackers."""
     law = fit(list(by_trackers), [one["track"] for one in by_trackers.values()])
     mean = {name: float(np.mean([one[name] for one in by_trackers.values()])) for name in ("capture", "run", "record")}
     return Costs(mean["capture"], mean["run"], mean["record"], law)

@@ -113,8 +113,8 @@ def test_143_for_a_second_sigterm():
     assert done.returncode == 128 + signal.SIGTERM
 
 
-@pytest.mark.parametrize(("ignored", "told"), [(False, True), (True, False)])
-def test_a_terminal_that_is_closed_ends_in_order_unless_nohup_is_used(ignored, told):
+@pytest.mark.parametrize(("ignored", "reported"), [(False, True), (True, False)])
+def test_a_terminal_that_is_closed_ends_in_order_unless_nohup_is_used(ignored, reported):
     program = (
         "import os, signal, sys\nfrom abs_service.commands.parts import rig_process\n"
         f"signal.signal(signal.SIGHUP, signal.{'SIG_IGN' if ignored else 'SIG_DFL'})\n"
@@ -124,7 +124,7 @@ def test_a_terminal_that_is_closed_ends_in_order_unless_nohup_is_used(ignored, t
     )
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
     done = subprocess.run([sys.executable, "-c", program], env=environment, check=False)
-    assert done.returncode == 10 + told
+    assert done.returncode == 10 + reported
 
 
 def test_a_process_that_not_even_sigkill_ends_does_not_keep_this_one(monkeypatch, capsys):

@@ -30,7 +30,7 @@ class Stream:
         self._stop = threading.Event()
         self._bus = ZenohBus.open("demo", endpoint, SessionMode.ROUTER)
         self.health = queue.SimpleQueue()
-        self._heard, self._ended = "", ""  # boot identities of the recorder that was heard last, and of one that ended
+        self._received, self._ended = "", ""  # boot identities of the newest recorder, and of one that ended
         self._bus.subscribe("health/record", lambda sample: self.health.put(Health.FromString(sample.payload)))
         self._thread = threading.Thread(target=self._run)
 
@@ -55,7 +55,7 @@ class Stream:
             health = self.health.get(timeout=20)
             if health.header.boot_id == self._ended:
                 continue
-            self._heard = health.header.boot_id
+            self._received = health.header.boot_id
             if condition(health):
                 return health
 
@@ -63,7 +63,7 @@ class Stream:
         """Kills the recorder; what it said before and was not yet looked at is not taken for its successor's."""
         recorder.send_signal(signal.SIGKILL)
         recorder.wait()
-        self._ended = self._heard
+        self._ended = self._received
 
     def _run(self):
         publisher = self._bus.publisher(TOPIC, codec.IMAGE_SCHEMA, IMAGES)

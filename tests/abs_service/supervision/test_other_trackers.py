@@ -41,8 +41,8 @@ def bench(monkeypatch):
 
 def level(bench):
     """The level that `run` has published last."""
-    told = [sample.payload for sample in bench.bus.sent if sample.topic == keys.health("run")]
-    return Health.FromString(told[-1]).level if told else None
+    reported = [sample.payload for sample in bench.bus.sent if sample.topic == keys.health("run")]
+    return Health.FromString(reported[-1]).level if reported else None
 
 
 def passes(bench, condition):

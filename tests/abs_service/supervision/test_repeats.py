@@ -23,7 +23,7 @@ def test_a_process_that_never_works_fills_no_log(caplog):
     assert supervisor.children["track/a"].restarts > 300
     assert 20 < len(lines) < 40, "one of each kind in ten minutes"
     assert "track/a ended with code 2: abs-service: error: trackers.a.template: no file x.obj" in lines[1]
-    assert "more of these since the last one that was told" in lines[-1]
+    assert "more of these since the last one that was reported" in lines[-1]
     caplog.clear()
     world.words = "abs-service: error: another reason"
     ends(world, supervisor, "track/b", -11)
@@ -44,14 +44,14 @@ def test_the_first_are_told_and_what_has_not_come_for_long_is_new():
 def test_a_traceback_is_told_as_a_whole_and_ever_more_rarely():
     tracebacks = Tracebacks()
 
-    def told(lines, second, component="record"):
-        return [told for line in lines for told in tracebacks.take(component, line, second * S)]
+    def reported(lines, second, component="record"):
+        return [reported for line in lines for reported in tracebacks.take(component, line, second * S)]
 
-    assert told(["a line", "a line"], 0) == ["a line", "a line"]
+    assert reported(["a line", "a line"], 0) == ["a line", "a line"]
     for second in range(5):
-        assert told(TRACEBACK, second) == TRACEBACK
-    assert told([*TRACEBACK, "after it"], 6) == ["after it"]
-    assert told(TRACEBACK, 7, "capture") == TRACEBACK
+        assert reported(TRACEBACK, second) == TRACEBACK
+    assert reported([*TRACEBACK, "after it"], 6) == ["after it"]
+    assert reported(TRACEBACK, 7, "capture") == TRACEBACK
     other = [*TRACEBACK[:-1], "KeyError: 3"]
-    assert told(other, 8) == other
-    assert told(TRACEBACK, 70)[-1] == "OSError: no disk (1 more of these since the last one that was told)"
+    assert reported(other, 8) == other
+    assert reported(TRACEBACK, 70)[-1] == "OSError: no disk (1 more of these since the last one that was reported)"

@@ -19,13 +19,13 @@ def test_a_child_that_starts_or_compiles_may_be_silent_for_longer(world):
     assert (world.events, supervisor.children["track/a"].reason) == ([], "")
 
 
-@pytest.mark.parametrize("heard", [True, False])
-def test_a_child_that_stands_still_while_it_starts_or_compiles_is_told_and_killed_long_before_that(world, heard):
+@pytest.mark.parametrize("received", [True, False])
+def test_a_child_that_stands_still_while_it_starts_or_compiles_is_told_and_killed_long_before_that(world, received):
     supervisor = world.supervisor("track/a")
     child, process = supervisor.children["track/a"], world.latest("track/a")
     for second in range(60):
         process.its_threads = {1: ThreadTimes(ran_ns=second * S)}
-        if heard:
+        if received:
             supervisor.heartbeat("track/a", busy=True)
         passes(world, supervisor, 1)
     assert (world.events, child.reason) == ([], "")

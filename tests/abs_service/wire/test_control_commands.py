@@ -36,13 +36,13 @@ class Bench:
 
 
 def test_all_controls_are_told_with_their_values_and_limits():
-    told = {one.name: one for one in Bench().ask({}).controls}
-    assert {name: control_commands.value(one) for name, one in told.items()} == {
+    reported = {one.name: one for one in Bench().ask({}).controls}
+    assert {name: control_commands.value(one) for name, one in reported.items()} == {
         "auto_exposure": True, "exposure_s": 0.01, "infrared_gain": 12, "sync_role": "free",
     }  # fmt: skip
-    exposure = told["exposure_s"]
+    exposure = reported["exposure_s"]
     assert (exposure.unit, exposure.minimum, exposure.maximum) == ("s", EXPOSURE.minimum, EXPOSURE.maximum)
-    assert list(told["sync_role"].choices) == ["free", "master"]
+    assert list(reported["sync_role"].choices) == ["free", "master"]
 
 
 def test_values_of_every_type_are_set_and_told():

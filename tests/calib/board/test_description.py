@@ -112,12 +112,12 @@ def test_single_markers_are_not_taken_for_a_charuco(name: str, tags: str) -> Non
     dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name))
     image = grey(cv2.aruco.GridBoard((7, 5), 0.03, 0.006, dictionary).generateImage((640, 460), marginSize=12))
     for board in (AprilGrid(7, 5, 0.03, 0.006), Chessboard(7, 5, 0.03), Charuco(7, 5, 0.03, 0.022, "4x4_50")):
-        told = f"shows single markers of the dictionary {tags} without a chessboard, which are not supported"
-        assert mismatch(board, image) == told
+        reported = f"shows single markers of the dictionary {tags} without a chessboard, which are not supported"
+        assert mismatch(board, image) == reported
 
 
 @pytest.mark.parametrize(
-    ("name", "first", "border", "described", "told"),
+    ("name", "first", "border", "described", "reported"),
     [
         ("DICT_5X5_100", 0, 2, "5x5_100", "shows markers with a black frame of 2 cells; a ChArUco has 1 here"),
         ("DICT_4X4_1000", 500, 1, "4x4_50", "markers of the dictionary 4x4_1000, the description says 4x4_50"),
@@ -133,31 +133,31 @@ def test_single_markers_are_not_taken_for_a_charuco(name: str, tags: str) -> Non
     ],
 )
 def test_markers_of_an_unusual_print_are_named(
-    name: str, first: int, border: int, described: Dictionary, told: str
+    name: str, first: int, border: int, described: Dictionary, reported: str
 ) -> None:
     dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name))
     printed = cv2.aruco.CharucoBoard((7, 5), 0.03, 0.022, dictionary, np.arange(first, first + 17))
     image = grey(printed.generateImage((900, 640), marginSize=20, borderBits=border))
-    assert mismatch(Charuco(7, 5, 0.03, 0.022, described), image).endswith(told)
+    assert mismatch(Charuco(7, 5, 0.03, 0.022, described), image).endswith(reported)
 
 
 def test_columns_and_rows_are_exchanged_only_if_the_last_row_is_there() -> None:
     square = AprilGrid(6, 6, 0.03, 0.009)
     image = as_bytes(photograph(square, VGA, centered(square, (0.2, 0.1, 0.3), 0.45)))
-    told = "shows markers with ids up to 35 that stand as on a board of 6 columns, not of 7 × 6"
-    assert mismatch(AprilGrid(7, 6, 0.03, 0.009), image) == told
+    reported = "shows markers with ids up to 35 that stand as on a board of 6 columns, not of 7 × 6"
+    assert mismatch(AprilGrid(7, 6, 0.03, 0.009), image) == reported
 
 
 @pytest.mark.parametrize(
-    ("described", "told"),
+    ("described", "reported"),
     [
         (Circles(8, 5, 0.02, 0.012), "shows a grid of 7 × 5 discs"),
         (AsymmetricCircles(7, 5, 0.02, 0.012), "shows a grid of 7 × 5 discs"),
     ],
 )
-def test_the_grid_of_discs_that_is_there_is_named(described: Circles | AsymmetricCircles, told: str) -> None:
+def test_the_grid_of_discs_that_is_there_is_named(described: Circles | AsymmetricCircles, reported: str) -> None:
     board = Circles(7, 5, 0.02, 0.012)
-    assert other_discs(described, as_bytes(photograph(board, VGA, centered(board, (0.2, 0.1, 0.1), 0.25)))) == told
+    assert other_discs(described, as_bytes(photograph(board, VGA, centered(board, (0.2, 0.1, 0.1), 0.25)))) == reported
 
 
 def test_discs_in_shifted_rows_are_no_regular_grid() -> None:

@@ -21,10 +21,10 @@ def test_what_stands_in_the_way_of_a_library_is_said(error, message):
     assert str(SdkMissingError("sdk", "extra", error=error)).startswith(message)
 
 
-@pytest.mark.parametrize(("running", "is_told"), [((3, 13), False), ((3, 14), True)])
-def test_a_library_without_a_wheel_for_this_python_asks_for_another(running, is_told, monkeypatch):
+@pytest.mark.parametrize(("running", "is_reported"), [((3, 13), False), ((3, 14), True)])
+def test_a_library_without_a_wheel_for_this_python_asks_for_another(running, is_reported, monkeypatch):
     monkeypatch.setattr(errors, "PYTHON", running)
     message = str(SdkMissingError("sdk", "extra", newest_python=(3, 13)))
     assert (
         "sdk is not installed, and has no wheel for Python 3.14:  make clean all PYTHON=python3.13" in message
-    ) == is_told
+    ) == is_reported

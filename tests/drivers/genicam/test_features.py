@@ -27,8 +27,8 @@ class Link:
 def test_distances_are_metres_along_the_axis_or_radial() -> None:
     assert features.distances(node_map(BLAZE), "genicam://") == Distances(0.25e-3, 0.0, 7.0, Geometry.Z)
     spherical = {"Scan3dCoordinateSystem": ["Spherical"], "Scan3dCoordinateOffset": 2.0, "Scan3dInvalidDataFlag": False}
-    told = features.distances(node_map(BLAZE | spherical | {"Scan3dDistanceUnit": ["Inch"]}), "genicam://")
-    assert told == Distances(0.25 * 0.0254, 2 * 0.0254, 0.0, Geometry.RADIAL)
+    reported = features.distances(node_map(BLAZE | spherical | {"Scan3dDistanceUnit": ["Inch"]}), "genicam://")
+    assert reported == Distances(0.25 * 0.0254, 2 * 0.0254, 0.0, Geometry.RADIAL)
 
 
 def test_the_scale_is_that_of_coordinate_c() -> None:

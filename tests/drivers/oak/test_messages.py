@@ -150,7 +150,7 @@ def test_a_corrupt_recording_is_read_or_rejected(tmp_path: Path) -> None:
     [
         ("depth.mcap", None, "depth.mcap: cannot be read"),
         ("depth.mcap", b"no MCAP", "depth.mcap: this is no recording of depthai"),
-        ("video.mcap", b"", "what it holds is told by its name; it must be one of tof_depth.mcap"),
+        ("video.mcap", b"", "its name says what it holds; it must be one of tof_depth.mcap"),
         ("", None, "there is no MCAP file in it"),
     ],
 )

@@ -31,7 +31,7 @@ def test_a_missed_goal_is_a_missed_case_and_missing_data_are_said(monkeypatch: p
         yield Case("2 writes nothing", "trusted", broken)
         yield Case("3 long", "trusted", missing, brief=False)
 
-    monkeypatch.setattr(calibration_cases, "_cases", cases)
+    monkeypatch.setattr(calibration_cases, "all_cases", cases)
     found = calibration_cases.run(calibration_cases.QUICK, Context(0))
     (text, table) = found.sections[0].blocks
     assert isinstance(table, Table)

@@ -75,6 +75,6 @@ def test_as_many_rigs_run_as_the_cores_of_this_host_carry(
     costs = Costs(capture_ms, 1.0, 4.0, Law(1.0, 0.0, 10.0, 1.0))
     monkeypatch.setattr(os, "cpu_count", lambda: 16)
     monkeypatch.setattr(services, "write_take", lambda *_: None)
-    monkeypatch.setattr(services, "_costs", lambda _: costs)
+    monkeypatch.setattr(services, "costs_of", lambda _: costs)
     monkeypatch.setattr(services.live, "observe", lambda *_, progress: observed(0, 0.6))
     assert len(services.measure((), 1.0, 1, lambda _: None).beside) == rigs

@@ -104,10 +104,10 @@ def test_a_cold_start_has_a_cache_of_its_own(tmp_path):
     cache = f"{measurement.CACHE}={tmp_path / 'cache'}"
     with Service(write_rig(tmp_path, seed=3), {measurement.CACHE: str(tmp_path / "cache")}) as service:
         environment = Path(f"/proc/{service.processes()['run']}/environ")
-        while not (told := environment.read_bytes().decode().split("\0"))[0]:
+        while not (variables := environment.read_bytes().decode().split("\0"))[0]:
             time.sleep(0.001)  # exec(2) has closed the pipe that Popen waits for, but not set it yet
-        assert cache in told
-        assert f"PATH={os.environ['PATH']}" in told
+        assert cache in variables
+        assert f"PATH={os.environ['PATH']}" in variables
 
 
 def start_goals(cold):

@@ -102,9 +102,9 @@ def test_a_killed_recorder_leaves_a_gap_of_a_second_and_a_half_at_most(run, tmp_
 
 def replaced(run, command):
     """Tells a process of `run` to end; returns the moment when there is another one [ns]."""
-    told = children(run)[command]
-    os.kill(told, signal.SIGTERM)
-    wait_until(lambda: children(run).get(command, told) != told, 10, f"another {command}")
+    process_id = children(run)[command]
+    os.kill(process_id, signal.SIGTERM)
+    wait_until(lambda: children(run).get(command, process_id) != process_id, 10, f"another {command}")
     return time.monotonic_ns()
 
 

@@ -162,10 +162,10 @@ def offsets_are_as_right_as_they_say(hosts, listener):
 def nothing_is_lost_in_silence(listener):
     """Every exposure of the reference is in an estimate or in a counter of a host that still speaks."""
     states, now_ns = [state for _, state in listener.states()], time.monotonic_ns()
-    told = [*newest_counters(listener, "track/sheet", now_ns), *newest_counters(listener, "capture", now_ns)]
+    reported = [*newest_counters(listener, "track/sheet", now_ns), *newest_counters(listener, "capture", now_ns)]
     losses = ("skipped", "rejected", "device.sim.late")  # a machine that pauses makes the cameras themselves late
     mine = Counter()
-    for counters in told:
+    for counters in reported:
         if any("tof/depth" in name for name in counters):
             names = [name for name in counters if name in losses or "tof/depth" in name]
             mine.update({name: counters[name] for name in names if not name.startswith("published")})
@@ -183,10 +183,10 @@ def newest_counters(listener, component, after_ns):
     """Counters of each host with that component; all that still run are awaited once more."""
     running = {one.header.host_clock for one in listener.health(component)[-10:]}
 
-    def told():
+    def reported():
         return running <= {one.header.host_clock for t_ns, one in listener.timed_health(component) if t_ns > after_ns}
 
-    wait_until(told, BOOT_S, f"health of {component}")
+    wait_until(reported, BOOT_S, f"health of {component}")
     newest = {one.header.host_clock: dict(one.counters) for one in listener.health(component)}
     return list(newest.values())
 

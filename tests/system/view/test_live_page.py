@@ -51,7 +51,7 @@ def test_the_page_shows_a_mesh_that_moves_acts_and_connects_again(run, rig_file,
 
     rig.send_signal(signal.SIGTERM)
     rig.wait(PATIENCE_S)
-    says(page, "Nothing heard from the rig")
+    says(page, "Nothing received from the rig")
     launch("run", rig_file, "--no-record", "--json")
     with RigListener(endpoint) as again:
         wait_until(again.tracks_since(0), START_S, "TRACKING")

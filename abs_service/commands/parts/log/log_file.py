@@ -18,9 +18,9 @@ END_S = 1.0
 class LogFile(WatchedFileHandler):
     """A file that is opened again after it was moved by logrotate, or could not be opened.
 
-    Records that cannot be written, as on a full disk or in a folder that is gone, end nobody's work. They are told on
-    standard error: the first, and how many there were when one can be written again. A pipe without a reader takes no
-    record, nor does one whose reader stands still.
+    Records that cannot be written, as on a full disk or in a folder that is gone, end nobody's work. They are reported
+    on standard error: the first, and how many there were when one can be written again. A pipe without a reader takes
+    no record, nor does one whose reader stands still.
     """
 
     _lost = 0

@@ -25,7 +25,7 @@ class DeviceControls:
     def __init__(self, gui: viser.GuiApi, tab: viser.GuiTabHandle, devices: Sequence[str], send: Send) -> None:
         self._gui, self._tab, self._devices, self._send = gui, tab, devices, send
         self._folders: dict[str, viser.GuiFolderHandle] = {}
-        self._known: dict[str, dict[str, Control]] = {}  # by device and name, as they were told last
+        self._known: dict[str, dict[str, Control]] = {}  # by device and name, as last reported
         self._inputs: dict[str, dict[str, Input]] = {}
         self._lock = threading.Lock()  # buttons are pressed in threads of the server
         with tab:

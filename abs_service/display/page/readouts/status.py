@@ -21,7 +21,7 @@ def lines(feed: Feed, tracker: str, silence: str) -> list[Words]:
     Args:
         feed: of the rig.
         tracker: that is shown.
-        silence: what to do while nothing is heard of the rig.
+        silence: what to do while nothing is received from the rig.
     """
     silent = words.silence(feed.age_s(), silence)
     if silent is not None:

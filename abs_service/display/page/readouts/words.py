@@ -98,4 +98,4 @@ def silence(age_s: float, remedy: str) -> Words | None:
     if age_s <= 3 * STALE_S:
         return None
     since = "yet" if age_s == float("inf") else f"for {age(age_s)}"
-    return Words(f"Nothing heard from the rig {since}", remedy, STALE_COLOR)
+    return Words(f"Nothing received from the rig {since}", remedy, STALE_COLOR)

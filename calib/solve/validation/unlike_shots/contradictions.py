@@ -61,7 +61,7 @@ class Contradiction:
         """One clause for people."""
         unit, scale = ("px", 1.0) if self.of == "corners" else ("mm", 1e3)
         miss, median = (f"{scale * each:.2g} {unit}" for each in (self.miss, self.median))
-        said = f"{self.of} of {self.sensors[0]} miss by {miss}, {median} are usual"
+        said = f"{self.of} of {self.sensors[0]} miss by {miss}, {median} are typical"
         if self.apart:
             said += f"; {' and '.join(self.sensors)} see the board {self.apart * 1e3:.1f} mm apart, and each fits alone"
         if self.exchanged_with:

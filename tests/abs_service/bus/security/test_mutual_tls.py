@@ -168,9 +168,9 @@ def test_a_router_says_that_its_new_certificate_waits_for_its_next_start(lab, mo
     now_ns += expiry.PERIOD_NS
     assert router.trouble() == "", "there is time"
     monkeypatch.setattr(expiry, "ENDS", timedelta(days=400))
-    told = router.trouble()
-    assert told.startswith('the certificate "rig" ends on 20')
-    assert told.endswith("; a new one is in its place, for which this process has to be started again")
+    reported = router.trouble()
+    assert reported.startswith('the certificate "rig" ends on 20')
+    assert reported.endswith("; a new one is in its place, for which this process has to be started again")
 
 
 def test_a_certificate_that_has_ended_is_told_so():

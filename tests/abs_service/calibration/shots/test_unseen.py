@@ -39,8 +39,10 @@ def test_a_board_that_is_in_no_image_is_said_with_what_is_there(said, data_set: 
     assert "3 images show a board of 9 × 6 inner corners: correct the description" in error
 
 
-@pytest.mark.parametrize(("hidden", "told"), [(1, False), (0, True)])
-def test_a_board_of_which_only_a_part_is_found_is_not_suggested(said, tmp_path: Path, hidden: int, told: bool) -> None:
+@pytest.mark.parametrize(("hidden", "reported"), [(1, False), (0, True)])
+def test_a_board_of_which_only_a_part_is_found_is_not_suggested(
+    said, tmp_path: Path, hidden: int, reported: bool
+) -> None:
     board = Chessboard(9, 5, 0.025)
     for number in range(2):
         image = as_bytes(photograph(board, VGA, centered(board, (0.2, 0.1, 0.3 * number), 0.4)))
@@ -48,8 +50,8 @@ def test_a_board_of_which_only_a_part_is_found_is_not_suggested(said, tmp_path: 
             image = as_bytes(photograph(Chessboard(8, 4, 0.025), VGA, centered(board, (0.2, 0.1, 0.3), 0.4)))
         cv2.imwrite(str(tmp_path / f"c_{number}.png"), image)
     error = said(Chessboard(9, 6, 0.025), "--images", f"color={tmp_path}/c_*.png")
-    assert ("2 images show a board of 9 × 5 inner corners" in error) == told
-    assert told or "inner corners: correct" not in error
+    assert ("2 images show a board of 9 × 5 inner corners" in error) == reported
+    assert reported or "inner corners: correct" not in error
 
 
 def test_a_board_with_more_corners_than_described_is_refused(said, data_set: Callable[[str], Path]) -> None:
@@ -73,7 +75,7 @@ PRINT = Charuco(7, 5, 0.03, 0.022, "5x5_50")
 
 
 @pytest.mark.parametrize(
-    ("described", "told"),
+    ("described", "reported"),
     [
         (Charuco(7, 5, 0.03, 0.022, "4x4_50"), "dictionary 5x5_50, the description says 4x4_50"),
         (Charuco(5, 7, 0.03, 0.022, "5x5_50"), "fits with columns and rows exchanged, 7 × 5 instead of 5 × 7"),
@@ -81,11 +83,11 @@ PRINT = Charuco(7, 5, 0.03, 0.022, "5x5_50")
     ],
 )
 def test_a_wrong_description_of_a_board_with_markers_is_named(
-    said, tmp_path: Path, described: Target, told: str
+    said, tmp_path: Path, described: Target, reported: str
 ) -> None:
     shown = photograph(PRINT, VGA, centered(PRINT, (0.2, 0.1, 0.3), 0.45))
     cv2.imwrite(str(tmp_path / "c_1.png"), as_bytes(shown))
-    assert f"{told}: correct the description" in said(described, "--images", f"color={tmp_path}/c_*.png")
+    assert f"{reported}: correct the description" in said(described, "--images", f"color={tmp_path}/c_*.png")
 
 
 def test_images_without_a_board_are_counted_by_what_is_wrong(said, tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from tests.waiting import eventually
 @pytest.fixture
 def waiting(tmp_path, monkeypatch):
     """Makes a rig whose recorder waits for a trigger; arguments of `Rig`."""
-    monkeypatch.setattr(readiness, "LOOK_NS", 10**6)
+    monkeypatch.setattr(readiness, "POLL_NS", 10**6)
     made = []
 
     def make(**arguments):

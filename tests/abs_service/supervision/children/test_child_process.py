@@ -213,8 +213,8 @@ def test_a_child_is_known_by_its_command_line(child):
     ready = threading.Event()
     process = child("import os; print('ready'); os.read(0, 1)", lambda *_: ready.set())
     assert ready.wait(10)
-    with open(f"/proc/{process.pid}/cmdline") as told:
-        assert told.read().rstrip("\0") == "abs-service import os; print('ready'); os.read(0, 1)"
+    with open(f"/proc/{process.pid}/cmdline") as cmdline:
+        assert cmdline.read().rstrip("\0") == "abs-service import os; print('ready'); os.read(0, 1)"
 
 
 def gone(pid, seconds=5.0):

@@ -42,13 +42,13 @@ DETECTION, LEVELS = scene()
 IMAGE = ColorImage(np.repeat(LEVELS[..., None], 3, axis=2))
 
 
-def told(image, camera=COLOR):
+def reported(image, camera=COLOR):
     rig = Rig("r", {"cam": Sensor("cam", camera, GaussianColor(3.0))})
     return alignment_warnings(DETECTION, {"cam": image}, rig)
 
 
 def test_a_right_calibration_raises_no_doubts():
-    assert told(IMAGE) == ()
+    assert reported(IMAGE) == ()
 
 
 @pytest.mark.parametrize(
@@ -71,7 +71,7 @@ def test_what_would_mend_a_wrong_calibration_is_told(wrong, scale, shift):
 @pytest.mark.parametrize("order", ["one channel", "grbg"])
 def test_grey_images_and_mosaics_tell_as_well(order):
     image = ChannelImage(LEVELS.astype(np.float32), BAYER_ORDERS.get(order, np.zeros((1, 1), np.uint8)))
-    assert told(image) == ()
+    assert reported(image) == ()
     found = displacement(DETECTION, image, replace(COLOR, cx=299.5))
     assert found is not None
     assert found.px == pytest.approx(20, abs=3)
@@ -92,9 +92,9 @@ def test_a_mirrored_image_is_told(is_grey):
     right = grey if is_grey else IMAGE
     pixels = right.values if isinstance(right, ChannelImage) else right.rgb
     changed = {"values" if is_grey else "rgb": np.ascontiguousarray(pixels[:, ::-1])}
-    (doubt,) = told(replace(right, **changed))
+    (doubt,) = reported(replace(right, **changed))
     assert doubt.endswith("only if left and right are exchanged: is one of the two mirrored?")
-    assert told(right) == ()
+    assert reported(right) == ()
 
 
 def test_distances_without_a_jump_tell_nothing():

@@ -108,14 +108,14 @@ def test_large_pixels_do_not_tear_a_round_surface(step, whole):
     assert (covered > 0.75) == whole, covered
 
 
-@pytest.mark.parametrize(("noise", "scale", "told"), [
+@pytest.mark.parametrize(("noise", "scale", "reported"), [
     (StructuredLight(), 1.0, 1.0), (StructuredLight(), 10.0, 0.1), (StructuredLight(), 0.1, 10.0),
     (Constant(10e-3), 1.0, 1.0), (Constant(10e-3), 10.0, 1.0), (Constant(0.1e-3), 1.0, 1.0),
 ])  # fmt: skip
-def test_a_unit_that_is_ten_times_off_is_told_by_the_scatter_of_structured_light(noise, scale, told):
+def test_a_unit_that_is_ten_times_off_is_told_by_the_scatter_of_structured_light(noise, scale, reported):
     """Distances of 1.2 m with a deviation of 2 mm; they were tracked in the wrong unit without a word."""
     scene = np.random.default_rng(3).normal(1.2, 2e-3, (96, 128)) * scale
     scene[30:60, 30:60] -= 0.2 * scale
     rig = Rig("r", {"tof": Sensor("tof", FINE, noise)})
     seen = detect_object(observation(tof=depth_image(scene.astype(np.float32))), rig, "tof", EVERYWHERE, 300)
-    assert seen.fitting_scale == told
+    assert seen.fitting_scale == reported

@@ -13,9 +13,9 @@ def test_a_wall_is_not_taken_for_the_largest_thing_on_a_table():
     distance = table(SMALL).distance
     distance[:30] = 1.0  # behind the table
     view = DepthView.of(distance, CAMERA)
-    with pytest.raises(DetectionError, match="like a wall or a floor, and another one is nearer, at") as told:
+    with pytest.raises(DetectionError, match="like a wall or a floor, and another one is nearer, at") as raised:
         above_plane.Settings().build().select(view)
-    column, row = map(int, str(told.value).rpartition("[")[2].partition("]")[0].split(", "))
+    column, row = map(int, str(raised.value).rpartition("[")[2].partition("]")[0].split(", "))
     around = ((90, 50), (140, 50), (140, 95), (90, 95))
     for settings in (above_plane.Settings(seed=(column, row)), above_plane.Settings(polygon=around)):
         assert_is(settings.build().select(view), SMALL)

@@ -107,13 +107,13 @@ def test_a_mosaic_is_compared_channel_by_channel(kind, order):
     """Every pixel is compared in its own channel, for any Bayer order; another order does not fit the colours."""
     mesh = sheet(21, 31, flat, size=(0.2, 0.14))
     synthesizer = built(kind, mesh)
-    looks = gradient_colors(synthesizer.canvas.vertices) * np.array([1.0, 0.6, 0.3], np.float32)
+    appearance = gradient_colors(synthesizer.canvas.vertices) * np.array([1.0, 0.6, 0.3], np.float32)
     wall = gradient_colors(COLOR.unproject(plane_distance(COLOR, WALL, 1.0))) * np.array([1.0, 0.6, 0.3])
     rows, columns = np.indices((COLOR.height, COLOR.width))
     channel = BAYER_ORDERS[order][rows % 2, columns % 2]
     values = np.take_along_axis(wall, channel[..., None].astype(int), axis=2)[..., 0].astype(np.float32)
     surface = as_surface((mesh.vertices, mesh.normals))
-    term = ChannelTerm("color", synthesizer, looks, GaussianBayer(LEVELS), Passive(), BOUNDS)
+    term = ChannelTerm("color", synthesizer, appearance, GaussianBayer(LEVELS), Passive(), BOUNDS)
     fit = term.observe(ChannelImage(values, channel), predicted(synthesizer, surface)).fit(surface)
     assert fit.inliers == fit.samples > 0.8 * fit.visible
     assert fit.normalized_residual < 0.3

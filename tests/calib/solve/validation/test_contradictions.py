@@ -109,5 +109,5 @@ def test_shots_after_which_a_sensor_was_moved_are_named_as_one_group() -> None:
     later = {shot: moved(T_rb, (0.1, 0, 0)) for shot, T_rb in BOARDS.items() if shot > 12}
     said = unlike_the_rest(*start(task({**BOARDS, **later}), lambda _: None))
     assert "(was a sensor moved before shot 13?)" in said
-    assert said.count("px are usual") == 1
+    assert said.count("px are typical") == 1
     assert said.endswith("--skip 13-19")

@@ -25,7 +25,7 @@ LATER_IMAGES = 4
 #: Dropouts of 2 % change a tenth of a fixed one. Of a sheet that hands bend before a real Kinect v1, far from the sides
 #: of its image, an edge was so in 5 of 116 such series of images.
 CELL_PX, MIN_SHARE, MIN_LENGTH, LARGEST_GAP = 16, 0.8, 24, 8
-#: If no more than this share of the rest of the outline changes, all of it stands still, and nothing can be told.
+#: If no more than this share of the rest of the outline changes, all of it stands still, and nothing is known.
 MIN_ELSEWHERE = 0.25
 #: So many returns farther than this beyond an edge, in all images so far, show that the sensor sees there [px].
 MIN_RETURNS, BEYOND_PX = 10, 2.0

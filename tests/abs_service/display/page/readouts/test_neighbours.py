@@ -29,7 +29,7 @@ def link(name="lab", **statuses):
             "lab: left: Tracking, σ 0.40 mm, right: Object lost<",
             words.STATUS["LOST"][1],
         ),
-        ({}, "lab: Nothing heard from the rig yet<", words.STALE_COLOR),
+        ({}, "lab: Nothing received from the rig yet<", words.STALE_COLOR),
     ],
 )
 def test_a_link_has_the_words_and_the_worst_colour_of_its_rig(statuses, text, color):

@@ -42,7 +42,7 @@ def rig():
 
 def test_a_rig_that_says_nothing(rig):
     (line,) = status.lines(rig.feed, "left", "Start it.")
-    assert (line.title, line.text) == ("Nothing heard from the rig yet", "Start it.")
+    assert (line.title, line.text) == ("Nothing received from the rig yet", "Start it.")
 
 
 def test_the_name_of_a_tracker_is_told_where_there_are_several_the_shown_one_first(rig):

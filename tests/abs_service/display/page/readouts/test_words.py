@@ -54,7 +54,7 @@ def test_a_silent_rig_is_told_with_what_to_do():
     assert words.silence(0.5, "tcp/rig:1") is None
     said = words.silence(12.0, "tcp/rig:1")
     assert said is not None
-    assert said.title == "Nothing heard from the rig for 12 s"
+    assert said.title == "Nothing received from the rig for 12 s"
     assert "tcp/rig:1" in said.text
     assert "yet" in getattr(words.silence(math.inf, "tcp/rig:1"), "title", "")
 

@@ -9,8 +9,8 @@ from absmsg.v1.health_pb2 import Health as HealthMessage
 
 from abs_service.bus.health import Health
 from abs_service.bus.stamps import HeaderFactory, WallClock
-from abs_service.recording.disk import disk_watch, forecast
-from abs_service.recording.disk.disk_watch import DiskWatch
+from abs_service.recording.disk import disk_monitor, forecast
+from abs_service.recording.disk.disk_monitor import DiskMonitor
 from abs_service.recording.disk.forecast import Growth
 from abs_service.recording.disk.retention import Retention
 from abs_service.recording.recording_file import ESTIMATES
@@ -90,8 +90,8 @@ def test_the_time_before_the_first_byte_is_no_part_of_the_rate():
     assert meter.add(40 * 10**9, 7.0) == 7.0
 
 
-class Watch:
-    """A disk watch with a clock and a disk of its own, which sees 10 MB/s written."""
+class Bench:
+    """A disk monitor with a clock and a disk of its own, which sees 10 MB/s written."""
 
     def __init__(self, folder, free, retain_s=math.inf, retain_bytes=math.inf):
         self.now_ns, self.jump_ns = 0, 0
@@ -100,27 +100,27 @@ class Watch:
         self.health = Health(self.bus, "record", HeaderFactory("demo", clock))
         recordings = Retention(folder, "demo", "", retain_s, retain_bytes)
         estimates = Retention(folder, "demo", ESTIMATES, math.inf, math.inf)
-        self.watch = DiskWatch(recordings, estimates, 0, self.health, clock, lambda folder: free)
+        self.monitor = DiskMonitor(recordings, estimates, 0, self.health, clock, lambda folder: free)
 
     def pass_seconds(self, seconds):
         for _ in range(seconds):
             self.now_ns += 10**9
             self.clock.measure()
-            self.watch.look((self.now_ns // 100, 0))
+            self.monitor.check((self.now_ns // 100, 0))
         return health_now(self.health, self.bus)
 
 
 def test_health_has_the_forecast_and_warns_in_the_last_hour(tmp_path):
-    said = Watch(tmp_path, free=72_000 * 10 * MB).pass_seconds(30)
+    said = Bench(tmp_path, free=72_000 * 10 * MB).pass_seconds(30)
     assert (said.level, said.labels["forecast"]) == (HealthMessage.LEVEL_OK, "20.0 hours on this disk")
-    said = Watch(tmp_path, free=1800 * 10 * MB).pass_seconds(30)
+    said = Bench(tmp_path, free=1800 * 10 * MB).pass_seconds(30)
     assert (said.level, said.message) == (HealthMessage.LEVEL_WARNING, "the disk is full in 30.0 min")
 
 
 def test_old_recordings_are_deleted_and_counted(tmp_path):
     for day in range(1, 8):
         put(tmp_path, take(day), 8 - day)
-    said = Watch(tmp_path, 1, retain_s=4.5 * 86_400).pass_seconds(11)
+    said = Bench(tmp_path, 1, retain_s=4.5 * 86_400).pass_seconds(11)
     assert (said.counters["deleted"], said.labels["deleted"]) == (3, take(3))
 
 
@@ -128,7 +128,7 @@ def test_estimates_outlive_their_recordings(tmp_path):
     names = (take(1), take(1).replace(".mcap", "_estimates.mcap"))
     for name in names:
         put(tmp_path, name, 7)
-    Watch(tmp_path, 1, retain_s=86_400).pass_seconds(11)
+    Bench(tmp_path, 1, retain_s=86_400).pass_seconds(11)
     assert [path.name for path in tmp_path.iterdir()] == [names[1]]
 
 
@@ -138,35 +138,35 @@ STEPS = (1 / 24, -1 / 24, 365, -NOW_NS / DAY_NS)
 
 @pytest.mark.parametrize("days", STEPS)
 def test_no_step_of_the_wall_clock_makes_a_recording_older_or_younger(tmp_path, days):
-    watch = Watch(tmp_path, 1, retain_s=60.0)
+    bench = Bench(tmp_path, 1, retain_s=60.0)
     put(tmp_path, take(1), 20 / 86_400)
-    watch.pass_seconds(11)
-    watch.jump_ns = int(days * DAY_NS)
-    assert watch.pass_seconds(20).counters["deleted"] == 0
-    assert watch.pass_seconds(20).counters["deleted"] == 1
+    bench.pass_seconds(11)
+    bench.jump_ns = int(days * DAY_NS)
+    assert bench.pass_seconds(20).counters["deleted"] == 0
+    assert bench.pass_seconds(20).counters["deleted"] == 1
 
 
 @pytest.mark.parametrize("days", STEPS)
 def test_what_is_recorded_after_a_step_of_the_wall_clock_is_the_newest(tmp_path, days):
     for day in (1, 2, 3):
         put(tmp_path, take(day), 8 - day)
-    watch = Watch(tmp_path, 1, retain_bytes=400)
-    watch.pass_seconds(11)
+    bench = Bench(tmp_path, 1, retain_bytes=400)
+    bench.pass_seconds(11)
     for day in (4, 5):
         active = put(tmp_path, take(day) + ".active", -days)
-        watch.pass_seconds(10)
+        bench.pass_seconds(10)
         active.rename(tmp_path / take(day))
-    watch.pass_seconds(10)
+    bench.pass_seconds(10)
     assert sorted(path.name for path in tmp_path.iterdir()) == [take(day) for day in (2, 3, 4, 5)]
 
 
 def test_a_recording_is_as_old_as_its_end(tmp_path):
-    watch = Watch(tmp_path, 1, retain_s=60.0)
+    bench = Bench(tmp_path, 1, retain_s=60.0)
     active = put(tmp_path, take(1) + ".active")
-    watch.pass_seconds(300)
+    bench.pass_seconds(300)
     active.rename(tmp_path / take(1))
-    assert watch.pass_seconds(50).counters["deleted"] == 0
-    assert watch.pass_seconds(30).counters["deleted"] == 1
+    assert bench.pass_seconds(50).counters["deleted"] == 0
+    assert bench.pass_seconds(30).counters["deleted"] == 1
 
 
 def test_what_cannot_be_deleted_does_not_keep_the_others(tmp_path, monkeypatch):
@@ -178,7 +178,7 @@ def test_what_cannot_be_deleted_does_not_keep_the_others(tmp_path, monkeypatch):
     for day in (1, 2, 3):
         put(tmp_path, take(day), 8 - day)
     monkeypatch.setattr("pathlib.Path.unlink", unlink)
-    said = Watch(tmp_path, 10**15, retain_s=86_400).pass_seconds(1)
+    said = Bench(tmp_path, 10**15, retain_s=86_400).pass_seconds(1)
     assert (said.counters["deleted"], "Operation not permitted" in said.message) == (2, True)
 
 
@@ -188,44 +188,44 @@ def test_what_cannot_be_deleted_is_said(tmp_path, monkeypatch):
 
     put(tmp_path, take(1), 7)
     monkeypatch.setattr("pathlib.Path.unlink", refuse)
-    said = Watch(tmp_path, 10**15, retain_s=86_400).pass_seconds(1)
+    said = Bench(tmp_path, 10**15, retain_s=86_400).pass_seconds(1)
     assert said.message == "an old recording cannot be deleted: [Errno 1] Operation not permitted"
 
 
 def test_without_a_folder_there_is_no_forecast(tmp_path):
-    watch = Watch(tmp_path, 1)
+    bench = Bench(tmp_path, 1)
     gone = Retention(tmp_path / "gone", "demo", "", 1.0, 1.0)
-    watch.watch = DiskWatch(gone, gone, 0, watch.health, watch.clock)
-    assert watch.pass_seconds(30).labels["forecast"] == ""
+    bench.monitor = DiskMonitor(gone, gone, 0, bench.health, bench.clock)
+    assert bench.pass_seconds(30).labels["forecast"] == ""
 
 
 def test_a_folder_that_takes_long_to_read_is_read_less_often(tmp_path):
-    watch, looks = Watch(tmp_path, 1), []
+    bench, checks = Bench(tmp_path, 1), []
 
     def slow(folder):
-        looks.append(watch.now_ns)
-        watch.now_ns += 3 * 10**9
+        checks.append(bench.now_ns)
+        bench.now_ns += 3 * 10**9
         return 1
 
     kept = Retention(tmp_path, "demo", "", 1.0, 1.0)
-    watch.watch = DiskWatch(kept, kept, 0, watch.health, watch.clock, slow)
-    watch.pass_seconds(130)
-    assert [t_ns // 10**9 for t_ns in looks] == [1, 64, 127]
+    bench.monitor = DiskMonitor(kept, kept, 0, bench.health, bench.clock, slow)
+    bench.pass_seconds(130)
+    assert [t_ns // 10**9 for t_ns in checks] == [1, 64, 127]
 
 
 def test_whoever_waits_for_the_disk_is_not_the_recorder_and_mistakes_of_ours_are_said(tmp_path, monkeypatch):
-    monkeypatch.setattr(disk_watch, "LOOK_S", 0.001)
-    watch, stop, looks = Watch(tmp_path, 1), threading.Event(), []
+    monkeypatch.setattr(disk_monitor, "CHECK_S", 0.001)
+    bench, stop, checks = Bench(tmp_path, 1), threading.Event(), []
 
-    def look(written):
-        looks.append(written)
-        if len(looks) == 1:
+    def check(written):
+        checks.append(written)
+        if len(checks) == 1:
             raise ZeroDivisionError("ours")
         stop.wait()
 
-    monkeypatch.setattr(watch.watch, "look", look)
-    watch.watch.start(lambda: (5, 7), stop)
-    assert eventually(lambda: len(looks) == 2)
+    monkeypatch.setattr(bench.monitor, "check", check)
+    bench.monitor.start(lambda: (5, 7), stop)
+    assert eventually(lambda: len(checks) == 2)
     stop.set()
-    assert looks == [(5, 7), (5, 7)]
-    assert health_now(watch.health, watch.bus).message == "ZeroDivisionError: ours"
+    assert checks == [(5, 7), (5, 7)]
+    assert health_now(bench.health, bench.bus).message == "ZeroDivisionError: ours"

@@ -14,9 +14,9 @@ from abs_service.recording.disk.retention import Ages, Retention
 
 _log = logging.getLogger(__name__)
 
-#: Time between two looks at the rate of recording [s].
-LOOK_S = 1.0
-#: Time between two looks at the files [ns].
+#: Time between two checks of the rate of recording [s].
+CHECK_S = 1.0
+#: Time between two checks of the files [ns].
 PERIOD_NS = 10_000_000_000
 #: Least pause after it, by the time that it took.
 PAUSE_FACTOR = 20
@@ -24,7 +24,7 @@ PAUSE_FACTOR = 20
 WARN_S = 3600.0
 
 
-class DiskWatch:
+class DiskMonitor:
     """Applies retentions and publishes a forecast, both in the recorder's health.
 
     Args:
@@ -56,24 +56,24 @@ class DiskWatch:
         self._next_ns = 0
 
     def start(self, written: Callable[[], tuple[int, int]], stop: threading.Event) -> None:
-        """Looks again and again, in a thread: 100,000 recordings take seconds, and a disk may not answer.
+        """Checks again and again, in a thread: 100,000 recordings take seconds, and a disk may not answer.
 
         Args:
-            written: see `look`.
+            written: see `check`.
             stop: ends it.
         """
 
         def follow() -> None:
-            while not stop.wait(LOOK_S):
+            while not stop.wait(CHECK_S):
                 try:
-                    self.look(written())
+                    self.check(written())
                 except Exception as error:  # our own mistake, which must not end retention without a word
-                    _log.exception("the disk is not watched")
+                    _log.exception("the disk is not monitored")
                     self._health.report("retention", Level.ERROR, f"{type(error).__name__}: {error}")
 
-        threading.Thread(target=follow, name="disk watch", daemon=True).start()
+        threading.Thread(target=follow, name="disk monitor", daemon=True).start()
 
-    def look(self, written: tuple[int, int]) -> None:
+    def check(self, written: tuple[int, int]) -> None:
         """Does both every ten seconds, less often where it takes long.
 
         Args:
