@@ -24,7 +24,7 @@ def numeric_options(name="", commands=cli.COMMANDS, module="abs_service.commands
 
 
 def is_number(read) -> bool:
-    """Whether a type of arguments makes a number of a text."""
+    """True for a type of arguments that makes a number of a text."""
     try:
         return isinstance(read("5"), int | float)
     except (argparse.ArgumentTypeError, ValueError):
