@@ -26,12 +26,16 @@ from collections.abc import Sequence
 from pathlib import Path
 from types import ModuleType
 
+from abs_service.commands.parts.options import whole
 from abs_service.report import page
 from abs_service.report.content import Report, to_json
 from abs_service.supervision.exit_codes import Exit, is_for_user
 from evaluation import experiment, running
 from evaluation.joint_report import joined
 from evaluation.running import EvaluateOptionError
+
+_SEED = whole(2**32 - 1, "a whole number")
+_JOBS = whole(1000, "a number of experiments", 1)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -66,7 +70,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--quick", action="store_true", help="seconds instead of minutes, on fewer and shorter sequences"
     )
-    parser.add_argument("--seed", metavar="N", type=int, default=0, help="of all random numbers (default: 0)")
+    parser.add_argument("--seed", metavar="N", type=_SEED, default=0, help="of all random numbers (default: 0)")
     parser.add_argument("--data", metavar="DIR", type=Path, help="recordings that are not in the repository")
     parser.add_argument(
         "--set", metavar="KEY=VALUE", action="append", default=[], help="a setting of the experiment, as in TOML"
@@ -74,7 +78,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--jobs",
         metavar="N",
-        type=int,
+        type=_JOBS,
         default=1,
         help="experiments at the same time, which disturbs times (default: 1)",
     )
@@ -121,8 +125,6 @@ def _check(arguments: argparse.Namespace, selected: Sequence[str], known: dict[s
         )
     if arguments.set and len(selected) > 1:
         raise EvaluateOptionError("--set changes the settings of one experiment and cannot be used with several")
-    if arguments.jobs < 1:
-        raise EvaluateOptionError(f"--jobs {arguments.jobs}: must be 1 or more")
     if arguments.data is not None and not arguments.data.is_dir():
         raise EvaluateOptionError(f"--data {arguments.data}: there is no such folder")
 

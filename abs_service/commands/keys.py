@@ -21,12 +21,13 @@ from pathlib import Path
 
 from abs_service.bus.security import roles
 from abs_service.bus.security.mutual_tls import MutualTls
-from abs_service.commands.parts.options import OptionError
+from abs_service.commands.parts.options import OptionError, whole
 from abs_service.supervision.exit_codes import Exit
 
 AUTHORITY = "authority"
 #: Life of an authority [days].
 AUTHORITY_DAYS = 3650
+_DAYS = whole(AUTHORITY_DAYS, "a number of days", 1)
 
 _AUTHORITY = "basicConstraints = critical, CA:true, pathlen:0\nkeyUsage = critical, keyCertSign, cRLSign"
 _LEAF = "basicConstraints = critical, CA:false\nkeyUsage = critical, digitalSignature"
@@ -47,7 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--only", metavar="ROLE", choices=roles.NAMES, action="append", help="only for this role")
     parser.add_argument("--authority", metavar="DIR", type=Path, help="sign with the authority in this folder")
-    parser.add_argument("--days", metavar="N", type=int, default=365, help="life of the certificates (default: 365)")
+    parser.add_argument("--days", metavar="N", type=_DAYS, default=365, help="life of the certificates (default: 365)")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -55,8 +56,6 @@ def run(arguments: argparse.Namespace) -> int:
     out, names = arguments.out, arguments.only or roles.NAMES
     if roles.RIG in names and not arguments.host:
         raise OptionError(f"--host: give the name of the host that listens, for the certificate of {roles.RIG}")
-    if not 1 <= arguments.days <= AUTHORITY_DAYS:
-        raise OptionError(f"--days {arguments.days}: allowed are 1 to {AUTHORITY_DAYS}")
     if out.exists():
         raise OptionError(f"{out}: exists, and nothing is overwritten; choose another folder")
     try:

@@ -109,6 +109,7 @@ def test_settings_of_one_experiment_can_be_changed(experiment, tmp_path: Path) -
         ("shots=3", "there are: frames, duration_s"),
         ("frames='x'", "must be int"),
         ("duration_s=true", "must be float"),
+        ("frames=-3", "must be 0 or more"),
     ],
 )
 def test_settings_that_cannot_be_are_named(experiment, given: str, said: str, tmp_path: Path, capsys) -> None:
@@ -224,8 +225,9 @@ def test_a_group_is_all_of_its_experiments(experiment, tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_two_run_beside_each_other_and_find_what_they_find_alone(tmp_path: Path, capsys) -> None:
     chosen = ["--quick", "--seed", "3"]
-    assert __main__.main(["noise_fits", *chosen, "--jobs", "0"]) == Exit.USER
-    assert "--jobs 0: must be 1 or more" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        __main__.main(["noise_fits", *chosen, "--jobs", "0"])
+    assert "argument --jobs: '0' must be a number of experiments from 1" in capsys.readouterr().err
     assert __main__.main(["noise_fits", "noise_board", *chosen, "--jobs", "2", "--out", str(tmp_path)]) == Exit.OK
     assert (tmp_path / "noise_board/report.json").exists()
     beside = json.loads((tmp_path / "noise_fits/report.json").read_text())

@@ -49,3 +49,29 @@ def test_every_place_in_the_glossary_exists():
     rooms = [ROOT, ROOT / "abs_service", ROOT / "abs_service" / "tracker"]  # the glossary abbreviates paths
     assert [place for place in places if not any((room / place).exists() for room in rooms)] == []
     assert len(places) > 30
+
+
+#: Words of a sentence, from this number on it is two.
+LONG_SENTENCE = 40
+
+
+def sentences(page):
+    """Sentences of a page's prose; code, links and formulas count as one word each."""
+    prose = re.sub(r"^ *```.*?^ *```$", "", page, flags=re.DOTALL | re.MULTILINE)
+    prose = re.sub(r"^(\||#).*$", "", prose, flags=re.MULTILINE)
+    prose = re.sub(r"`[^`]*`|\]\([^)]*\)|\$[^$]*\$", lambda found: " Word" if found[0][0] != "]" else "]", prose)
+    for paragraph in re.split(r"\n\s*\n|\n\s*(?:[-*]|\d+\.) ", prose):
+        if " · " not in paragraph:  # a list of links
+            yield from re.split(r"(?<=[.!?:])[*_)\"]*\s+(?=[^a-z])", " ".join(paragraph.split()))
+
+
+def test_sentences_of_the_pages_are_short():
+    pages = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+    long = [
+        f"{page.relative_to(ROOT)}: {sentence}"
+        for page in pages
+        if page.parent.name != "decisions"
+        for sentence in sentences(page.read_text(encoding="utf-8"))
+        if len(re.findall(r"\S*\w\S*", sentence)) >= LONG_SENTENCE
+    ]
+    assert long == []

@@ -49,7 +49,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("config", metavar="RIG", type=Path, help="TOML file of the rig")
     parser.add_argument("--target", type=Path, required=True, metavar="FILE", help="description of the board")
     parser.add_argument("--out", type=Path, required=True, metavar="FILE.mcap", help="recording; must not exist")
-    parser.add_argument("--limit-s", type=float, default=float("inf"), metavar="S", help="longest time (no limit)")
+    parser.add_argument(
+        "--limit-s",
+        type=rig_process.seconds,
+        default=rig_process.LONGEST_S,
+        metavar="S",
+        help="longest time (no limit)",
+    )
     parser.add_argument("--json", action="store_true", help="print the result as one JSON object")
 
 

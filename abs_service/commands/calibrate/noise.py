@@ -39,7 +39,7 @@ from abs_service.calibration.noise import board_poses, measurement, repeated, re
 from abs_service.calibration.shots import sequences
 from abs_service.commands.calibrate.inputs import calibrations
 from abs_service.commands.images import camera_file
-from abs_service.commands.parts.options import OptionError, number
+from abs_service.commands.parts.options import OptionError, number, whole
 from abs_service.config import plugins
 from abs_service.report import page, provenance
 from abs_service.report.content import Level, Report, to_json
@@ -49,6 +49,7 @@ from calib.camera import Camera
 from calib.noise.per_pixel import PerPixel
 from calib.sequences.static_board import StaticBoard
 from drivers.contract.frame import Geometry
+from drivers.encoding.message_check import LARGEST_SIDE
 from drivers.image_folder.images import DepthImages, ImageFolder
 from drivers.image_folder.listing import by_number
 
@@ -57,6 +58,9 @@ SEED = 0
 
 #: Metres per unit of the depth images of a folder whose camera file has no unit.
 DEPTH_SCALE = 0.001
+
+_PIXEL = whole(LARGEST_SIDE - 1, "a column or row of an image")
+_IMAGES = whole(1_000_000, "a number of images", 2)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -72,9 +76,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--calibration", metavar="FILE", type=Path, help="calibration or rig file: cameras in place of the sources' own"
     )
     parser.add_argument("--sensor", metavar="NAME", default="", help="depth sensor (default: the only one)")
-    parser.add_argument("--box", metavar="PX", nargs=4, type=int, help="left, top, right, bottom of the target [px]")
+    parser.add_argument("--box", metavar="PX", nargs=4, type=_PIXEL, help="left, top, right, bottom of the target [px]")
     parser.add_argument("--mask", metavar="FILE", type=Path, help="image, black where the target is not")
-    parser.add_argument("--frames", metavar="N", type=int, default=120, help="most frames of a source (%(default)d)")
+    parser.add_argument(
+        "--frames", metavar="N", type=_IMAGES, default=120, help="most frames of a source (%(default)d)"
+    )
     parser.add_argument("--camera", metavar="FILE", type=Path, help="camera file of a folder, as for import")
     parser.add_argument("--depth", metavar="GLOB", default="depth_*.png", help="depth images of a folder (%(default)s)")
     parser.add_argument("--out", metavar="PATH", type=Path, help="files to write, without suffix (default: noise-NAME)")
@@ -140,8 +146,6 @@ def _cameras(path: Path | None) -> dict[str, Camera]:
 
 
 def _read(source: str, arguments: argparse.Namespace) -> list[sequences.Sequence]:
-    if arguments.frames < 2:
-        raise OptionError(f"--frames {arguments.frames}: must be 2 at least")
     path = Path(source)
     if "://" in source:
         return sequences.of_device(source, arguments.sensor, arguments.frames, time.monotonic_ns)
@@ -165,7 +169,7 @@ def _region(arguments: argparse.Namespace, shape: Sequence[int]) -> NDArray[np.b
     if arguments.box is not None:
         left, top, right, bottom = arguments.box
         region[:] = False
-        region[max(top, 0) : bottom + 1, max(left, 0) : right + 1] = True
+        region[top : bottom + 1, left : right + 1] = True
     if arguments.mask is not None:
         mask = load_mask(arguments.mask, "--mask")
         if mask.shape != (height, width):

@@ -14,7 +14,8 @@ from abs_service.calibration.cameras import report
 from abs_service.calibration.files import rig_file
 from abs_service.commands.calibrate.inputs import skipping
 from abs_service.commands.calibrate.inputs.material import Material, UnusableImagesError, say
-from abs_service.commands.parts.options import OptionError, assignments, positive
+from abs_service.commands.parts import rig_process
+from abs_service.commands.parts.options import OptionError, assignments, positive, views
 from abs_service.config.problems import allowed_instead
 from abs_service.report import page, provenance
 from abs_service.report.content import Level, Report, Verdict
@@ -56,7 +57,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="intrinsics that stay as they begin, such as k3,aspect; repeatable",
     )  # fmt: skip
     parser.add_argument(
-        "--every", metavar="S", type=float, default=0.5, help="least time between shots of a recording (%(default)g)"
+        "--every",
+        metavar="S",
+        type=rig_process.seconds,
+        default=0.5,
+        help="least time between shots of a recording (%(default)g)",
     )
     skipping.add_argument(parser)
     parser.add_argument(
@@ -64,7 +69,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="shots of one half of the cross-validation, such as 0-9 (default: every other pose)",
     )  # fmt: skip
     parser.add_argument(
-        "--shots", metavar="N", type=int, default=30, help="different views to wait for, live (%(default)d)"
+        "--shots", metavar="N", type=views, default=30, help="different views to wait for, live (%(default)d)"
     )
     parser.add_argument(
         "--distance", metavar="M", type=positive, help="of what will be looked at (default: where the boards were)"

@@ -21,7 +21,7 @@ from dataclasses import fields, replace
 from pathlib import Path
 
 from abs_service.calibration.files import board_sheet, target_file
-from abs_service.commands.parts.options import OptionError, ending_in
+from abs_service.commands.parts.options import OptionError, ending_in, positive, whole
 from abs_service.supervision.exit_codes import Exit
 from calib.board.april_grid import AprilGrid
 from calib.board.target import AsymmetricCircles, Charuco, Chessboard, Circles, Target, outline
@@ -51,6 +51,9 @@ _BOARD = {
     "gap": "distance of tags (april_grid)",
 }
 
+#: Type of the arguments that count its parts.
+_COUNT = whole(1000, "a number", 1)
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the arguments of `abs-service calibrate target`."""
@@ -64,9 +67,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     for name, meaning in _BOARD.items():
         if name in ("columns", "rows"):
-            parser.add_argument(f"--{name}", type=int, metavar="N", help=meaning)
+            parser.add_argument(f"--{name}", type=_COUNT, metavar="N", help=meaning)
         else:
-            parser.add_argument(f"--{name}-mm", dest=name, type=float, metavar="MM", help=f"{meaning} [mm]")
+            parser.add_argument(f"--{name}-mm", dest=name, type=positive, metavar="MM", help=f"{meaning} [mm]")
     parser.add_argument("--dictionary", metavar="NAME", help="set of markers (charuco; 5x5_100)")
     parser.add_argument(
         "--paper", type=_paper, default=PAPERS["a4"], metavar="SIZE", help="a4, a3, letter or WIDTHxHEIGHT in mm (a4)"
@@ -117,9 +120,9 @@ def _target(arguments: argparse.Namespace) -> Target:
             raise OptionError(f"--{_option(name)} = {value}: means nothing for {arguments.kind}")
     changed = {name: value * 1e-3 if isinstance(value, float) else value for name, value in given.items()}
     # Markers, discs and gaps scale with squares, spacing and tags unless given explicitly.
-    for part, whole in (("marker", "square"), ("diameter", "spacing"), ("gap", "tag")):
-        if whole in changed and part in allowed and part not in changed:
-            changed[part] = changed[whole] * getattr(default, part) / getattr(default, whole)
+    for part, one in (("marker", "square"), ("diameter", "spacing"), ("gap", "tag")):
+        if one in changed and part in allowed and part not in changed:
+            changed[part] = changed[one] * getattr(default, part) / getattr(default, one)
     try:
         return replace(default, **changed)
     except TargetError as error:

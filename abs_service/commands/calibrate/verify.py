@@ -30,7 +30,7 @@ from abs_service.calibration.shots.shots import Shot
 from abs_service.commands.calibrate.inputs import calibrations, live, skipping
 from abs_service.commands.calibrate.inputs.material import UnusableImagesError
 from abs_service.commands.parts import rig_process
-from abs_service.commands.parts.options import OptionError, assignments
+from abs_service.commands.parts.options import OptionError, assignments, views
 from abs_service.config.problems import allowed_instead
 from abs_service.report import page, provenance
 from abs_service.report.content import Level, Report, Verdict, to_json
@@ -55,11 +55,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--target", metavar="FILE", type=Path, required=True, help="description of the board, TOML")
     parser.add_argument(
-        "--every", metavar="S", type=float, default=0.5, help="seconds between shots of a recording (default: 0.5)"
+        "--every",
+        metavar="S",
+        type=rig_process.seconds,
+        default=0.5,
+        help="seconds between shots of a recording (default: 0.5)",
     )
     skipping.add_argument(parser)
     parser.add_argument(
-        "--shots", metavar="N", type=int, default=15, help="different views to wait for, live (default: 15)"
+        "--shots", metavar="N", type=views, default=15, help="different views to wait for, live (default: 15)"
     )
     parser.add_argument(
         "--report", metavar="PATH", type=Path, help="page to write (default: RIG_OR_CALIBRATION-verify.html)"
@@ -142,8 +146,6 @@ def _see_all(
 
 def _see_live(arguments: argparse.Namespace, target: Target, cameras: Mapping[str, Camera]) -> BoardObservations:
     """Observations in distinct shots of running devices, until sufficient or interrupted by a signal."""
-    if arguments.shots < 1:
-        raise OptionError(f"--shots {arguments.shots}: must be 1 at least")
     stop = rig_process.stop_on_signals()
     seen = BoardObservations()
     with live.streaming(arguments.source, cameras, stop.is_set) as (shots, there):

@@ -17,7 +17,7 @@ from pathlib import Path
 from abs_service.bus import keys
 from abs_service.commands.new import recorded, rig_text
 from abs_service.commands.new.rig_text import BEHIND, DEVICES, OBJECTS, Answers, Device
-from abs_service.commands.parts.options import OptionError
+from abs_service.commands.parts.options import OptionError, positive
 from abs_service.config.problems import allowed_instead
 from abs_service.supervision.exit_codes import Exit
 from drivers import opening
@@ -41,7 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--object", choices=OBJECTS, help="what is tracked")
     parser.add_argument(
-        "--size", nargs=2, type=float, metavar=("WIDTH", "HEIGHT"), help="of a sheet of known size, in metres"
+        "--size", nargs=2, type=positive, metavar=("WIDTH", "HEIGHT"), help="of a sheet of known size, in metres"
     )
     parser.add_argument("--color", action=argparse.BooleanOptionalAction, help="use the colour camera as well")
     parser.add_argument("--behind", choices=BEHIND, help="what is behind the object")

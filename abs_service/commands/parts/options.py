@@ -29,12 +29,13 @@ def number(minimum: float, maximum: float, what: str) -> Callable[[str], float]:
     return read
 
 
-def whole(maximum: int, what: str) -> Callable[[str], int]:
-    """Type of an argument: a whole number from 0 to `maximum`, described by `what` in the message about others."""
+def whole(maximum: int, what: str, minimum: int = 0) -> Callable[[str], int]:
+    """Type of an argument: a whole number from `minimum` to `maximum`, named `what` in the message about others."""
 
     def read(text: str) -> int:
-        if not (text.isascii() and text.isdigit() and len(text) <= len(str(maximum)) and int(text) <= maximum):
-            raise argparse.ArgumentTypeError(f"{text!r} must be {what} from 0 to {maximum}")
+        is_number = text.isascii() and text.isdigit() and len(text) <= len(str(maximum))
+        if not (is_number and minimum <= int(text) <= maximum):
+            raise argparse.ArgumentTypeError(f"{text!r} must be {what} from {minimum} to {maximum}")
         return int(text)
 
     return read
@@ -42,6 +43,9 @@ def whole(maximum: int, what: str) -> Callable[[str], int]:
 
 #: Type of an argument: number of a port; 0 lets the system choose one.
 port = whole(LAST_PORT, "a port")
+
+#: Type of an argument: how many different views of a calibration board.
+views = whole(10_000, "a number of views", 1)
 
 #: Type of an argument: a number that is neither 0 nor infinite.
 positive = number(math.ulp(0.0), math.nextafter(math.inf, 0.0), "a number above 0")

@@ -19,6 +19,7 @@ from abs_service.bus import keys
 from abs_service.bus.contract import Bus, Sample
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.commands.parts import rig_process
+from abs_service.commands.parts.options import whole
 from abs_service.supervision.exit_codes import Exit
 from abs_service.wire import commands
 from drivers.encoding.message_check import LARGEST_SIDE
@@ -26,6 +27,8 @@ from drivers.encoding.message_content import MAX_CORNERS, MIN_CORNERS
 
 #: Timeout of the detection [s].
 TIMEOUT_S = 10.0
+
+_PIXEL = whole(LARGEST_SIDE - 1, "a column or row of an image")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -35,13 +38,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     where = parser.add_argument_group(
         "the object, in the depth image of the tracker's reference sensor, instead of the region of the rig file"
     ).add_mutually_exclusive_group()
-    where.add_argument("--seed", metavar=("U", "V"), nargs=2, type=_place, help="column and row of a pixel of it")
+    where.add_argument("--seed", metavar=("U", "V"), nargs=2, type=_PIXEL, help="column and row of a pixel of it")
     where.add_argument(
-        "--box", metavar=("U", "V", "U2", "V2"), nargs=4, type=_place,
+        "--box", metavar=("U", "V", "U2", "V2"), nargs=4, type=_PIXEL,
         help="first and last column and row of a box around it",
     )  # fmt: skip
     where.add_argument(
-        "--polygon", metavar="U V", nargs="+", type=_place, action=_Polygon,
+        "--polygon", metavar="U V", nargs="+", type=_PIXEL, action=_Polygon,
         help=f"column and row of each corner, {MIN_CORNERS} to {MAX_CORNERS}, of a polygon around it",
     )  # fmt: skip
 
@@ -109,9 +112,3 @@ def _choice(arguments: argparse.Namespace) -> commands.Choice:
     if arguments.box:
         return commands.Choice(polygon=commands.box(*arguments.box))
     return commands.Choice(polygon=arguments.polygon or ())
-
-
-def _place(text: str) -> int:
-    if not (text.isdecimal() and int(text) < LARGEST_SIDE):
-        raise argparse.ArgumentTypeError(f"{text!r} is no column or row of an image")
-    return int(text)

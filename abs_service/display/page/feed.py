@@ -2,22 +2,21 @@
 
 import threading
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
-import numpy as np
 from absmsg.v1.deformation_state_pb2 import DeformationState
 from absmsg.v1.deformed_mesh_pb2 import DeformedMesh, MeshTopology
 from absmsg.v1.frame_info_pb2 import FrameInfo
 from absmsg.v1.health_pb2 import Health
 from absmsg.v1.sensor_model_pb2 import Config, SensorModel
 from google.protobuf.message import DecodeError, Message
-from numpy.typing import NDArray
 
 from abs_service.bus import keys
 from abs_service.bus.contract import Sample, Subscription
+from abs_service.display.page import numbers
+from abs_service.display.page.numbers import MINUTE_S, Numbers
 from calib.camera import Camera
 from drivers.contract.frame import Frame
 from drivers.encoding import codec
@@ -25,36 +24,11 @@ from drivers.encoding.sensor_model import decode_camera
 
 M = TypeVar("M", bound=Message)
 
-#: Time that numbers are kept [s], images that are kept of a stream, and the timeout of a query [s].
-MINUTE_S, IMAGES, QUERY_S = 60.0, 6, 0.2
+#: Images that are kept of a stream, and the timeout of a query [s].
+IMAGES, QUERY_S = 6, 0.2
 
 _PATTERNS = ("health/**", keys.state("*"), keys.topology("*"), keys.model("*"), keys.CONFIG)
 _MESSAGES: tuple[type[Message], ...] = (Health, DeformationState, DeformedMesh, MeshTopology, SensorModel, Config)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Numbers:
-    """Numbers of one estimate.
-
-    Attributes:
-        t_s: arrival [s].
-        age_ms, solve_ms: age, and time of the search [ms].
-        generations, skipped: effort, and frame sets passed over.
-        likelihoods: log-likelihood of a vertex by sensor.
-        deviation_mm: σ of a vertex, median over the mesh [mm]; NaN if it is unknown.
-        model_id: theta is comparable between equal ones.
-        theta: parameters (d,) of the model.
-    """
-
-    t_s: float
-    age_ms: float
-    solve_ms: float
-    generations: int
-    skipped: int
-    likelihoods: dict[str, float]
-    deviation_mm: float
-    model_id: str
-    theta: NDArray[np.float32]
 
 
 class Source(Protocol):
@@ -89,6 +63,7 @@ class Feed:
         self._parse = {message.DESCRIPTOR.full_name: message for message in _MESSAGES}
         self._newest: dict[str, tuple[Message, float]] = {}
         self._numbers: dict[str, deque[Numbers]] = {}
+        self._lost: Mapping[str, int] = {}  # by component
         self._images: dict[str, deque[tuple[Sample, float]]] = {}
         self._cameras: dict[str, Camera] = {}
         self._watching: list[Subscription] = []
@@ -201,9 +176,11 @@ class Feed:
         with self._lock:
             now_s = self._arrival_s()
             self._newest[sample.topic] = message, now_s
+            if isinstance(message, Health):
+                self._lost = {**self._lost, message.component: numbers.losses(message)}
             if isinstance(message, DeformationState):
                 length = deque[Numbers](maxlen=round(60 * MINUTE_S))
-                self._numbers.setdefault(message.tracker, length).append(_numbers(message, now_s))
+                self._numbers.setdefault(message.tracker, length).append(numbers.of_state(message, now_s, self._lost))
 
     def _take_image(self, sample: Sample) -> None:
         with self._lock:
@@ -216,21 +193,9 @@ class Feed:
         if now_s < self._last_s:
             for collected in (self._newest, self._numbers, self._images):
                 collected.clear()
+            self._lost = {}
         self._last_s = now_s
         return now_s
-
-
-def rate_hz(numbers: Iterable[Numbers], now_s: float, seconds: float = 3.0) -> float:
-    """Estimates per second in the last seconds."""
-    return sum(one.t_s > now_s - seconds for one in numbers) / seconds
-
-
-def _numbers(state: DeformationState, t_s: float) -> Numbers:
-    likelihoods = {one.sensor: one.mean_log_likelihood for one in state.sensors if not one.missing and one.samples}
-    deviation_mm = 1e3 * state.deviation_m if state.covariance_valid else float("nan")
-    theta = np.array(state.theta, np.float32)
-    effort = state.age_ms, state.solve_ms, state.generations, state.skipped
-    return Numbers(t_s, *effort, likelihoods, deviation_mm, state.model_id, theta)
 
 
 def _belong(topology: MeshTopology, mesh: DeformedMesh) -> bool:

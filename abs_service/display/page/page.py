@@ -96,8 +96,7 @@ class Page:
         periods_s = {self._draw_meshes: MESH_S, self._draw_images: IMAGES_S, self._write: WORDS_S}
         while not stop.is_set():
             tick()
-            looked_at = bool(self._server.get_clients())
-            self._feed.watch(looked_at)
+            self._feed.watch(looked_at := bool(self._server.get_clients()))
             now_s = 1e-9 * self._clock()
             for draw in periods_s if looked_at else ():
                 if now_s >= self._due_s[draw]:
@@ -120,11 +119,13 @@ class Page:
             return
         stale, name = found[1] > words.STALE_S, self._panel.field
         state = mesh.header.boot_id, mesh.header.seq, stale, name, self._panel.shows
-        if (before and before.state == state) or (view := self._mesh_view(mesh, name == "residual")) is None:
+        if before and before.state == state:
+            self._scene.settle(tracker)
+            return
+        if (view := self._mesh_view(mesh, name == "residual")) is None:
             return
         self._drawn[tracker] = Drawn(view, mesh.header.t_host_ns, state)
-        colors = self._scales[name].colors(FIELDS[name].values(view))
-        self._scene.show_mesh(tracker, view, colors, stale)
+        self._scene.show_mesh(tracker, view, self._scales[name].colors(FIELDS[name].values(view)), stale)
         self._scene.show_first(tracker, view, self._panel.shows[0])
         self._scene.show_gravity(tracker, view, gravity.down(self._feed, tracker))
         self._trails.extend(tracker, (mesh.header.boot_id, mesh.mesh_version), view.vertices, mesh.header.t_host_ns)
@@ -184,8 +185,8 @@ class Page:
             return
         if abs(frame.t_host_ns - chosen.exposure_ns) > SAME_NS:
             return
-        scale = self._scales["residual"]
-        view = replace(chosen.view, measured=pictures.radial(frame, camera), camera=camera)
+        scale, measured = self._scales["residual"], pictures.radial(frame, camera)
+        view = replace(chosen.view, measured=measured, camera=camera)
         drawn = pictures.with_colors(image, camera, view.vertices, view.faces, residual(view), scale.colors)
         self._panel.show_image(name, f"{stream}, residual up to ± {scale.end:g} mm", drawn)
 

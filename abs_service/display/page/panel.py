@@ -9,7 +9,7 @@ import numpy as np
 import viser
 from viser import uplot
 
-from abs_service.display.page.feed import MINUTE_S
+from abs_service.display.page.numbers import MINUTE_S
 from abs_service.display.page.pictures import Picture
 from abs_service.display.page.readouts.plots import Curves, complete
 from abs_service.display.page.readouts.words import Words

@@ -38,6 +38,12 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--host", default="127.0.0.1", help="address to listen at [%(default)s]; others let others read"
     )
-    parser.add_argument("--port", type=int, default=8081, help="[%(default)s]")
+    parser.add_argument("--port", type=_port, default=8081, help="[%(default)s]")
     parser.add_argument("--origin", default="", help="of pages elsewhere that may read, such as http://localhost:3000")
     return parser
+
+
+def _port(text: str) -> int:
+    if not (text.isascii() and text.isdigit() and len(text) < 6 and int(text) < 65_536):
+        raise argparse.ArgumentTypeError(f"{text!r} must be a port from 0 to 65535")
+    return int(text)

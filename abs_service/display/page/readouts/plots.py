@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.display.page.feed import MINUTE_S, Numbers
+from abs_service.display.page.numbers import MINUTE_S, Numbers
 
 #: Values of each half second, by name; NaN where there are none.
 Curves = Mapping[str, NDArray[np.float64]]
@@ -23,9 +23,8 @@ def plots(numbers: Sequence[Numbers], now_s: float) -> dict[str, Curves]:
     """
     times_s = np.array([one.t_s for one in numbers]) - now_s
     sensors = sorted({name for one in numbers for name in one.likelihoods})
-    values: dict[str, dict[str, Sequence[float] | NDArray[np.floating] | None]] = {
+    values: dict[str, dict[str, Sequence[float] | NDArray[np.floating]]] = {
         "latency [ms]": {"age": [one.age_ms for one in numbers], "search": [one.solve_ms for one in numbers]},
-        "estimates a second": {"rate": None},
         "generations": {"generations": [one.generations for one in numbers]},
         "log-likelihood of a vertex": {
             name: [one.likelihoods.get(name, np.nan) for one in numbers] for name in sensors
@@ -33,11 +32,30 @@ def plots(numbers: Sequence[Numbers], now_s: float) -> dict[str, Curves]:
         "σ of a vertex, median [mm]": {"σ": [one.deviation_mm for one in numbers]},
         "Θ from its mean, components that move most [SI]": dict(moving(numbers)),
     }
-    return {
+    means: dict[str, Curves] = {
         title: {name: binned(times_s, column) for name, column in curves.items()}
         for title, curves in values.items()
         if curves
     }
+    rates: dict[str, Curves] = {
+        "estimates a second": {"rate": a_second(times_s, np.ones(len(numbers)))},
+        "lost a second": {name: a_second(times_s, amounts) for name, amounts in lost(numbers).items()},
+    }
+    return {"latency [ms]": means.pop("latency [ms]")} | rates | means
+
+
+def lost(numbers: Sequence[Numbers]) -> dict[str, NDArray[np.floating]]:
+    """What was lost between an estimate and the next one, by component; of all together if none has lost anything.
+
+    Args:
+        numbers: estimates (n), oldest first.
+    """
+    names = sorted({name for one in numbers for name, number in one.lost.items() if number})
+    found = {}
+    for name in names:
+        counted = np.array([one.lost.get(name, 0) for one in numbers])
+        found[name] = np.maximum(np.diff(counted, prepend=counted[:1]), 0)  # a process that begins anew counts from 0
+    return found or {"all": np.zeros(len(numbers))}
 
 
 def moving(numbers: Sequence[Numbers]) -> dict[str, NDArray[np.floating]]:
@@ -57,21 +75,35 @@ def moving(numbers: Sequence[Numbers]) -> dict[str, NDArray[np.floating]]:
     return {f"Θ{index}": theta[:, index] for index in most}
 
 
-def binned(times_s: NDArray[np.float64], values: Sequence[float] | NDArray[np.floating] | None) -> NDArray[np.float64]:
-    """Means of values in half seconds of the last minute, NaN where there are none; of None the rate [1/s].
+def binned(times_s: NDArray[np.float64], values: Sequence[float] | NDArray[np.floating]) -> NDArray[np.float64]:
+    """Means of values in half seconds of the last minute, NaN where there are none.
 
     Args:
         times_s: of the values, before now (n,) [s], so negative.
         values: (n,); NaN are left out.
     """
-    index = np.floor((times_s + MINUTE_S) * STEPS / MINUTE_S).astype(int)
-    number = np.ones(len(index)) if values is None else np.asarray(values, float)
-    kept = (index >= 0) & (index < STEPS) & np.isfinite(number)
-    count = np.bincount(index[kept], minlength=STEPS)
-    if values is None:  # how many there were until half a second after the first is unknown
-        return np.where(np.cumsum(count) > count, count * STEPS / MINUTE_S, np.nan)
-    total = np.bincount(index[kept], number[kept], minlength=STEPS)
+    total, count = _sums(times_s, np.asarray(values, float))
     return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+
+
+def a_second(times_s: NDArray[np.float64], amounts: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Amounts a second in half seconds of the last minute [1/s]; NaN where nothing was received yet.
+
+    Args:
+        times_s: of the amounts, before now (n,) [s], so negative.
+        amounts: (n,).
+    """
+    total, count = _sums(times_s, amounts)
+    # How much there was until half a second after the first is unknown.
+    return np.where(np.cumsum(count) > count, total * STEPS / MINUTE_S, np.nan)
+
+
+def _sums(times_s: NDArray[np.float64], values: NDArray[np.floating]) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+    """Sum and number of the values in each half second."""
+    index = np.floor((times_s + MINUTE_S) * STEPS / MINUTE_S).astype(int)
+    kept = (index >= 0) & (index < STEPS) & np.isfinite(values)
+    count = np.bincount(index[kept], minlength=STEPS)
+    return np.asarray(np.bincount(index[kept], values[kept], STEPS), np.float64), count
 
 
 def complete(columns: Sequence[NDArray[np.float64]]) -> tuple[NDArray[np.float64], ...]:

@@ -7,7 +7,8 @@ from absmsg.v1.deformation_state_pb2 import DeformationState
 from absmsg.v1.health_pb2 import Health
 
 from abs_service.bus import keys
-from abs_service.display.page.feed import Feed, rate_hz
+from abs_service.display.page.feed import Feed
+from abs_service.display.page.numbers import rate_hz
 from abs_service.display.page.readouts import words
 from abs_service.display.page.readouts.words import STALE_S, STATUS, Words
 

@@ -8,11 +8,9 @@ from absmsg.v1.deformation_state_pb2 import DeformationState
 from absmsg.v1.health_pb2 import Health
 
 from abs_service.bus import keys
-from abs_service.display.page.feed import Feed, rate_hz
+from abs_service.display.page.feed import Feed
+from abs_service.display.page.numbers import LOSSES, losses, rate_hz
 from abs_service.display.page.readouts import words
-
-#: First parts of the counters that count losses.
-LOSSES = frozenset({"dropped", "lost", "malformed", "unused", "skipped"})
 
 
 def rows(feed: Feed, tracker: str) -> dict[str, str]:
@@ -42,8 +40,7 @@ def rows(feed: Feed, tracker: str) -> dict[str, str]:
 def _lost(healths: Iterable[Health]) -> Iterator[tuple[str, int]]:
     """Components that have lost something, and how much."""
     for health in healths:
-        lost = sum(number for name, number in health.counters.items() if name.partition(".")[0] in LOSSES)
-        if lost:
+        if lost := losses(health):
             yield health.component, lost
 
 

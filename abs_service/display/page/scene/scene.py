@@ -1,5 +1,7 @@
 """The 3-D part of the page: mesh, its first pose, trails, gravity, points of the depth sensors, cameras."""
 
+from dataclasses import dataclass
+
 import numpy as np
 import viser
 from numpy.typing import NDArray
@@ -34,13 +36,30 @@ AMBIENT, LAMP, LAMP_PLACE = 2.0, 1.3, (0.2, -0.6, -1.0)
 #: Vertical field of view [rad].
 FOV = 0.75
 
+#: Turns of the page without a new mesh, about 0.3 s, after which a browser has loaded the last one.
+LOADED = 9
+
+
+@dataclass(slots=True)
+class _Shown:
+    """A mesh on the page: the file that is seen, another out of sight, and turns since the latter was replaced."""
+
+    seen: viser.GlbHandle
+    hidden: viser.GlbHandle
+    turns: int
+
+    def swap(self) -> None:
+        """Shows the file that was out of sight."""
+        self.hidden.visible, self.seen.visible = True, False
+        self.seen, self.hidden = self.hidden, self.seen
+
 
 class Scene:
     """Draws into the scene of a server. Rigs have y downwards, like their cameras."""
 
     def __init__(self, server: viser.ViserServer) -> None:
         self._server = server
-        self._meshes: dict[str, tuple[viser.GlbHandle, viser.GlbHandle]] = {}  # by tracker: seen, and hidden
+        self._meshes: dict[str, _Shown] = {}  # by tracker
         self._first: dict[str, NDArray[np.float64]] = {}  # vertices when the mesh was first shown
         self._ghosts: dict[str, viser.MeshHandle] = {}
         self._clouds: dict[str, viser.PointCloudHandle] = {}
@@ -52,7 +71,7 @@ class Scene:
         _light(server.scene)
 
     def show_mesh(self, tracker: str, view: MeshView, colors: NDArray[np.uint8], stale: bool) -> None:
-        """Shows a tracker's mesh with colours (n, 3). A file is loaded out of sight, and seen when the next comes."""
+        """Shows a tracker's mesh with colours (n, 3): its file is loaded out of sight, and seen when the next comes."""
         data = glb(view.vertices, view.faces, np.full_like(colors, STALE) if stale else colors)
         if tracker not in self._meshes:
             if not self._meshes:
@@ -62,15 +81,23 @@ class Scene:
                 self._aim(client)
             first, second = f"/mesh/{tracker}/0", f"/mesh/{tracker}/1"
             add = self._server.scene.add_glb
-            self._meshes[tracker] = (
-                add(first, data, cast_shadow=False),
-                add(second, data, visible=False, cast_shadow=False),
+            self._meshes[tracker] = _Shown(
+                add(first, data, cast_shadow=False), add(second, data, visible=False, cast_shadow=False), LOADED
             )
-        seen, hidden = self._meshes[tracker]
+        shown = self._meshes[tracker]
         with self._server.atomic():
-            hidden.visible, seen.visible = True, False
-            seen.glb_data = data
-        self._meshes[tracker] = hidden, seen
+            if shown.turns < LOADED:
+                shown.swap()
+            shown.hidden.glb_data = data
+        shown.turns = 0
+
+    def settle(self, tracker: str) -> None:
+        """Shows the last mesh that was sent, if none follows; to be called at every turn without a new one."""
+        shown = self._meshes[tracker]
+        shown.turns += 1
+        if shown.turns == LOADED:
+            with self._server.atomic():
+                shown.swap()
 
     def show_first(self, tracker: str, view: MeshView, visible: bool) -> None:
         """Shows the first pose of a tracker's mesh as a net."""

@@ -171,7 +171,6 @@ def test_a_bad_model_is_reported_and_not_written(tmp_path: Path, monkeypatch, ca
         (["--distance-m", "1", "2"], "2 distances for 1 sources"),
         (["--box", "500", "0", "600", "10"], "leave nothing of the image"),
         (["--mask", "nowhere.png"], "--mask = 'nowhere.png': cannot be read"),
-        (["--frames", "1"], "must be 2 at least"),
         (["--frames", "5"], "5 frames are too few to tell noise from motion"),
         (["--sensor", "left"], "no depth image of a sensor 'left'"),
     ],

@@ -74,7 +74,7 @@ def test_a_file_that_exists_is_replaced_only_by_force(tmp_path, capsys):
     [
         (["--uri", "kinect1://"], "begins with simulated://"),
         (["--uri", "simulated://sheet?sede=1"], "unknown key 'sede'"),
-        (["--object", "known-sheet", "--size", "0", "1"], "--size 0 1: sides are lengths"),
+        (["--object", "known-sheet", "--size", "100", "1"], "--size 100 1: sides are lengths"),
         (["--object", "known-sheet", "--size", "297", "210"], "less than 100; did you mean 0.297 0.21?"),
         (["--name", "a/b"], "is no name"),
     ],

@@ -7,7 +7,8 @@ from absmsg.v1.health_pb2 import Health
 
 from abs_service.bus.contract import EVENTS, IMAGES
 from abs_service.bus.stamps import HeaderFactory, WallClock
-from abs_service.display.page.feed import Feed, rate_hz
+from abs_service.display.page.feed import Feed
+from abs_service.display.page.numbers import rate_hz
 from drivers.contract.frame import Frame, Kind
 from drivers.encoding import codec
 from tests.abs_service.bus.loopback import LoopbackBus
@@ -50,6 +51,14 @@ def test_numbers_are_kept_for_a_minute_and_give_the_rate():
     numbers = rig.feed.numbers("sheet")
     assert [one.solve_ms for one in numbers] == list(range(29, 90))
     assert rate_hz(numbers, rig.feed.now_s) == 1.0
+
+
+def test_every_estimate_has_what_each_component_had_lost_until_then():
+    rig = Rig()
+    for lost in (2, 5):
+        rig.send("health/capture", Health(component="capture", counters={"dropped.tof/depth/image": lost, "frames": 9}))
+        rig.send("sheet/state", DeformationState(tracker="sheet"))
+    assert [one.lost for one in rig.feed.numbers("sheet")] == [{"capture": 2}, {"capture": 5}]
 
 
 def test_images_come_only_while_somebody_looks_and_the_nearest_exposure_is_found():

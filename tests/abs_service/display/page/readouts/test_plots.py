@@ -2,12 +2,14 @@
 
 import numpy as np
 
-from abs_service.display.page.feed import Numbers
-from abs_service.display.page.readouts.plots import COMPONENTS, STEPS, binned, complete, moving, plots
+from abs_service.display.page.numbers import Numbers
+from abs_service.display.page.readouts.plots import COMPONENTS, STEPS, a_second, binned, complete, moving, plots
 
 
-def numbers(t_s, theta, model_id="a", deviation_mm=0.5) -> Numbers:
-    return Numbers(t_s, 20.0, 10.0, 3, 0, {"tof": -1.0}, deviation_mm, model_id, np.array(theta, np.float32))
+def numbers(t_s, theta, model_id="a", deviation_mm=0.5, lost=None) -> Numbers:
+    return Numbers(
+        t_s, 20.0, 10.0, 3, 0, {"tof": -1.0}, deviation_mm, model_id, np.array(theta, np.float32), lost or {}
+    )
 
 
 def test_the_components_that_move_most_are_shown_less_their_mean():
@@ -32,13 +34,25 @@ def test_sigma_is_plotted_and_an_unknown_one_left_out():
     assert drawn["log-likelihood of a vertex"]["tof"][-1] == -1.0
 
 
+def test_losses_are_plotted_by_component_as_what_came_between_two_estimates():
+    given = [(7.2, 40), (7.7, 40), (8.2, 43), (8.7, 43), (9.2, 0), (9.7, 2)]  # the camera's process began anew
+    drawn = plots([numbers(t_s, [0.0], lost={"capture": number, "record": 0}) for t_s, number in given], 10.0)
+    assert list(drawn["lost a second"]) == ["capture"]
+    np.testing.assert_array_equal(drawn["lost a second"]["capture"][-6:], [np.nan, 0, 6, 0, 0, 4])
+
+
+def test_without_losses_their_plot_says_zero():
+    drawn = plots([numbers(9.2, [0.0]), numbers(9.7, [0.0])], 10.0)
+    assert drawn["lost a second"]["all"][-1] == 0
+
+
 def test_bins_hold_means_and_rates_and_only_complete_ones_are_drawn():
     times_s = np.array([-0.4, -0.3, -1.2, -61.0])
     means = binned(times_s, [1.0, 3.0, 5.0, 7.0])
     assert len(means) == STEPS
     assert means[[-1, -3]].tolist() == [2.0, 5.0]
     assert np.isnan(means[-2])
-    rates = binned(times_s, None)
+    rates = a_second(times_s, np.ones(4))
     assert rates[[-1, -2]].tolist() == [4.0, 0.0]
     assert np.isnan(rates[:-2]).all()  # before the second half second nobody listened, or not all the time
     shown_s, values = complete([means])
