@@ -43,7 +43,7 @@ def test_a_forecast(rate, room, used, retain_s, retain_bytes, expected):
     ("rotate_bytes", "retain_s", "retain_bytes", "expected"),
     [
         (4_000 * MB, 3600.0, math.inf, "the last 60.0 min are kept"),
-        (9_000 * MB, 3600.0, math.inf, "62.2 min on this disk" + forecast.TOO_SMALL),  # the file that is an hour old is 200 s long
+        (9_000 * MB, 3600.0, math.inf, "62.2 min on this disk" + forecast.TOO_SMALL),  # the oldest is 200 s long
         (9_000 * MB, math.inf, 1_000 * MB, "the last 22 s are kept"),
         (900_000 * MB, math.inf, 1_000 * MB, "62.2 min on this disk" + forecast.TOO_SMALL),  # within one file
     ],
