@@ -119,8 +119,8 @@ def stop_on_signals() -> threading.Event:
     signal.signal(signal.SIGINT, on_signal)
     if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
         signal.signal(signal.SIGHUP, hand_over)
-    for number in (signal.SIGUSR1, signal.SIGUSR2):
-        signal.signal(number, signal.SIG_IGN)
+    for user_signal in (signal.SIGUSR1, signal.SIGUSR2):
+        signal.signal(user_signal, signal.SIG_IGN)
     return stop
 
 

@@ -1,4 +1,4 @@
-"""SIGHUP to a service that starts, and with SIGUSR1 and SIGUSR2 to all processes of one that runs, as by `pkill -HUP`."""
+"""SIGHUP to a service that starts, and with SIGUSR1 and SIGUSR2 to all processes of one that runs, as by `pkill`."""
 
 import os
 import signal
