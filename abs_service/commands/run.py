@@ -36,10 +36,11 @@ from abs_service.supervision.children.child_process import ChildProcess, Process
 from abs_service.supervision.exit_codes import Exit
 from abs_service.supervision.health import metrics, systemd
 from abs_service.supervision.health.rig_view import Display
+from abs_service.supervision.limits import Limits
 from abs_service.supervision.process_setup import log_lines
 from abs_service.supervision.repeats import Tracebacks
 from abs_service.supervision.run_session import Renewal, RunSession
-from abs_service.supervision.supervisor import Limits, Supervisor
+from abs_service.supervision.supervisor import Supervisor
 from abs_service.wire.commands import RefusedError
 
 #: Type of --seed, with the limits of a simulated device.

@@ -89,10 +89,14 @@ def recover(source: Path, directory: Path | None = None) -> RecoveryReport:
         except OSError:
             unfinished.unlink(missing_ok=True)
             raise
-        os.replace(unfinished, target)
         lossless = not (salvage.damaged or salvage.orphans or salvage.skipped_bytes)
-        kept = source
-        if was_active and directory is None:
+        replaces, kept, complete = was_active and directory is None, source, unfinished
+        if replaces and lossless:
+            with contextlib.suppress(OSError):  # somebody else's in a folder like /tmp
+                os.replace(unfinished, source)  # never are there two copies, whenever power fails
+                kept, complete = None, source
+        os.replace(complete, target)
+        if replaces and complete is unfinished:
             kept = source.unlink() if lossless else set_aside(source)
     return RecoveryReport(
         kept,

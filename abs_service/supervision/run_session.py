@@ -238,7 +238,7 @@ class RunSession:
         for child in self._supervisor.children.values():
             self._health.count_up_to({f"restarts.{child.component}": child.restarts})
             starved = child.state is ChildState.RUNNING and child.reason
-            level = Level.WARNING if starved else Level.ERROR if child.lacks else _LEVELS.get(child.state, Level.OK)
+            level = Level.ERROR if child.lacks else Level.WARNING if starved else _LEVELS.get(child.state, Level.OK)
             why = f"{child.component} {child.condition}" if child.reason else ""
             self._health.report(child.component, level, why)
             self._health.label(f"{PROCESS}{child.component}", child.condition)

@@ -5,11 +5,11 @@ A state machine without threads: the caller calls `poll` periodically; clock and
 
 import logging
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 
 from abs_service.supervision.children.child import FIRST_BACKOFF_NS, FIRST_POLL_NS, Child, ChildState, exit_reason
 from abs_service.supervision.children.child_process import NO_PROCESS, Spawn
 from abs_service.supervision.exit_codes import Exit
+from abs_service.supervision.limits import Limits
 from abs_service.supervision.repeats import Repeats, counted
 
 _log = logging.getLogger(__name__)
@@ -22,27 +22,6 @@ WORKED_NS = 10_000_000_000
 OVERDUE_NS = 1_800_000_000
 #: If `poll` was not called for longer than this, the supervisor itself was suspended, and received no health [ns].
 PAUSE_NS = 1_000_000_000
-
-
-@dataclass(frozen=True)
-class Limits:
-    """Limits and timeouts of a supervisor.
-
-    Attributes:
-        restarts, window_ns: a process that needs more restarts than this within the window is given up, for as long
-            [ns].
-        startup_ns: timeout for the first health, and between healths while a process reports to be busy [ns], as long
-            as it does anything.
-        stall_ns: timeout between healths afterwards; a process that exceeds it is restarted [ns]. The time that it
-            waited for a processor is added, up to `startup_ns`.
-        stop_ns: time that all processes together have to end in order [ns].
-    """
-
-    restarts: int = 5
-    window_ns: int = 60_000_000_000
-    startup_ns: int = 180_000_000_000
-    stall_ns: int = 10_000_000_000
-    stop_ns: int = 4_000_000_000
 
 
 class Supervisor:
@@ -92,7 +71,7 @@ class Supervisor:
         child = self.children.get(component)
         if child is not None and child.state is ChildState.RUNNING:
             self._expect_health(child, self._clock(), busy)
-            child.threads, child.reason = child.process.threads(), ""
+            child.threads, child.reason, child.lacks = child.process.threads(), "", False
 
     def renew(self, component: str) -> None:
         """Ends a process in order, and starts it again, which is no failure; also one that was given up."""
@@ -177,14 +156,13 @@ class Supervisor:
         try:
             child.process = self._spawn(child.component, child.arguments)
         except (OSError, EOFError, RuntimeError, MemoryError) as error:  # RuntimeError: too many threads
-            # The host lacks something, which is no failure of the process.
-            child.state, child.lacks, child.start_at_ns = ChildState.BACKOFF, True, now_ns + LONGEST_BACKOFF_NS
-            child.reason = f"cannot be started: {error}"
-            self._tell(logging.WARNING, f"{child.component} {child.reason}; trying again")
+            self._start_later(child, now_ns, f"cannot be started: {error}")
             return
         started = {"component": child.component, "child": child.process.pid, "restarts": child.restarts}
         _log.info("%s is started", child.component, extra={"fields": started})
-        child.state, child.reason, child.lacks, child.starts = ChildState.RUNNING, "", False, child.starts + 1
+        child.lacks &= child.exit_code == Exit.USER  # whether its files are right by now, its health tells
+        child.state, child.starts = ChildState.RUNNING, child.starts + 1
+        child.reason = child.reason if child.lacks else ""
         child.started_ns, child.threads, child.looked_at = now_ns, {}, {}
         self._expect_health(child, now_ns, busy=True)
 
@@ -197,12 +175,16 @@ class Supervisor:
                 child.reason = f"no health for {(now_ns - child.received_ns) / 1e9:.0f} s"
             return
         child.exit_code, child.worst_code = code, max(child.worst_code, code)
+        words = child.process.output_tail()
         if code == Exit.ENDED:
             child.state, child.process = ChildState.FINISHED, NO_PROCESS
         elif code == Exit.USER and child.starts == 1:
-            self._give_up(child, now_ns, child.process.output_tail())
+            self._give_up(child, now_ns, words)
+        elif code == Exit.USER:  # a file that was right may be half-written, and will be put right
+            child.restarts += 1
+            self._start_later(child, now_ns, exit_reason(code, words))
         else:
-            self._schedule_restart(child, now_ns, exit_reason(code, child.process.output_tail()), ChildState.BACKOFF)
+            self._schedule_restart(child, now_ns, exit_reason(code, words), ChildState.BACKOFF)
 
     def _treat_silence(self, child: Child, now_ns: int) -> None:
         if now_ns < child.deadline_ns + min(child.waited_ns(now_ns), self._limits.startup_ns):
@@ -227,6 +209,12 @@ class Supervisor:
         child.restarts += 1
         child.state, child.reason, child.process = state, reason, NO_PROCESS
         self._tell(logging.WARNING, f"{child.component} {reason}; starting it again")
+
+    def _start_later(self, child: Child, now_ns: int, reason: str) -> None:
+        """Tries again, for ever, after what is no failure of the process: a lack of the host, or of a file of its."""
+        child.lacks, child.start_at_ns = True, now_ns + LONGEST_BACKOFF_NS
+        child.state, child.reason, child.process = ChildState.BACKOFF, reason, NO_PROCESS
+        self._tell(logging.WARNING, f"{child.component} {reason}; trying again")
 
     def _give_up(self, child: Child, now_ns: int, reason: str) -> None:
         child.start_at_ns = now_ns + self._limits.window_ns

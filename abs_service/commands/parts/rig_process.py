@@ -103,6 +103,7 @@ def stop_on_signals() -> threading.Event:
     """An event that SIGTERM, SIGINT and SIGHUP set. A second SIGTERM or SIGINT ends the process on the spot.
 
     SIGHUP says that the terminal is gone, often twice: by the kernel and by the shell. `nohup` lets it be ignored.
+    SIGUSR1 and SIGUSR2, by which others rotate their logs, do nothing here, but would end the process.
     """
     stop, is_signalled = threading.Event(), False
     hand_over = _in_thread(stop.set)
@@ -118,6 +119,8 @@ def stop_on_signals() -> threading.Event:
     signal.signal(signal.SIGINT, on_signal)
     if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
         signal.signal(signal.SIGHUP, hand_over)
+    for user_signal in (signal.SIGUSR1, signal.SIGUSR2):
+        signal.signal(user_signal, signal.SIG_IGN)
     return stop
 
 

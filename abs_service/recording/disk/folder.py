@@ -87,6 +87,18 @@ def check_mounted(mount: Path) -> None:
         raise OSError(f"the disk at {mount} is not mounted any more")
 
 
+def check_inodes(directory: Path) -> None:
+    """Checks that the file system of an existing folder can hold one more file: many small ones use up its inodes.
+
+    Raises:
+        OSError: it cannot, which the system would call a lack of space.
+    """
+    disk = os.statvfs(directory)
+    if disk.f_files and not disk.f_favail:  # some file systems have no limit, and say 0 of 0
+        files = f"its {disk.f_files} files are as many as it can hold"
+        raise OSError(f"no inode is left on the disk of {directory}: {files}; delete some, however small")
+
+
 def _mistakes(directory: Path) -> Iterator[FolderError]:
     try:
         make(directory)

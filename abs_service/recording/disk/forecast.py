@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 #: Time over which the rate is averaged [ns].
 WINDOW_NS = 60_000_000_000
+#: Said of a disk that is full before the limits of the recordings delete any.
+TOO_SMALL = ", too small for what record.retain_* and record.rotate_* keep"
 
 
 class RateMeter:
@@ -79,7 +81,8 @@ def text(recordings: Growth, estimates: Growth, room: float) -> str:
         return ""
     seconds = room_s((recordings, estimates), room)
     if seconds < float("inf"):
-        return f"{duration(seconds)} on this disk"
+        unmet = seconds * recordings.rate < recordings.more < float("inf")
+        return f"{duration(seconds)} on this disk" + TOO_SMALL * unmet
     kept = f"the last {duration(recordings.kept_s)} are kept"
     return f"{kept}, estimates of {duration(estimates.kept_s)}" if estimates.rate > 0 else kept
 

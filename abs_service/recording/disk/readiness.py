@@ -62,4 +62,5 @@ class Readiness:
     def _check(self) -> None:
         folder.check_mounted(self._mount)
         folder.make(self._directory)
+        folder.check_inodes(self._directory)
         self._space.check()

@@ -43,7 +43,8 @@ class Child:
         reason: of the state, in plain words.
         restarts: how often it was started again after a failure.
         starts: how often it was started.
-        lacks: it cannot be started, because the host lacks something, such as open files.
+        lacks: it cannot work, because the host lacks something, such as open files, or a file of it is wrong; until it
+            is started, or sends health.
         process: the running one; `NO_PROCESS` if there is none.
         exit_code: of its last end.
         worst_code: the highest with which it ended by itself or because it was told; 128 + N for signal N that ended it

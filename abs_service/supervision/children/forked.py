@@ -76,7 +76,8 @@ def detach() -> None:
 
     It ends when `run` has ended, and removes what `run` cannot if it was killed.
     """
-    signal.signal(signal.SIGHUP, signal.SIG_IGN)  # also of what it forks: whoever sends it to all means `run`
+    for number in (signal.SIGHUP, signal.SIGUSR1, signal.SIGUSR2):  # also of what it forks: who sends them means `run`
+        signal.signal(number, signal.SIG_IGN)
     setproctitle("abs-service fork-server")
     atexit.register(shutil.rmtree, os.environ.pop(_FOLDER), ignore_errors=True)
     with open(os.devnull, "r+b", buffering=0) as null:

@@ -129,8 +129,12 @@ class RigView:
         ]
         found += [("run", Health.LEVEL_WARNING, self.refused)] if self.refused else []
         found += [("run", Health.LEVEL_ERROR, self.rivals)] if self.rivals else []
-        failed = [child for child in self.children if child.state is ChildState.FAILED]
-        return found + [(child.component, Health.LEVEL_ERROR, f"given up: {child.reason}") for child in failed]
+        for child in self.children:
+            given_up = child.state is ChildState.FAILED
+            if given_up or child.lacks:
+                words = f"given up: {child.reason}" if given_up else child.reason
+                found.append((child.component, Health.LEVEL_ERROR, words))
+        return found
 
     @property
     def activity(self) -> str:

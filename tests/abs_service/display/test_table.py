@@ -112,9 +112,11 @@ def test_troubles_of_components_and_children_that_were_given_up_are_shown(live):
         live, Health(component="capture", level=Health.LEVEL_ERROR, message="sim: unplugged; trying again in 1 s")
     )
     failed = Child("track/sheet", (), 1, ChildState.FAILED, "needed more than 5 restarts")
-    text = drawn(view(live, children=[failed]), width=120)
+    waits = Child("record", (), 2, reason="cannot be started: Too many open files", lacks=True)
+    text = drawn(view(live, children=[failed, waits]), width=120)
     assert "capture: sim: unplugged; trying again in 1 s" in text
     assert "track/sheet: given up: needed more than 5 restarts" in text
+    assert "record: cannot be started: Too many open files" in text
 
 
 def test_preparation_is_shown_with_a_spinner(live):

@@ -3,6 +3,7 @@
 import fcntl
 import os
 import random
+from contextlib import suppress
 
 import numpy as np
 import pytest
@@ -200,6 +201,33 @@ def test_an_interrupted_recovery_is_repeated(tmp_path, monkeypatch):
     monkeypatch.undo()
     assert [path.name for path in tmp_path.iterdir()] == ["a.mcap.active"]
     assert recover(source).messages == 2 * FRAMES
+
+
+def test_a_power_cut_at_any_moment_leaves_no_second_copy(tmp_path, monkeypatch):
+    for calls in (1, 2):
+        source, left = write(tmp_path / f"{calls}.mcap.active", finish=False), [calls]
+        for name in ("replace", "unlink"):
+            monkeypatch.setattr(os, name, cut_after(left, getattr(os, name)))
+        with suppress(KeyboardInterrupt):
+            recover(source)
+        monkeypatch.undo()
+        if calls == 1:
+            recover(source)
+        assert [path.name for path in tmp_path.iterdir()] == [f"{calls}.mcap"]
+        assert len(read(tmp_path / f"{calls}.mcap")[0]) == 2 * FRAMES
+        (tmp_path / f"{calls}.mcap").unlink()
+
+
+def cut_after(left, function):
+    """The function, after which all ends as soon as it has been called so often."""
+
+    def called(*arguments, **options):
+        function(*arguments, **options)
+        left[0] -= 1
+        if not left[0]:
+            raise KeyboardInterrupt
+
+    return called
 
 
 def test_what_a_killed_recovery_left_is_removed_and_what_a_living_one_writes_is_not(tmp_path):

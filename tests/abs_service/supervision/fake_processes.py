@@ -3,7 +3,8 @@
 import signal
 
 from abs_service.supervision.children.child import Child
-from abs_service.supervision.supervisor import Limits, Supervisor
+from abs_service.supervision.limits import Limits
+from abs_service.supervision.supervisor import Supervisor
 
 S = 1_000_000_000
 

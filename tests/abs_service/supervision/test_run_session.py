@@ -20,8 +20,9 @@ from abs_service.display.terminal.lines import PlainDisplay
 from abs_service.display.terminal.output import Output
 from abs_service.supervision.children.child import Child
 from abs_service.supervision.exit_codes import Exit
+from abs_service.supervision.limits import Limits
 from abs_service.supervision.run_session import Renewal, RunSession
-from abs_service.supervision.supervisor import Limits, Supervisor
+from abs_service.supervision.supervisor import Supervisor
 from abs_service.tracking.monitors import silence_monitor
 from abs_service.wire import commands, estimate_messages
 from abs_service.wire.checked_bus import CheckedBus

@@ -1,4 +1,4 @@
-"""SIGHUP to a service that starts, and to all processes of one that runs, as by `pkill -HUP abs-service`."""
+"""SIGHUP to a service that starts, and with SIGUSR1 and SIGUSR2 to all processes of one that runs, as by `pkill`."""
 
 import os
 import signal
@@ -32,9 +32,9 @@ def test_a_service_reads_its_file_again_and_none_of_its_processes_ends(rig_file,
         wait_until(lambda: children(process.pid).get("fork-server", first) != first, 10, "another fork server")
         alive = every_child(process.pid)
         assert {"fork-server", "capture", "track"} <= {command for command, _ in alive}
-        for _, pid in alive:
-            os.kill(pid, signal.SIGHUP)
-        process.send_signal(signal.SIGHUP)
+        for pid in [process.pid, *(pid for _, pid in alive)]:
+            for number in (signal.SIGUSR1, signal.SIGUSR2, signal.SIGHUP):
+                os.kill(pid, number)
         wait_until(listener.tracks_since(time.monotonic_ns() + 2 * 10**9), 20, "TRACKING afterwards")
         assert every_child(process.pid) == alive
     process.send_signal(signal.SIGTERM)

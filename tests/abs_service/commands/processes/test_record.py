@@ -63,7 +63,11 @@ def test_a_recording_in_a_folder_where_owners_alone_may_delete_is_copied_once(tm
     def refuse(*_):
         raise PermissionError(errno.EPERM, os.strerror(errno.EPERM))
 
+    def replace(source, target, rename=os.replace):
+        return refuse() if Path(target).suffix == ".active" else rename(source, target)
+
     with monkeypatch.context() as patch:
+        patch.setattr(os, "replace", replace)
         patch.setattr(Path, "unlink", refuse)
         assert not record.recover_leftovers(settings, health, LATER_S)
         copy = (tmp_path / "a.mcap").stat()

@@ -30,7 +30,7 @@ MB = 1_000_000
         (45 * MB, 500_000 * MB, 0, 7200.0, math.inf, "the last 2.0 hours are kept"),
         (50 * MB, 500_000 * MB, 0, math.inf, 360_000 * MB, "the last 2.0 hours are kept"),
         (50 * MB, 300_000 * MB, 60_000 * MB, math.inf, 360_000 * MB, "the last 2.0 hours are kept"),
-        (50 * MB, 30_000 * MB, 60_000 * MB, math.inf, 360_000 * MB, "10.0 min on this disk"),
+        (50 * MB, 30_000 * MB, 60_000 * MB, math.inf, 360_000 * MB, "10.0 min on this disk" + forecast.TOO_SMALL),
         (0.0, 1, 0, math.inf, math.inf, ""),
     ],
 )
@@ -43,9 +43,9 @@ def test_a_forecast(rate, room, used, retain_s, retain_bytes, expected):
     ("rotate_bytes", "retain_s", "retain_bytes", "expected"),
     [
         (4_000 * MB, 3600.0, math.inf, "the last 60.0 min are kept"),
-        (9_000 * MB, 3600.0, math.inf, "62.2 min on this disk"),  # the file that is an hour old is 200 s long
+        (9_000 * MB, 3600.0, math.inf, "62.2 min on this disk" + forecast.TOO_SMALL),  # the oldest is 200 s long
         (9_000 * MB, math.inf, 1_000 * MB, "the last 22 s are kept"),
-        (900_000 * MB, math.inf, 1_000 * MB, "62.2 min on this disk"),  # within one file
+        (900_000 * MB, math.inf, 1_000 * MB, "62.2 min on this disk" + forecast.TOO_SMALL),  # within one file
     ],
 )
 def test_a_file_that_is_written_is_not_deleted(tmp_path, rotate_bytes, retain_s, retain_bytes, expected):

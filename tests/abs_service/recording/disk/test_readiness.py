@@ -1,5 +1,8 @@
 """A recorder that waits for its trigger tells whether it could record, and when it can again."""
 
+import os
+from types import SimpleNamespace
+
 import pytest
 from absmsg.v1.health_pb2 import Health
 
@@ -26,7 +29,7 @@ def waiting(tmp_path, monkeypatch):
         rig.recorder.stop(5)
 
 
-@pytest.mark.parametrize("fault", ["full", "no folder", "unmounted"])
+@pytest.mark.parametrize("fault", ["full", "no inode", "no folder", "unmounted"])
 def test_what_a_recording_would_fail_of_is_said_before_it_is_asked_for(waiting, tmp_path, monkeypatch, fault):
     free = [1 << 40]
     rig = waiting(free_bytes=lambda _: free[0], minimum_free_bytes=1000)
@@ -34,6 +37,8 @@ def test_what_a_recording_would_fail_of_is_said_before_it_is_asked_for(waiting, 
     assert rig.said.level == Health.LEVEL_OK
     if fault == "full":
         free[0] = 999
+    elif fault == "no inode":
+        monkeypatch.setattr(os, "statvfs", lambda _: SimpleNamespace(f_files=1000, f_favail=0))
     elif fault == "no folder":
         (tmp_path / "takes").rmdir()
         (tmp_path / "takes").write_text("")
@@ -41,6 +46,7 @@ def test_what_a_recording_would_fail_of_is_said_before_it_is_asked_for(waiting, 
         monkeypatch.setattr(folder, "check_mounted", unmounted)
     assert eventually(lambda: rig.said.level == Health.LEVEL_ERROR)
     assert rig.said.message.startswith("nothing could be recorded: ")
+    assert ("no inode is left on the disk of" in rig.said.message) == (fault == "no inode")
     free[0] = 1 << 40
     monkeypatch.undo()
     if fault == "no folder":
