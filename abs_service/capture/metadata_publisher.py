@@ -15,7 +15,7 @@ from calib.camera import Camera
 
 
 @dataclass(frozen=True)
-class Described:
+class ConfiguredSensors:
     """Sensors as a configuration describes them."""
 
     toml: str
@@ -28,7 +28,7 @@ class MetadataPublisher:
     Its methods may be called from any thread: devices are opened by threads of their own.
     """
 
-    def __init__(self, bus: Bus, headers: HeaderFactory, described: Described) -> None:
+    def __init__(self, bus: Bus, headers: HeaderFactory, described: ConfiguredSensors) -> None:
         self._bus = bus
         self._headers = headers
         self._described = described
@@ -37,7 +37,7 @@ class MetadataPublisher:
         self._seq = 0
         self._lock = threading.Lock()
 
-    def configure(self, described: Described) -> None:
+    def configure(self, described: ConfiguredSensors) -> None:
         """Publishes another configuration from now on, with the same cameras."""
         with self._lock:
             self._described = described

@@ -11,7 +11,7 @@ from calib.calibration_check.stored import Stored, Views
 from calib.solve.bundle import robust
 from calib.solve.bundle.adjustment import NotSolvedError
 from calib.solve.start.board_poses import pose_candidates
-from calib.solve.validation.distance_errors import Displaced, Misread, distance_errors
+from calib.solve.validation.distance_errors import DistanceShift, Misread, distance_errors
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ def distance_bias(stored: Stored, views: Views, sensor: str) -> DistanceBias | N
     )
 
 
-def distance_error(stored: Stored, views: Views, sensor: str, needed_px: float) -> Misread | Displaced | None:
+def distance_error(stored: Stored, views: Views, sensor: str, needed_px: float) -> Misread | DistanceShift | None:
     """Mistake in the distances of a sensor, by its own corners, or by those of all others if it makes no image.
 
     None without any, and if the other sensors contradict each other.

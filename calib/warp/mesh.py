@@ -20,7 +20,7 @@ LARGEST_STEP_M = 0.04
 _REACH = 0.99
 
 
-class Each(Protocol):
+class ParallelMap(Protocol):
     """Applies a function to all parts of an image: the built-in `map`, or `map` of a thread pool."""
 
     def __call__(
@@ -42,7 +42,7 @@ class MeshWarp:
         source: Camera,
         target: Camera,
         largest_step_m: float = LARGEST_STEP_M,
-        each: Each = map,
+        each: ParallelMap = map,
         parts: int = 1,
     ):
         """Precomputes everything that does not depend on images.

@@ -48,7 +48,7 @@ def write(path: Path, settings: ServiceConfig) -> None:
     with path.open("wb") as stream:
         file = McapFile(stream, Compression.ZSTD)
         file.attach("rig.toml", "text/toml", toml.encode(), START_NS)
-        _write_announcements(file, settings, simulation, headers)
+        _write_metadata(file, settings, simulation, headers)
         for k in EXPOSURES:
             frames, truth = simulation.expose(k)
             _write_truth(file, truth, headers)
@@ -64,9 +64,7 @@ def track(path: Path) -> list[list[float]]:
     return [estimate.theta.tolist() for estimate in recording.rig.tracker("sheet").replay(recording)]
 
 
-def _write_announcements(
-    file: McapFile, settings: ServiceConfig, simulation: Simulation, headers: HeaderFactory
-) -> None:
+def _write_metadata(file: McapFile, settings: ServiceConfig, simulation: Simulation, headers: HeaderFactory) -> None:
     header = headers.at(0, 0)
     cameras = {name: head.camera for name, head in simulation.heads.items()}
     messages = {

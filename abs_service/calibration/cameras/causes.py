@@ -12,7 +12,7 @@ from calib.calibration_check.hypotheses import TERMS, Kind
 from calib.calibration_check.mistakes import Mistake
 from calib.calibration_check.stored import Views
 from calib.solve.validation.board_shape import ShapeError
-from calib.solve.validation.distance_errors import Displaced, Misread
+from calib.solve.validation.distance_errors import DistanceShift, Misread
 from calib.solve.validation.unlike_shots.contradictions import Contradiction
 
 #: Distance bias that is as good as any depth camera's, and that is unacceptable [m].
@@ -46,22 +46,22 @@ _MISTAKES = {
 
 
 @dataclass(frozen=True)
-class Reach:
+class DistanceRange:
     """Distances of the boards that a sensor measured [m]."""
 
     near: float
     far: float
 
 
-def reaches(views: Views) -> dict[str, Reach]:
+def reaches(views: Views) -> dict[str, DistanceRange]:
     """Distances of the boards by the sensors that measured them."""
     found: dict[str, list[float]] = {}
     for view in views.planes:
         found.setdefault(view.sensor, []).append(float(np.median(view.distances)))
-    return {name: Reach(min(distances), max(distances)) for name, distances in found.items()}
+    return {name: DistanceRange(min(distances), max(distances)) for name, distances in found.items()}
 
 
-def verdicts(found: Comparison, motion: Level, reaches: Mapping[str, Reach]) -> list[Verdict]:
+def verdicts(found: Comparison, motion: Level, reaches: Mapping[str, DistanceRange]) -> list[Verdict]:
     """Verdict on a change that all shots share; none if there is none, or none that matters.
 
     Args:
@@ -116,7 +116,7 @@ def of_misprint(found: ShapeError) -> Verdict:
     return Verdict(Level.BAD, text, f"{found.shape.value[0].upper()}{found.shape.value[1:]}.")
 
 
-def of_distance_error(found: Misread | Displaced) -> Verdict:
+def of_distance_error(found: Misread | DistanceShift) -> Verdict:
     """Verdict on distances of another geometry, or on a displaced depth image."""
     return Verdict(Level.BAD, f"{found.finding}.", f"{found.remedy[0].upper()}{found.remedy[1:]}.", found.sensor)
 
@@ -142,7 +142,7 @@ def _mistaken(mistake: Mistake) -> str:
     return said if np.isnan(mistake.undone_px) else f"{said} corners miss by {mistake.undone_px:.2g} px"
 
 
-def _level(explanation: Explanation, motion: Level, reaches: Mapping[str, Reach]) -> Level:
+def _level(explanation: Explanation, motion: Level, reaches: Mapping[str, DistanceRange]) -> Level:
     """Level of a change by its effect on images, or on distances in the middle of the boards."""
     kind = explanation.hypothesis.kind
     if kind == Kind.BOARD:
@@ -190,7 +190,7 @@ def _percent(value: float, sigma: float) -> str:
     return f"{100 * value:+.2f} ± {100 * sigma:.2f} %"
 
 
-def _advice(every: Sequence[Explanation], reaches: Mapping[str, Reach]) -> str:
+def _advice(every: Sequence[Explanation], reaches: Mapping[str, DistanceRange]) -> str:
     """Action that mends what explains the shots, or that tells explanations apart."""
     of_sensors = [each for each in every if each.hypothesis.kind != Kind.BOARD]
     if len(of_sensors) < len(every):

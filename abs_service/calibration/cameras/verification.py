@@ -7,7 +7,7 @@ import numpy as np
 
 from abs_service.calibration.cameras import causes, fit_verdict, new_views
 from abs_service.calibration.cameras import verification_tables as tables
-from abs_service.calibration.cameras.causes import UNNOTICED_M, WRONG_M, Reach
+from abs_service.calibration.cameras.causes import UNNOTICED_M, WRONG_M, DistanceRange
 from abs_service.calibration.cameras.fit_verdict import SPOILT_PX, UNNOTICED_PX
 from abs_service.calibration.files.rig_file import RigCalibration
 from abs_service.calibration.shots.corner_extraction import BoardObservations
@@ -22,7 +22,7 @@ from calib.calibration_check.hypotheses import TERMS, Kind
 from calib.calibration_check.misprint import misprint
 from calib.calibration_check.optics import OpticsChange, optics_change
 from calib.calibration_check.stored import Stored, Views, usable
-from calib.solve.validation.distance_errors import Displaced, Misread
+from calib.solve.validation.distance_errors import DistanceShift, Misread
 
 #: Expected reprojection error if the calibration does not contain its own [px].
 BASELINE_PX = 0.5
@@ -58,10 +58,10 @@ class Verification:
     focal_px: Mapping[str, float]
     expected_px: Mapping[str, float]
     biases: Mapping[str, DistanceBias]
-    errors: Mapping[str, Misread | Displaced]
+    errors: Mapping[str, Misread | DistanceShift]
     changes: tuple[PairChange, ...]
     comparison: Comparison
-    reaches: Mapping[str, Reach]
+    reaches: Mapping[str, DistanceRange]
     likelier: Mapping[str, str]
     unused: tuple[Verdict, ...]
     sensors: int

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from abs_service import config
-from abs_service.capture.metadata_publisher import Described
+from abs_service.capture.metadata_publisher import ConfiguredSensors
 from abs_service.config import addresses, plugins
 from abs_service.config.errors import error_of
 from calib.camera import Camera
@@ -64,10 +64,10 @@ def cameras(rig: config.ServiceConfig, name: str, device: Device) -> dict[str, C
     return found
 
 
-def described(rig: config.ServiceConfig) -> Described:
+def described(rig: config.ServiceConfig) -> ConfiguredSensors:
     """The configuration itself, and the noise models of its sensors with their outliers."""
     noises = {}
     for sensor, table in rig.sensors.items():
         outliers = table.model_dump(include={"outlier_share", "range_m"}, exclude_none=True)
         noises[sensor] = {} if table.noise is None else plugins.table(table.noise) | outliers
-    return Described(config.to_toml(rig), noises)
+    return ConfiguredSensors(config.to_toml(rig), noises)

@@ -26,7 +26,7 @@ from abs_service.recording.recorder import Recorder
 from abs_service.recording.recorder_settings import RecorderSettings
 from abs_service.recording.recovery import InUseError, RecoveryError, leftovers, recover, remove_interrupted, set_aside
 from abs_service.recording.triggers.first_tracking import FirstTracking
-from abs_service.recording.triggers.trigger import ALWAYS, Asked, Trigger
+from abs_service.recording.triggers.trigger import ALWAYS, RequestTrigger, Trigger
 from abs_service.supervision.exit_codes import Exit
 from abs_service.supervision.process_setup import process_tuning
 from abs_service.wire import commands
@@ -127,7 +127,7 @@ def _trigger(rig: config.ServiceConfig, clock: WallClock) -> Trigger:
     table = rig.record
     if table.when == "always":
         return ALWAYS
-    trigger = Asked(table.when == "not_tracking", table.post_roll_s, clock.monotonic)
+    trigger = RequestTrigger(table.when == "not_tracking", table.post_roll_s, clock.monotonic)
     if any(time.time() - changed_s < INTERRUPTED_S for changed_s in leftovers(table.directory).values()):
         trigger.resume()
     return trigger

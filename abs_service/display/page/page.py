@@ -25,7 +25,7 @@ from abs_service.display.page.readouts import status, table, words
 from abs_service.display.page.readouts.neighbours import Neighbour, links
 from abs_service.display.page.readouts.plots import plots
 from abs_service.display.page.scene import gravity
-from abs_service.display.page.scene.fields import FIELDS, ColorScale, Drawn, MeshView, joined, residual
+from abs_service.display.page.scene.fields import FIELDS, ColorScale, MeshView, ShownMesh, joined, residual
 from abs_service.display.page.scene.scene import Scene
 from abs_service.display.page.scene.trails import Trails
 from abs_service.tracking.log.tracker_log import points
@@ -77,7 +77,7 @@ class Page:
             tab = self._panel.add_tab("Devices")
             self._controls = DeviceControls(self._server.gui, tab, commands.devices, commands.control)
         self._scales = {name: ColorScale(field) for name, field in FIELDS.items()}
-        self._drawn: dict[str, Drawn] = {}  # by tracker
+        self._drawn: dict[str, ShownMesh] = {}  # by tracker
         self._measured: dict[str, Measured] = {}  # by sensor
         self._due_s = dict.fromkeys((self._draw_meshes, self._draw_images, self._write), 0.0)
 
@@ -124,7 +124,7 @@ class Page:
             return
         if (view := self._mesh_view(mesh, name == "residual")) is None:
             return
-        self._drawn[tracker] = Drawn(view, mesh.header.t_host_ns, state)
+        self._drawn[tracker] = ShownMesh(view, mesh.header.t_host_ns, state)
         self._scene.show_mesh(tracker, view, self._scales[name].colors(FIELDS[name].values(view)), stale)
         self._scene.show_first(tracker, view, self._panel.shows[0])
         self._scene.show_gravity(tracker, view, gravity.down(self._feed, tracker))

@@ -12,7 +12,7 @@ from viser import uplot
 from abs_service.display.page.numbers import MINUTE_S
 from abs_service.display.page.pictures import Picture
 from abs_service.display.page.readouts.plots import Curves, complete
-from abs_service.display.page.readouts.words import Words
+from abs_service.display.page.readouts.words import StatusLine
 from abs_service.display.page.scene.fields import FIELDS, PALETTES
 from abs_service.display.page.style import GONE, STYLE
 
@@ -88,7 +88,7 @@ class Panel:
         if trackers and tuple(trackers) != tuple(self._tracker.options):
             self._tracker.options, self._tracker.visible = tuple(trackers), len(trackers) > 1
 
-    def show_status(self, words: Iterable[Words]) -> None:
+    def show_status(self, words: Iterable[StatusLine]) -> None:
         """Shows the status; the first line is the largest. To be called at least every `style.GONE_S` seconds."""
         self._renewed += 1
         lines = [f"<!-- {self._renewed} -->", GONE]

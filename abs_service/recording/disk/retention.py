@@ -15,7 +15,7 @@ KEEP = ".keep"
 
 
 @dataclass(frozen=True, slots=True)
-class Kept:
+class RetainedFile:
     """A file of the recorder: its name, size [bytes] and time of its last change [ns since the epoch]."""
 
     name: str
@@ -37,7 +37,7 @@ class Ages:
         self._wall_ns = wall_ns
         self._changed_ns: dict[str, int] | None = None  # by name, CLOCK_MONOTONIC [ns]
 
-    def of(self, files: Iterable[Kept], now_ns: int) -> dict[str, int]:
+    def of(self, files: Iterable[RetainedFile], now_ns: int) -> dict[str, int]:
         """Times since the last change of all files that there are, by name [ns]."""
         before, self._changed_ns, ages = self._changed_ns, {}, {}
         for file in files:
@@ -76,7 +76,7 @@ class Retention:
     rotate_s: float = 0.0
     rotate_bytes: float = 0.0
 
-    def files(self) -> list[Kept]:
+    def files(self) -> list[RetainedFile]:
         """The recordings that count, finished or not, oldest first; none if the folder cannot be read."""
         pattern = re.compile(
             rf"{re.escape(self.name)}_\d{{4}}-\d\d-\d\dT\d\d-\d\d-\d\dZ(_\d+)?"
@@ -87,12 +87,12 @@ class Retention:
                 named = {entry.name: entry for entry in entries if entry.name.startswith(self.name)}
         except OSError:
             return []
-        found: list[Kept] = []
+        found: list[RetainedFile] = []
         for name, entry in named.items():
             with suppress(OSError):  # it is deleted at this moment, is a loop of links, or its disk does not tell
                 if pattern.fullmatch(name) and name + KEEP not in named and entry.is_file():
                     about = entry.stat()
-                    found.append(Kept(name, about.st_size, about.st_mtime_ns))
+                    found.append(RetainedFile(name, about.st_size, about.st_mtime_ns))
         return sorted(found, key=lambda file: (file.mtime_ns, file.name))
 
     def growth(self, rate: float) -> Growth:
@@ -100,7 +100,7 @@ class Retention:
         one = min(self.rotate_bytes, self.rotate_s * rate)
         return Growth(rate, sum(file.size for file in self.files()), self.retain_s, self.retain_bytes, one)
 
-    def apply(self, ages: Callable[[Iterable[Kept]], dict[str, int]]) -> tuple[list[Path], list[OSError]]:
+    def apply(self, ages: Callable[[Iterable[RetainedFile]], dict[str, int]]) -> tuple[list[Path], list[OSError]]:
         """Deletes the files beyond the limits, by their ages [ns]; returns them, and why others cannot be deleted."""
         deleted: list[Path] = []
         failures: list[OSError] = []

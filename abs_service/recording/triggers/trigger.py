@@ -30,7 +30,7 @@ class Trigger(Protocol):
         ...
 
 
-class Always:
+class AlwaysTrigger:
     """Records always."""
 
     reason = "always"
@@ -43,10 +43,10 @@ class Always:
         """Does nothing."""
 
 
-ALWAYS = Always()
+ALWAYS = AlwaysTrigger()
 
 
-class Asked:
+class RequestTrigger:
     """Records from a command on until the next, and after an event for some time.
 
     Args:

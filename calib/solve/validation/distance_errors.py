@@ -53,7 +53,7 @@ class Misread:
 
 
 @dataclass(frozen=True)
-class Displaced:
+class DistanceShift:
     """Distances that lie elsewhere in the image than the corners.
 
     Attributes:
@@ -81,7 +81,7 @@ class Displaced:
         return f"{self.sensor}: {self.finding}: {self.remedy}"
 
 
-def distance_errors(solution: Solution, needed_px: float) -> list[Misread | Displaced]:
+def distance_errors(solution: Solution, needed_px: float) -> list[Misread | DistanceShift]:
     """Mistakes in distances, at most one of each sensor, that are certain and matter.
 
     Args:
@@ -103,7 +103,7 @@ def distance_errors(solution: Solution, needed_px: float) -> list[Misread | Disp
 
 def _of_group(
     solution: Solution, sensor: str, columns: Sequence[NDArray[np.float64]], needed_px: float
-) -> list[Misread | Displaced]:
+) -> list[Misread | DistanceShift]:
     read, across, down, *terms = columns
     blocks = (np.stack([read, *terms], axis=1), np.stack([across, down, *terms], axis=1))
     every = further(solution.adjustment.equations, solution.adjustment.residuals, blocks)
@@ -114,7 +114,7 @@ def _of_group(
         if count == 1 and certain.all() and abs(abs(sizes.item()) - 1) < MISREAD:
             return [Misread(sensor, sizes.item())]
         if count > 1 and np.any(certain & (np.abs(sizes) > needed_px)):
-            return [Displaced(sensor, -sizes, sigmas)]
+            return [DistanceShift(sensor, -sizes, sigmas)]
     return []
 
 

@@ -85,7 +85,7 @@ def free_shape(solution: Solution) -> FreeShape:
     return FreeShape(solution, poses, robust.covariance_inflation(left[:measured]), misses)
 
 
-class Once(NamedTuple):
+class DistinctPoses(NamedTuple):
     """Information of the poses as if every distinct one had been seen once.
 
     Attributes:
@@ -97,7 +97,7 @@ class Once(NamedTuple):
     scores: Array
 
 
-class Along(NamedTuple):
+class AlongDirections(NamedTuple):
     """Information of poses along directions.
 
     Attributes:
@@ -113,20 +113,20 @@ class Along(NamedTuple):
     whole: Array
 
 
-def once(poses: PoseInformation) -> Once:
+def once(poses: PoseInformation) -> DistinctPoses:
     """Information and scores of poses without their repetitions."""
     repeats = poses.repeats
-    return Once(poses.information / repeats[:, None, None], poses.scores / repeats[:, None] / poses.efficiency)
+    return DistinctPoses(poses.information / repeats[:, None, None], poses.scores / repeats[:, None] / poses.efficiency)
 
 
-def along(directions: Array, information: Array, prior: Array) -> Along:
+def along(directions: Array, information: Array, prior: Array) -> AlongDirections:
     """Information of poses along directions (k, m); a prior (k, k) adds to that of all poses (poses, k, k)."""
     lower = linalg.cholesky(information.sum(axis=0) + prior, lower=True)
     whole = linalg.solve_triangular(lower, np.eye(len(lower)), lower=True) @ information @ directions
-    return Along(directions, lower, directions.T @ information @ directions, whole)
+    return AlongDirections(directions, lower, directions.T @ information @ directions, whole)
 
 
-def without(poses: Once, known: Along, members: Members, change: Array) -> Array:
+def without(poses: DistinctPoses, known: AlongDirections, members: Members, change: Array) -> Array:
     """Scores (poses, k) that are left if some poses (poses,) have a change (m,) along `known` from the others."""
     moved = known.whole[members].sum(axis=0) @ change
     others = -linalg.solve_triangular(known.lower, moved, lower=True, trans=1)

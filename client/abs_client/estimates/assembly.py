@@ -19,7 +19,7 @@ Numbered = tuple[str, int]
 
 
 @dataclass(frozen=True)
-class Whole:
+class CompleteEstimate:
     """The messages of one estimate, and when the last of them arrived on this host's monotonic clock [ns]."""
 
     state: DeformationState
@@ -46,7 +46,7 @@ class Assembly:
         self._states: OrderedDict[Numbered, DeformationState] = OrderedDict()
         self._meshes: OrderedDict[Numbered, DeformedMesh] = OrderedDict()
         self._topologies: OrderedDict[Numbered, MeshTopology] = OrderedDict()
-        self._newest: Whole | None = None
+        self._newest: CompleteEstimate | None = None
         self._last: Numbered = ("", -1)
         self.lacks_topology = False
 
@@ -65,7 +65,7 @@ class Assembly:
             for number in list(self._states):
                 self._complete(number)
 
-    def take(self) -> Whole | None:
+    def take(self) -> CompleteEstimate | None:
         """The newest estimate that is whole, once."""
         with self._lock:
             newest, self._newest = self._newest, None
@@ -87,7 +87,7 @@ class Assembly:
         self.lacks_topology = topology is None and bool(mesh.vertices_f32)
         if self.lacks_topology or (topology and len(topology.rest_vertices_f32) != len(mesh.vertices_f32)):
             return
-        self._newest = Whole(state, mesh, topology or MeshTopology(), self._clock())
+        self._newest = CompleteEstimate(state, mesh, topology or MeshTopology(), self._clock())
         self._last = number
         for waiting in (self._states, self._meshes):
             for other in [one for one in waiting if one[0] != number[0] or one[1] <= number[1]]:

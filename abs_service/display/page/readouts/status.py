@@ -10,13 +10,13 @@ from abs_service.bus import keys
 from abs_service.display.page.feed import Feed
 from abs_service.display.page.numbers import rate_hz
 from abs_service.display.page.readouts import words
-from abs_service.display.page.readouts.words import STALE_S, STATUS, Words
+from abs_service.display.page.readouts.words import STALE_S, STATUS, StatusLine
 
 #: Begin of the message of a tracker's health where that is its status.
 _STATUSES = tuple(f"{name}: " for name in STATUS)
 
 
-def lines(feed: Feed, tracker: str, silence: str) -> list[Words]:
+def lines(feed: Feed, tracker: str, silence: str) -> list[StatusLine]:
     """Messages for the user, the most important first.
 
     Args:
@@ -45,7 +45,7 @@ def _preparing(feed: Feed) -> dict[str, str]:
     }
 
 
-def _tracker(feed: Feed, tracker: str) -> Words:
+def _tracker(feed: Feed, tracker: str) -> StatusLine:
     newest = feed.newest(keys.state(tracker), DeformationState)
     if newest is None:
         return words.tracker("", [], [], float("inf"), float("nan"))
@@ -62,13 +62,13 @@ def _slow(feed: Feed, tracker: str) -> str:
     return words.slow(rate_hz(numbers, feed.now_s), camera_hz, sum(one.skipped for one in numbers))
 
 
-def _warnings(feed: Feed) -> Iterator[Words]:
+def _warnings(feed: Feed) -> Iterator[StatusLine]:
     """Components that report a warning or an error, without those that the estimates contain already, or contradict."""
     for health, age_s in feed.healths():
         message = _unsaid(feed, health)
         if age_s < 3 * STALE_S and health.level >= Health.LEVEL_WARNING and (message or not health.message):
             color = STATUS["LOST" if health.level == Health.LEVEL_ERROR else "DEGRADED"][1]
-            yield Words(health.component, message, color)
+            yield StatusLine(health.component, message, color)
 
 
 def _unsaid(feed: Feed, health: Health) -> str:

@@ -21,7 +21,7 @@ STALE_COLOR, STARTING = "#6b7280", STATUS["INITIALIZING"][1]
 
 
 @dataclass(frozen=True, slots=True)
-class Words:
+class StatusLine:
     """A line about a tracker or a rig: title, reasons and remedy, and its colour."""
 
     title: str
@@ -43,17 +43,17 @@ def stream(name: str, age_s: float, rate_hz: float) -> str:
     return f"{name}, {rate_hz:.1f} Hz" if rate_hz else name
 
 
-def preparing(kernels: str) -> Words:
+def preparing(kernels: str) -> StatusLine:
     """A tracker that compiles its kernels, with the progress of that, or loads them."""
     if not kernels:
-        return Words("Loading kernels", "The first start on a computer compiles them, once.", STARTING)
+        return StatusLine("Loading kernels", "The first start on a computer compiles them, once.", STARTING)
     text = f"{kernels[:1].upper()}{kernels[1:]}. Once on each computer; tracking begins by itself."
-    return Words("Compiling kernels for this rig", text, STARTING)
+    return StatusLine("Compiling kernels for this rig", text, STARTING)
 
 
 def tracker(
     status: str, reasons: Sequence[str], warnings: Sequence[str], age_s: float, sigma_mm: float, slow: str = ""
-) -> Words:
+) -> StatusLine:
     """A tracker's state.
 
     Args:
@@ -64,17 +64,17 @@ def tracker(
         slow: warning of `slow`; the first reason, since a tracker that misses images gets into all other trouble.
     """
     if not status:
-        return Words(
+        return StatusLine(
             "No estimate yet", "The first one is still to come; if none does, the sensors deliver nothing.", STALE_COLOR
         )
     title, color, remedy = STATUS.get(status, (status.title(), STALE_COLOR, ""))
     if age_s > STALE_S:
         text = f"The last estimate said: {title.lower()}. Check that the tracker runs and its sensors deliver."
-        return Words(f"No estimate for {age(age_s)}", text, STALE_COLOR)
+        return StatusLine(f"No estimate for {age(age_s)}", text, STALE_COLOR)
     precise = f", σ {sigma_mm:.2f} mm" if status in ("TRACKING", "DEGRADED") and math.isfinite(sigma_mm) else ""
     text = sentences((slow, *reasons, *warnings))
     color = STATUS["DEGRADED"][1] if slow and status == "TRACKING" else color
-    return Words(title + precise, f"{text} {remedy}".strip(". "), color)
+    return StatusLine(title + precise, f"{text} {remedy}".strip(". "), color)
 
 
 def slow(rate_hz: float, camera_hz: float, skipped: int) -> str:
@@ -93,9 +93,9 @@ def slow(rate_hz: float, camera_hz: float, skipped: int) -> str:
     )
 
 
-def silence(age_s: float, remedy: str) -> Words | None:
+def silence(age_s: float, remedy: str) -> StatusLine | None:
     """Silence of the whole rig: its duration and advice; None while the rig publishes."""
     if age_s <= 3 * STALE_S:
         return None
     since = "yet" if age_s == float("inf") else f"for {age(age_s)}"
-    return Words(f"Nothing received from the rig {since}", remedy, STALE_COLOR)
+    return StatusLine(f"Nothing received from the rig {since}", remedy, STALE_COLOR)

@@ -40,7 +40,7 @@ class MeshView:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Drawn:
+class ShownMesh:
     """A mesh that is shown.
 
     Attributes:

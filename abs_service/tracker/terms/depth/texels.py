@@ -180,7 +180,7 @@ class TexelsOnDemand:
         is_single = len(pixel) == 1
         pixels = pixel[0] if is_single else self._of_window()
         shape = 2, pixels.size
-        wanted = Wanted(self._distance, self._amplitude, np.empty(shape, np.int64), np.empty(shape))
+        wanted = RequestedTexels(self._distance, self._amplitude, np.empty(shape, np.int64), np.empty(shape))
         count = _take(pixels, corner(self._window), self._costs, self._done, self._texture, wanted)
         if count:
             (row, column), (measured, amplitude) = wanted.places[:, :count], wanted.values[:, :count]
@@ -200,7 +200,7 @@ class TexelsOnDemand:
         return self._texture.shape[0] - 2, self._texture.shape[1] - 2
 
 
-class Wanted(NamedTuple):
+class RequestedTexels(NamedTuple):
     """Pixels whose texels are to be rendered.
 
     Attributes:
@@ -222,7 +222,7 @@ def _take(
     costs: ConstantCosts,
     done: NDArray[np.bool_],
     texture: NDArray[np.float32],
-    wanted: Wanted,
+    wanted: RequestedTexels,
 ) -> int:
     """Writes the constant texels of pixels that are not done; the number of those with a usable distance.
 

@@ -20,7 +20,7 @@ from calib.solve.validation.unlike_shots.steadiness import changes_of_optics, ch
 _EXPLAINED = 1.5
 
 
-class Unlike(NamedTuple):
+class ShotDoubts(NamedTuple):
     """Reasons to doubt that all shots show one board and one rig, shots that contradict, and likely causes."""
 
     reasons: Sequence[str]
@@ -28,11 +28,11 @@ class Unlike(NamedTuple):
     causes: Sequence[str]
 
 
-def unlike_shots(free: FreeShape, shape: Sequence[ShapeError], needed_px: float) -> Unlike:
+def unlike_shots(free: FreeShape, shape: Sequence[ShapeError], needed_px: float) -> ShotDoubts:
     """Looks whether all shots show one board and one rig."""
     solution = free.solution
     if wrong := distance_errors(solution, needed_px):
-        return Unlike([*map(str, wrong)], [], [])  # they pull everything else along
+        return ShotDoubts([*map(str, wrong)], [], [])  # they pull everything else along
     moved = changes_of_place(free, needed_px)
     # What happened to a sensor looks as if its image changed, and a wrong board as if every shot had another lens.
     changed = [] if moved else changes_of_optics(free, needed_px)
@@ -54,7 +54,7 @@ def unlike_shots(free: FreeShape, shape: Sequence[ShapeError], needed_px: float)
     reasons += [*misprinted, *map(str, mixed), *(changes.of_focus(*each) for each in focus.items())]
     reasons += [*map(str, [*two, *scattered]), *_contradicting(contradicting)]
     reasons += [changes.unexplained(one) for one, is_so in zip(changed, confirmed) if not is_so]
-    return Unlike(reasons, contradicting, [*map(str, cause)])
+    return ShotDoubts(reasons, contradicting, [*map(str, cause)])
 
 
 def _two(solution: Solution, contradicting: Sequence[Contradiction], scattered: Sequence[Scatter]) -> list[TwoGroups]:

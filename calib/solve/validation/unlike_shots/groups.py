@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from calib.solve.regrouping.two_groups import numbered, two_groups
 from calib.solve.solution import Solution
-from calib.solve.validation.free_shape import Along, FreeShape, Members, along, disagreement, once, without
+from calib.solve.validation.free_shape import AlongDirections, FreeShape, Members, along, disagreement, once, without
 from calib.solve.validation.unlike_shots.steadiness import HARMLESS, from_middle_px, of_focal, optics
 
 #: Minimum number of distinct poses, as any few fall into two groups, and of those in the smaller group.
@@ -143,7 +143,7 @@ def _split(free: FreeShape, directions: Array) -> _Split:
     return _Split(gain, members, change, is_uneven)
 
 
-def _grown(members: Members, known: Along, pulls: Array) -> _Split:
+def _grown(members: Members, known: AlongDirections, pulls: Array) -> _Split:
     """A group from a first guess (poses,), its gain in squared deviations of all poses; none if too few are left.
 
     Args:

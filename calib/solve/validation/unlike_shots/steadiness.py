@@ -19,7 +19,7 @@ from calib import pose
 from calib.solve.bundle.parameters.layout import POSE, turned
 from calib.solve.bundle.uncertainty import scaled_inverse
 from calib.solve.solution import Solution
-from calib.solve.validation.free_shape import FreeShape, Once, along, disagreement, once, without
+from calib.solve.validation.free_shape import DistinctPoses, FreeShape, along, disagreement, once, without
 from calib.solve.validation.support import from_middle
 
 #: Minimum number of distinct poses before and after a change.
@@ -181,7 +181,7 @@ def _split(free: FreeShape, directions: Array) -> _Found | None:
     if len(numbers) < 2 * MIN_POSES:
         return None
     order = np.argsort(first)
-    poses = Once(*(part[order] for part in once(free.poses)))
+    poses = DistinctPoses(*(part[order] for part in once(free.poses)))
     known = along(directions, poses.information, free.poses.prior)
     own, whole, pulls = known.own, known.whole, poses.scores @ directions
     best = _best(own, whole, pulls)

@@ -6,7 +6,7 @@ import pytest
 
 from abs_service import cli
 from abs_service.bus.stamps import HeaderFactory, WallClock
-from abs_service.capture.metadata_publisher import Described, MetadataPublisher
+from abs_service.capture.metadata_publisher import ConfiguredSensors, MetadataPublisher
 from abs_service.commands.processes import track
 from calib.camera import Camera
 
@@ -32,7 +32,7 @@ def tracked(tmp_path, endpoint, open_bus, monkeypatch):
     (tmp_path / "rig.toml").write_text(RIG)
     stop = threading.Event()
     monkeypatch.setattr(track.rig_process, "stop_on_signals", lambda: stop)
-    metadata = MetadataPublisher(open_bus(), HeaderFactory("demo", WallClock()), Described("", {"tof": {}}))
+    metadata = MetadataPublisher(open_bus(), HeaderFactory("demo", WallClock()), ConfiguredSensors("", {"tof": {}}))
     metadata.add({"tof": Camera(160, 120, 200.0, 200.0, 79.5, 59.5)})
 
     def tracked():

@@ -7,7 +7,7 @@ import pytest
 from absmsg.v1.health_pb2 import Health
 
 from abs_service.recording.disk import folder, readiness
-from abs_service.recording.triggers.trigger import Asked
+from abs_service.recording.triggers.trigger import RequestTrigger
 from tests.abs_service.recording.recorder_rig import Rig, depth, recordings, sequences
 from tests.waiting import eventually
 
@@ -19,7 +19,7 @@ def waiting(tmp_path, monkeypatch):
     made = []
 
     def make(**arguments):
-        rig = Rig(tmp_path / "takes", trigger=Asked(False, 1.0, lambda: 0), pre_roll_s=2.0, **arguments)
+        rig = Rig(tmp_path / "takes", trigger=RequestTrigger(False, 1.0, lambda: 0), pre_roll_s=2.0, **arguments)
         made.append(rig)
         rig.recorder.start()
         return rig

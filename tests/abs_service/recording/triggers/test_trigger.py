@@ -8,7 +8,7 @@ from absmsg.v1.health_pb2 import Health
 
 from abs_service.bus import keys
 from abs_service.bus.contract import Sample
-from abs_service.recording.triggers.trigger import ALWAYS, Asked
+from abs_service.recording.triggers.trigger import ALWAYS, RequestTrigger
 from abs_service.wire import commands
 from tests.abs_service.recording.recorder_rig import Rig, depth, metadata, read, recordings, sequences
 from tests.waiting import eventually
@@ -35,7 +35,7 @@ class Waiting(Rig):
 
     def __init__(self, directory, watches_status=False, post_roll_s=3.0, pre_roll_bytes=MANY, **settings):
         self.time = Clock()
-        trigger = Asked(watches_status, post_roll_s, self.time)
+        trigger = RequestTrigger(watches_status, post_roll_s, self.time)
         super().__init__(
             directory,
             trigger=trigger,
@@ -185,7 +185,7 @@ def test_a_recorder_that_records_always_refuses_commands(tmp_path):
 
 def test_a_recorder_that_was_killed_goes_on():
     clock = Clock()
-    asked, watching = Asked(False, 3.0, clock), Asked(True, 3.0, clock)
+    asked, watching = RequestTrigger(False, 3.0, clock), RequestTrigger(True, 3.0, clock)
     for trigger in (asked, watching):
         trigger.resume()
     assert (asked.reason, watching.reason) == ("asked for", "the recorder was interrupted")

@@ -13,7 +13,7 @@ from calib.lenses.lens import LensError
 from calib.solve.bundle.tasks import SensorTask, Task
 from calib.solve.calibrate import calibrate
 from calib.solve.solution import Solution
-from calib.solve.validation.distance_errors import Displaced, Misread, distance_errors
+from calib.solve.validation.distance_errors import DistanceShift, Misread, distance_errors
 from calib.solve.validation.verdict import assess
 from evaluation.scenes.boards import board_views
 
@@ -84,7 +84,7 @@ def test_the_other_geometry_is_named_of_a_sensor_without_an_image() -> None:
 def test_a_displaced_depth_image_is_named_with_its_shift() -> None:
     solution = solved(displaced, True)
     (found,) = distance_errors(solution, 1.0)
-    assert isinstance(found, Displaced)
+    assert isinstance(found, DistanceShift)
     np.testing.assert_allclose(found.shift, (6, -2), atol=1.5)
     assert assess(solution, 1.0, 1.0).verdict.startswith("Do not trust it yet: tof: its depth image is displaced by (+")
     assert distance_errors(solution, 10.0) == []

@@ -9,7 +9,7 @@ from abs_service.bus.health import Health
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.display.page.acting import recording
 from abs_service.display.page.feed import Feed
-from abs_service.recording.triggers.trigger import ALWAYS, Asked
+from abs_service.recording.triggers.trigger import ALWAYS, RequestTrigger
 from abs_service.wire import commands
 from tests.abs_service.bus.loopback import LoopbackBus
 
@@ -27,7 +27,7 @@ class Bench:
 
 
 def test_a_recorder_with_a_trigger_begins_and_ends():
-    trigger = Asked(watches_status=False, post_roll_s=1.0, clock=lambda: 0)
+    trigger = RequestTrigger(watches_status=False, post_roll_s=1.0, clock=lambda: 0)
     bench = Bench(trigger)
     assert bench.ask(True) == "The recorder records."
     assert trigger.reason == "asked for"

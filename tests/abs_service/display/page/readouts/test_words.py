@@ -15,7 +15,7 @@ def test_ages_are_short(seconds, text):
 
 
 def test_a_good_estimate_says_how_good():
-    assert words.tracker("TRACKING", [], [], 0.1, 0.77) == words.Words("Tracking, σ 0.77 mm", "", "#16a34a")
+    assert words.tracker("TRACKING", [], [], 0.1, 0.77) == words.StatusLine("Tracking, σ 0.77 mm", "", "#16a34a")
     assert words.tracker("TRACKING", [], [], 0.1, math.nan).title == "Tracking"
 
 
