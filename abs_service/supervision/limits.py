@@ -1,4 +1,4 @@
-"""When a supervisor gives up a process, and how long it waits for one."""
+"""Limits of a supervisor: restarts, after which a process is given up, and timeouts."""
 
 from dataclasses import dataclass
 

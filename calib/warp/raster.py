@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from calib.jit import kernel
 from calib.warp.points import Source
+from calib.warp.triangle import Triangle, columns_of, rows_of, triangle, weights_at
 
 #: Tolerance that closes the seam between two triangles.
 _EDGE = -1e-4
@@ -133,26 +134,21 @@ def _fill(
     place, inverse_z, (nearness, face), (top, bottom) = source.place, source.inverse_z, buffer, rows
     i, j, k = corners(missing)
     ar, ac, br, bc, cr, cc = r + i // 2, c + i % 2, r + j // 2, c + j % 2, r + k // 2, c + k % 2
-    ax, ay = place[ar, ac, 0], place[ar, ac, 1]
-    bx, by = place[br, bc, 0] - ax, place[br, bc, 1] - ay
-    cx, cy = place[cr, cc, 0] - ax, place[cr, cc, 1] - ay
-    area = bx * cy - by * cx
-    first_row = max(int(np.ceil(ay + min(by, cy, np.float32(0)) - np.float32(1e-3))), top)
-    last_row = min(int(np.floor(ay + max(by, cy, np.float32(0)) + np.float32(1e-3))), bottom - 1)
-    first_column = max(int(np.ceil(ax + min(bx, cx, np.float32(0)) - np.float32(1e-3))), 0)
-    last_column = min(int(np.floor(ax + max(bx, cx, np.float32(0)) + np.float32(1e-3))), nearness.shape[1] - 1)
-    if first_row > last_row or first_column > last_column or area == 0:
+    at, slack = _triangle(place, r, c, missing), np.float32(1e-3)
+    (highest, lowest), (leftmost, rightmost) = rows_of(at), columns_of(at)
+    first_row, last_row = max(int(np.ceil(highest - slack)), top), min(int(np.floor(lowest + slack)), bottom - 1)
+    first_column = max(int(np.ceil(leftmost - slack)), 0)
+    last_column = min(int(np.floor(rightmost + slack)), nearness.shape[1] - 1)
+    if first_row > last_row or first_column > last_column or at.area == 0:
         return
-    edge, inverse = np.float32(_EDGE), np.float32(1) / area
-    near_a = inverse_z[ar, ac]
+    edge, one = np.float32(_EDGE), np.float32(1)
+    per_area, near_a = one / at.area, inverse_z[ar, ac]
     near_b, near_c = inverse_z[br, bc] - near_a, inverse_z[cr, cc] - near_a
     number = 4 * (r * place.shape[1] + c) + missing
     for row in range(first_row, last_row + 1):
-        y = np.float32(row) - ay
         for column in range(first_column, last_column + 1):
-            x = np.float32(column) - ax
-            at_b, at_c = (x * cy - y * cx) * inverse, (bx * y - by * x) * inverse
-            if at_b >= edge and at_c >= edge and np.float32(1) - at_b - at_c >= edge:
+            at_b, at_c = weights_at(at, per_area, row, column)
+            if at_b >= edge and at_c >= edge and one - at_b - at_c >= edge:
                 near = near_a + at_b * near_b + at_c * near_c
                 if near > nearness[row, column]:
                     nearness[row, column] = near
@@ -213,7 +209,6 @@ def tear(
 ) -> None:
     """Marks pixels behind depth edges: the region between foreground and background is unobserved."""
     place, inverse_z, distance = source
-    height, width = torn.shape
     for r in range(place.shape[0] - 1):
         for c in range(place.shape[1] - 1):
             if not height_of_step(distance, r, c) > largest_step:
@@ -222,21 +217,31 @@ def tear(
             gap = lone_gap(n0, n1, n2, n3)
             for missing in range(4):
                 if missing == gap or (not np.isnan(n0 + n1 + n2 + n3) and 1 <= missing <= 2):
-                    i, j, k = corners(missing)
-                    ax, ay = place[r + i // 2, c + i % 2, 0], place[r + i // 2, c + i % 2, 1]
-                    bx, by = place[r + j // 2, c + j % 2, 0] - ax, place[r + j // 2, c + j % 2, 1] - ay
-                    cx, cy = place[r + k // 2, c + k % 2, 0] - ax, place[r + k // 2, c + k % 2, 1] - ay
-                    area = bx * cy - by * cx
-                    for row in range(
-                        max(int(np.ceil(ay + min(by, cy, 0))), 0), min(int(ay + max(by, cy, 0)), height - 1) + 1
-                    ):
-                        for column in range(
-                            max(int(np.ceil(ax + min(bx, cx, 0))), 0), min(int(ax + max(bx, cx, 0)), width - 1) + 1
-                        ):
-                            x, y = column - ax, row - ay
-                            at_b, at_c = (x * cy - y * cx) / area, (bx * y - by * x) / area
-                            if at_b >= 0 and at_c >= 0 and at_b + at_c <= 1:
-                                torn[row, column] = True
+                    _fill_torn(_triangle(place, r, c, missing), torn)
+
+
+@kernel
+def _fill_torn(at: Triangle, torn: NDArray[np.bool_]) -> None:
+    """Marks the pixels of a triangle."""
+    (height, width), one = torn.shape, np.float32(1)
+    if at.area == 0:
+        return
+    per_area = one / at.area
+    (highest, lowest), (leftmost, rightmost) = rows_of(at), columns_of(at)
+    left, right = max(int(np.ceil(leftmost)), 0), min(int(np.floor(rightmost)), width - 1)
+    for row in range(max(int(np.ceil(highest)), 0), min(int(np.floor(lowest)), height - 1) + 1):
+        for column in range(left, right + 1):
+            at_b, at_c = weights_at(at, per_area, row, column)
+            if at_b >= 0 and at_c >= 0 and at_b + at_c <= one:
+                torn[row, column] = True
+
+
+@kernel
+def _triangle(place: NDArray[np.float32], r: int, c: int, missing: int) -> Triangle:
+    """The triangle of a quadrilateral that lacks one corner."""
+    i, j, k = corners(missing)
+    a, b, d = place[r + i // 2, c + i % 2], place[r + j // 2, c + j % 2], place[r + k // 2, c + k % 2]
+    return triangle(a[0], a[1], b[0], b[1], d[0], d[1])
 
 
 @kernel

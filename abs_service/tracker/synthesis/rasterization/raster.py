@@ -1,7 +1,6 @@
 """Distance image of one deformed mesh, with a z-buffer.
 
-This rasteriser is separate from `zbuffer`, which also records each pixel's face for a population, because it needs only
-the depth: it takes about half the time, and it interpolates in double precision, so the results differ in the last bit.
+`zbuffer` also records each pixel's face, for a population. This needs only the depth, and takes about half the time.
 """
 
 import math
@@ -11,8 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.synthesis.projection import Projected, Projection, extent
+from abs_service.tracker.synthesis.rasterization.face_in_image import face_in_image
 from calib.camera import Camera
 from calib.jit import kernel
+from calib.warp.triangle import Triangle, columns_of, rows_of, weights_at
 
 
 class Raster:
@@ -82,54 +83,37 @@ class FewPixels(NamedTuple):
     columns: NDArray[np.int64]
 
 
-class Corners(NamedTuple):
-    """Corners a, b and c of a face in the image.
+class Plane(NamedTuple):
+    """1/z of a face, linear in the image (exactly for a pinhole).
 
     Attributes:
-        ax, ay, bx, by, cx, cy: columns and rows.
-        near_a, near_b, near_c: 1/z.
-        area: twice the face's area; 0 if the camera does not see all corners.
+        at: the face.
+        per_area: 1 / area.
+        near_a, near_b, near_c: of the corners, the second and third from the first.
     """
 
-    ax: np.float32
-    ay: np.float32
+    at: Triangle
+    per_area: np.float32
     near_a: np.float32
-    bx: np.float32
-    by: np.float32
     near_b: np.float32
-    cx: np.float32
-    cy: np.float32
     near_c: np.float32
-    area: np.float32
 
 
 @kernel
-def _corners(seen: Projected, face: NDArray[np.int32]) -> Corners:
-    """Corners of a face (3,) of a population of one."""
-    a, b, c = face
-    place, inverse_z = seen.place[0], seen.inverse_z[0]
-    ax, ay, bx, by = place[a, 0], place[a, 1], place[b, 0], place[b, 1]
-    cx, cy = place[c, 0], place[c, 1]
-    area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
-    area = np.float32(0) if np.isnan(inverse_z[a] + inverse_z[b] + inverse_z[c]) else area
-    return Corners(ax, ay, inverse_z[a], bx, by, inverse_z[b], cx, cy, inverse_z[c], area)
+def _plane(seen: Projected, face: NDArray[np.int32]) -> tuple[Plane, bool]:
+    """The plane of a face (3,) of a population of one, and whether the camera sees all corners."""
+    at, near_a, near_b, near_c = face_in_image(seen, 0, face)
+    is_seen = not np.isnan(near_a + near_b + near_c) and at.area != 0
+    return Plane(at, np.float32(1) / at.area, near_a, near_b - near_a, near_c - near_a), is_seen
 
 
 @kernel
-def _rows_of(at: Corners, height: int) -> tuple[int, int]:
-    """First and last row of a face in an image of a height; the last is before the first if it covers none."""
-    if at.area == 0:
-        return 0, -1
-    return max(int(np.ceil(min(at.ay, at.by, at.cy))), 0), min(int(np.floor(max(at.ay, at.by, at.cy))), height - 1)
-
-
-@kernel
-def _nearness_in(at: Corners, row: int, column: int) -> np.floating | float:
-    """1/z of a face at a pixel's centre, 0 beside it; linear in the image (exactly for a pinhole)."""
-    of_b = ((column - at.ax) * (at.cy - at.ay) - (row - at.ay) * (at.cx - at.ax)) / at.area
-    of_c = ((at.bx - at.ax) * (row - at.ay) - (at.by - at.ay) * (column - at.ax)) / at.area
-    of_a = 1 - of_b - of_c
-    return of_a * at.near_a + of_b * at.near_b + of_c * at.near_c if of_a >= 0 and of_b >= 0 and of_c >= 0 else 0.0
+def _nearness_in(plane: Plane, row: int, column: int) -> np.float32:
+    """1/z of a face at a pixel's centre, 0 beside it."""
+    at_b, at_c = weights_at(plane.at, plane.per_area, row, column)
+    zero, one = np.float32(0), np.float32(1)
+    near = plane.near_a + at_b * plane.near_b + at_c * plane.near_c
+    return near if min(at_b, at_c, one - at_b - at_c) >= zero else zero
 
 
 @kernel
@@ -137,28 +121,28 @@ def _nearest(seen: Projected, faces: NDArray[np.int32], nearness: NDArray[np.flo
     """Largest 1/z of all faces (m, 3) of a population of one at every pixel (height, width), zeros at the start."""
     height, width = nearness.shape
     for f in range(faces.shape[0]):
-        at = _corners(seen, faces[f])
-        first, last = _rows_of(at, height)
-        left = max(int(np.ceil(min(at.ax, at.bx, at.cx))), 0)
-        right = min(int(np.floor(max(at.ax, at.bx, at.cx))), width - 1)
-        for row in range(first, last + 1):
+        plane, is_seen = _plane(seen, faces[f])
+        if not is_seen:
+            continue
+        (highest, lowest), (leftmost, rightmost) = rows_of(plane.at), columns_of(plane.at)
+        left, right = max(int(np.ceil(leftmost)), 0), min(int(np.floor(rightmost)), width - 1)
+        for row in range(max(int(np.ceil(highest)), 0), min(int(np.floor(lowest)), height - 1) + 1):
             for column in range(left, right + 1):
-                near = np.float32(_nearness_in(at, row, column))
-                nearness[row, column] = max(nearness[row, column], near)
+                nearness[row, column] = max(nearness[row, column], _nearness_in(plane, row, column))
 
 
 @kernel
 def _nearest_at(seen: Projected, faces: NDArray[np.int32], few: FewPixels, nearness: NDArray[np.float32]) -> None:
     """As `_nearest`, at some pixels (k,)."""
+    height = few.start.size - 1
     for f in range(faces.shape[0]):
-        at = _corners(seen, faces[f])
-        first, last = _rows_of(at, few.start.size - 1)
-        left = np.int64(np.ceil(min(at.ax, at.bx, at.cx)))
-        right = np.int64(np.floor(max(at.ax, at.bx, at.cx)))
-        for row in range(first, last + 1):
+        plane, is_seen = _plane(seen, faces[f])
+        if not is_seen:
+            continue
+        (highest, lowest), (left, right) = rows_of(plane.at), columns_of(plane.at)
+        for row in range(max(int(np.ceil(highest)), 0), min(int(np.floor(lowest)), height - 1) + 1):
             for k in range(few.start[row], few.start[row + 1]):
                 pixel = few.order[k]
                 column = int(np.int64(few.columns[pixel]))  # one form of what is called
                 if left <= column <= right:
-                    near = np.float32(_nearness_in(at, row, column))
-                    nearness[pixel] = max(nearness[pixel], near)
+                    nearness[pixel] = max(nearness[pixel], _nearness_in(plane, row, column))

@@ -6,7 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.synthesis.projection import Projected, extent
+from abs_service.tracker.synthesis.rasterization.face_in_image import face_in_image
 from calib.jit import kernel
+from calib.warp.triangle import columns_of, rows_of, weights_at
 
 
 class Samples(NamedTuple):
@@ -97,30 +99,23 @@ def _rasterize(
     seen: Projected, faces: NDArray[np.int32], grid: Grid, nearest: Nearest, count: NDArray[np.int64]
 ) -> None:
     """Fills in the nearest faces, and counts the samples (population,), zeros at the start."""
-    (step, top, left), (place, inverse_z), (nearness, face) = grid, seen, nearest
+    (step, top, left), (nearness, face) = grid, nearest
     height, width = nearness.shape[1:]
     one = np.float32(1)
     for k in range(nearness.shape[0]):
         nearness[k] = 0
         face[k] = -1
         for f in range(faces.shape[0]):
-            a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
-            near_a, near_b, near_c = inverse_z[k, a], inverse_z[k, b], inverse_z[k, c]
-            ax, ay = place[k, a, 0], place[k, a, 1]
-            bx, by = place[k, b, 0] - ax, place[k, b, 1] - ay
-            cx, cy = place[k, c, 0] - ax, place[k, c, 1] - ay
-            area = bx * cy - by * cx
-            if np.isnan(near_a + near_b + near_c) or area == 0:
+            at, near_a, near_b, near_c = face_in_image(seen, k, faces[f])
+            if np.isnan(near_a + near_b + near_c) or at.area == 0:
                 continue
-            inverse = one / area
-            first_row = max(int(np.ceil((ay + min(by, cy, 0)) / step)) - top, 0)
-            last_row = min(int(np.floor((ay + max(by, cy, 0)) / step)) - top, height - 1)
-            first_column = max(int(np.ceil((ax + min(bx, cx, 0)) / step)) - left, 0)
-            last_column = min(int(np.floor((ax + max(bx, cx, 0)) / step)) - left, width - 1)
-            for row in range(first_row, last_row + 1):
-                for column in range(first_column, last_column + 1):
-                    x, y = np.float32((column + left) * step) - ax, np.float32((row + top) * step) - ay
-                    at_b, at_c = (x * cy - y * cx) * inverse, (bx * y - by * x) * inverse
+            per_area = one / at.area
+            (highest, lowest), (leftmost, rightmost) = rows_of(at), columns_of(at)
+            first_row, last_row = int(np.ceil(highest / step)) - top, int(np.floor(lowest / step)) - top
+            first_column, last_column = int(np.ceil(leftmost / step)) - left, int(np.floor(rightmost / step)) - left
+            for row in range(max(first_row, 0), min(last_row, height - 1) + 1):
+                for column in range(max(first_column, 0), min(last_column, width - 1) + 1):
+                    at_b, at_c = weights_at(at, per_area, (row + top) * step, (column + left) * step)
                     at_a = one - at_b - at_c
                     near = at_a * near_a + at_b * near_b + at_c * near_c
                     if at_a >= 0 and at_b >= 0 and at_c >= 0 and near > nearness[k, row, column]:
@@ -139,9 +134,9 @@ def _collect(
     samples: Samples,
 ) -> None:
     """Gathers the covered pixels, row by row, into the samples."""
-    (step, top, left), (place, inverse_z), (nearness, face) = grid, seen, nearest
+    (step, top, left), (nearness, face) = grid, nearest
     population, height, width = face.shape
-    stride = ray_length.shape[1] + 2
+    stride, one = ray_length.shape[1] + 2, np.float32(1)
     for k in range(population):
         i = 0
         for row in range(height):
@@ -149,22 +144,17 @@ def _collect(
                 f = face[k, row, column]
                 if f < 0:
                     continue
-                a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
-                ax, ay = place[k, a, 0], place[k, a, 1]
-                bx, by = place[k, b, 0] - ax, place[k, b, 1] - ay
-                cx, cy = place[k, c, 0] - ax, place[k, c, 1] - ay
+                at, near_a, near_b, near_c = face_in_image(seen, k, faces[f])
                 y, x = (row + top) * step, (column + left) * step
-                right, down = np.float32(x) - ax, np.float32(y) - ay
-                area = bx * cy - by * cx
-                at_b, at_c = (right * cy - down * cx) / area, (bx * down - by * right) / area
+                at_b, at_c = weights_at(at, one / at.area, y, x)
                 z = 1 / nearness[k, row, column]
                 # The image's y axis points down: faces that are clockwise in it are front faces.
-                samples.pixel[k, i] = (y + 1) * stride + x + 1 if area < 0 else 0
+                samples.pixel[k, i] = (y + 1) * stride + x + 1 if at.area < 0 else 0
                 samples.distance[k, i] = ray_length[y, x] * z
                 samples.face[k, i] = f
-                samples.weights[k, i, 0] = (1 - at_b - at_c) * inverse_z[k, a] * z
-                samples.weights[k, i, 1] = at_b * inverse_z[k, b] * z
-                samples.weights[k, i, 2] = at_c * inverse_z[k, c] * z
+                samples.weights[k, i, 0] = (one - at_b - at_c) * near_a * z
+                samples.weights[k, i, 1] = at_b * near_b * z
+                samples.weights[k, i, 2] = at_c * near_c * z
                 i += 1
 
 
