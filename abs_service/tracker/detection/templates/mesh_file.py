@@ -74,9 +74,9 @@ def load(path: Path, metres: float, vertices: int) -> KnownObject:
 
 def _read(path: Path) -> _Content:
     if path.suffix.lower() not in FORMATS:
-        raise DetectionError(f"template.path = {str(path)!r}: the name must end in {', '.join(FORMATS)}")
+        raise DetectionError(f"path = {str(path)!r}: the name must end in {', '.join(FORMATS)}")
     if not path.is_file():
-        raise DetectionError(f"template.path = {str(path)!r}: there is no such file")
+        raise DetectionError(f"path = {str(path)!r}: there is no such file")
     try:
         trimesh = import_module("trimesh")
     except ImportError:
@@ -86,10 +86,10 @@ def _read(path: Path) -> _Content:
     try:
         found = trimesh.load_mesh(path, process=False)
     except Exception as error:  # each of its readers has errors of its own
-        raise DetectionError(f"template.path = {str(path)!r} cannot be read: {error}") from error
+        raise DetectionError(f"path = {str(path)!r} cannot be read: {error}") from error
     vertices, faces = np.asarray(getattr(found, "vertices", ())), np.asarray(getattr(found, "faces", ()))
     if not len(faces):
-        raise DetectionError(f"template.path = {str(path)!r} has no triangles; a surface is needed, not points")
+        raise DetectionError(f"path = {str(path)!r} has no triangles; a surface is needed, not points")
     return _with_colors(found.visual, vertices.astype(np.float64), faces.astype(np.int32))
 
 
@@ -140,17 +140,17 @@ def _mesh(content: _Content, metres: float) -> Mesh:
 def _checked(mesh: Mesh, path: Path) -> Mesh:
     """The mesh, or DetectionError if it cannot be tracked."""
     if len(mesh.vertices) < 3 or not mesh.area > 0:
-        raise DetectionError(f"template.path = {str(path)!r} has no triangles with an area; a surface is needed")
+        raise DetectionError(f"path = {str(path)!r} has no triangles with an area; a surface is needed")
     size = float(np.linalg.norm(np.ptp(mesh.vertices, axis=0)))
     if not SMALLEST_M <= size <= LARGEST_M:
         raise DetectionError(
-            f"template.path = {str(path)!r}: the object would measure {extents(mesh.vertices)}, {SMALLEST_M:g} m to "
+            f"path = {str(path)!r}: the object would measure {extents(mesh.vertices)}, {SMALLEST_M:g} m to "
             f'{LARGEST_M:g} m allowed; unit = "m", "cm" or "mm" says what its coordinates are'
         )
     directed = sides_of(mesh.faces).astype(np.int64) @ [len(mesh.vertices), 1]
     if len(np.unique(directed)) < len(directed):
         raise DetectionError(
-            f"template.path = {str(path)!r}: neighbouring faces are oriented against each other, or more than two share an "
+            f"path = {str(path)!r}: neighbouring faces are oriented against each other, or more than two share an "
             "edge; all must be counter-clockwise seen from outside"
         )
     return mesh
