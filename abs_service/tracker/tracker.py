@@ -25,6 +25,7 @@ from abs_service.tracker.posterior.frame_posterior import FramePosterior
 from abs_service.tracker.posterior.posterior import Posterior
 from abs_service.tracker.posterior.relocation import fit_to_points
 from abs_service.tracker.posterior.search_start import search_start
+from abs_service.tracker.posterior.slide_drift import SlideDrift
 from abs_service.tracker.terms.patches import patches_of
 
 #: Frames after a start that are searched from scratch: in the first, nothing is known, and in the second, not how fast
@@ -62,7 +63,7 @@ class Tracker:
         self._vertex_covariance = VertexCovariance(model, registration_m, centers)
         self._patches = patches_of(model.mesh)
         self._shape = ShapeComparison(model.mesh)
-        self._slides = SlideObservability(model)
+        self._slides, self._drift = SlideObservability(model), SlideDrift()
         self._followed = 0
         self._last_tracked = model.rest
 
@@ -91,6 +92,7 @@ class Tracker:
         motion.restart(fit_to_points(self.model, self._last_tracked, points))
         self._theta_covariance.restart(motion.longest_covariance)
         self._vertex_covariance.restart()
+        self._drift.restart()
         self._followed = 0
 
     def _minimize(self, frame: FramePosterior, search: Search, budget: Budget) -> Outcome:
@@ -111,9 +113,10 @@ class Tracker:
         motion = self._posterior.motion.update(frame.motion, optimum.theta, optimum.inverse_curvature)
         covariance = self._theta_covariance.update(optimum, frame.motion, motion)
         vertex_covariance = self._vertex_covariance.update(optimum, frame, covariance)
-        slide_m, no_outline_m = self._slides.deviations(optimum)
-        single_frame_m = max(single_frame_deviation(optimum, frame.motion), slide_m)
-        shape = self._shape.compare(optimum.vertices, vertex_covariance, single_frame_m, no_outline_m)
+        slides = self._slides.of(optimum)
+        single_frame_m = max(single_frame_deviation(optimum, frame.motion), slides.deviation_m)
+        # Without drift: it tells how far the mesh may be off, not how far it has to be seen to be off.
+        shape = self._shape.compare(optimum.vertices, vertex_covariance, single_frame_m, slides.no_outline_deviation_m)
         fits = outcome.compared(frame).fits
         frame.learn(optimum.surface)
         verdict, reasons = status.judge(
@@ -131,7 +134,7 @@ class Tracker:
             theta=optimum.theta,
             covariance=covariance,
             vertices=optimum.vertices,
-            vertex_covariance=vertex_covariance,
+            vertex_covariance=vertex_covariance + self._drift.update(slides, frame.motion),
             fits=fits,
             shape=shape,
             search=SearchReport.of(outcome, spent),

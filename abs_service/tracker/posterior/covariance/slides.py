@@ -6,6 +6,8 @@ some degrees off, and so are those of its edges. That information is taken away;
 Gelfand and Guibas, Shape segmentation using local slippage analysis, SGP 2004, find slides by the same eigenvalues.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 import scipy  # its parts are imported when they are first used
 from numpy.typing import NDArray
@@ -30,6 +32,32 @@ _RIGID = 6
 _LEAST = 1.0
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Slides:
+    """Rigid motions of the surface of one estimate, and what holds them.
+
+    Attributes:
+        deviation_m: standard deviation of the vertices, root mean square, along the one that is held least; 0 for a
+            model that does not slide [m].
+        no_outline_deviation_m: the same without the outline, infinite for a model that does not slide [m].
+        held: information (6,) on each of them [1/m²]; (0,) for a model that does not slide.
+        motions: the motions (6, 6), columns, of which each moves the vertices by 1, root mean square; see `_motions`.
+        vertices: of the estimate (n, 3) [m].
+        size: root mean square of their distances from their centre [m].
+    """
+
+    deviation_m: float
+    no_outline_deviation_m: float
+    held: NDArray[np.float64]
+    motions: NDArray[np.float64]
+    vertices: NDArray[np.float64]
+    size: float
+
+    def displacements(self, which: NDArray[np.intp]) -> NDArray[np.float64]:
+        """Displacements of the vertices (n, 3, k) by k of the motions."""
+        return np.asarray(_motions(self.vertices, *_frame(self.vertices)) @ self.motions[:, which], np.float64)
+
+
 class SlideObservability:
     """Information of the sensors on rigid motions of the surface.
 
@@ -46,31 +74,33 @@ class SlideObservability:
         is_exact = model.mesh.is_complete and len(model.rest) == _RIGID
         self._is_free = bool(np.mean(left**2) < _SMALL_SHARE * np.mean(motions**2)) and not is_exact
 
-    def deviations(self, optimum: Optimum) -> tuple[float, float]:
-        """Standard deviation [m] of the vertices, root mean square, along the slide that is held least; 0 without any.
-
-        The second is that without the outline, infinite for a model that does not slide.
-
-        Args:
-            optimum: the estimate of a frame; its priors do not count.
-        """
-        if not self._is_free:
-            return 0.0, np.inf
+    def of(self, optimum: Optimum) -> Slides:
+        """The slides of the estimate of a frame; its priors do not count."""
         vertices = optimum.vertices.astype(np.float64)
         frame = _frame(vertices)
+        if not self._is_free:
+            return Slides(0.0, np.inf, np.zeros(0), np.zeros((6, 0)), vertices, frame[1])
         known, feigned = np.zeros((2, len(optimum.sensed), 6, 6))
         for k, part in enumerate(optimum.sensed):
             known[k], feigned[k] = _information(part, *frame)
             feigned[k] *= _direction_error(part) ** 2
         inside = [isinstance(part, PointLinearization) for part in optimum.sensed]
         moved = _moved(vertices, *frame)
-        return _least_held(known, feigned, moved), _least_held(known[inside], feigned[inside], moved)
+        motions, held = _held(known, feigned, moved)
+        without_outline = _deviation(_held(known[inside], feigned[inside], moved)[1])
+        return Slides(_deviation(held), without_outline, held, motions, vertices, frame[1])
 
 
-def _least_held(known: NDArray[np.float64], feigned: NDArray[np.float64], moved: NDArray[np.float64]) -> float:
-    """Deviation [m] along the slide that is held least, by information of parts, known and feigned (parts, 6, 6)."""
+def _held(
+    known: NDArray[np.float64], feigned: NDArray[np.float64], moved: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Slides (6, 6), columns, and what holds them (6,), by information of parts, known and feigned (parts, 6, 6)."""
     slides = _slides(known.sum(axis=0), moved)
-    held = np.maximum(_along(slides, known - feigned), 0.0).sum(axis=0)
+    return slides, np.maximum(_along(slides, known - feigned), 0.0).sum(axis=0)
+
+
+def _deviation(held: NDArray[np.float64]) -> float:
+    """Deviation [m] along the slide that is held least."""
     return float(1 / np.sqrt(_LEAST + held.min()))
 
 

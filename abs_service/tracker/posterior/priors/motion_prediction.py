@@ -60,6 +60,14 @@ class MotionPrediction:
         return self.settings.persistence(self.elapsed_s)
 
     @property
+    def wandered_m2(self) -> float:
+        """Mean square of the way along one direction since the frame before, of a motion that nothing shows [m²].
+
+        A velocity as large as the prior allows for lasts for its memory, so the ways of many frames add up to that.
+        """
+        return 2 * self.settings.memory_s * self.settings.speed**2 * self.elapsed_s
+
+    @property
     def _deviation_m(self) -> float:
         return self.speed * self.elapsed_s
 

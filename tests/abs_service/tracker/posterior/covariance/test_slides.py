@@ -113,7 +113,7 @@ def test_a_strip_whose_gripper_is_fixed_does_not_slide(is_free: bool, expected_m
     theta, size = model.rest, len(model.rest)
     nothing = LinearizedCost(theta, Quadratic(theta, np.eye(size)), np.eye(size), [], model.sparse_jacobian(theta))
     optimum = Optimum(theta, model.deform(theta[None]), nothing, [], np.eye(size))
-    assert SlideObservability(model).deviations(optimum)[0] == pytest.approx(expected_m)
+    assert SlideObservability(model).of(optimum).deviation_m == pytest.approx(expected_m)
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(1, 50))
