@@ -45,7 +45,7 @@ def plots(numbers: Sequence[Numbers], now_s: float) -> dict[str, Curves]:
 
 
 def lost(numbers: Sequence[Numbers]) -> dict[str, NDArray[np.floating]]:
-    """What was lost between an estimate and the next one, by component; of all together if none has lost anything.
+    """Losses between an estimate and the next one, by component; of all together if none has lost anything.
 
     Args:
         numbers: estimates (n), oldest first.
