@@ -35,16 +35,20 @@ def values(uri: str, parsers: Mapping[str, Callable[[str], Any]]) -> dict[str, A
     """Values of the keys behind the '?' of an address.
 
     Raises:
-        AddressError: an unknown key, one that is given twice, or a value that is not allowed; names what is.
+        AddressError: unknown keys, keys that are given twice, and values that are not allowed; names all, and what is.
     """
     found: dict[str, Any] = {}
+    mistakes = []
     for key, text in parse_qsl(split(uri).query, keep_blank_values=True):
         if key not in parsers:
-            raise AddressError(f"{uri}: unknown key {key!r}; allowed are {', '.join(sorted(parsers))}")
-        if key in found:
-            raise AddressError(f"{uri}: {key} is given twice")
-        try:
-            found[key] = parsers[key](text)
-        except ValueError as error:
-            raise AddressError(f"{uri}: {key} = {text!r} must be {error}") from None
+            mistakes.append(f"unknown key {key!r}; allowed are {', '.join(sorted(parsers))}")
+        elif key in found:
+            mistakes.append(f"{key} is given twice")
+        else:
+            try:
+                found[key] = parsers[key](text)
+            except ValueError as error:
+                mistakes.append(f"{key} = {text!r} must be {error}")
+    if mistakes:
+        raise AddressError(f"{uri}: {'; '.join(mistakes)}")
     return found

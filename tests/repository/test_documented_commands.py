@@ -15,7 +15,7 @@ from abs_service.commands.parts.log import logs
 ROOT = Path(__file__).parents[2]
 
 #: The words after `abs-service` at the beginning of a line. Those that a shell expands by braces are left out.
-COMMAND = re.compile(r"^(?:\.venv/bin/)?abs-service ([^{\n]+)$", re.MULTILINE)
+COMMAND = re.compile(r"^(?:(?:\.\./)?\.venv/bin/)?abs-service ([^{\n]+)$", re.MULTILINE)
 
 
 def documented() -> Iterator[tuple[str, list[str]]]:

@@ -80,7 +80,8 @@ def run(arguments: argparse.Namespace) -> int:
         raise ExportError(f"{path} is there already; name another file with --out")
     try:
         if path.suffix in _SERIES:
-            print(f"{path.parent}: {_write_estimates(source, arguments.tracker, path.suffix, path)}")
+            done = _write_estimates(source, arguments.tracker, path.suffix, path)
+            print(f"{path.with_name(path.stem)}_*{path.suffix}: {done}")
             return Exit.OK
         active = path.with_name(f"{path.name}.active")
         try:

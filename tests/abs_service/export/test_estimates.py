@@ -88,8 +88,9 @@ def test_a_series_has_a_mesh_for_each_estimate_that_has_one(recording, tmp_path,
         np.testing.assert_array_equal(mesh.faces, FACES[version(k)])
 
 
-def test_a_series_replaces_nothing(recording, tmp_path, capsys):
+def test_a_series_names_its_files_and_replaces_nothing(recording, tmp_path, capsys):
     out = export(recording, tmp_path / "meshes" / "sheet.ply")
+    assert capsys.readouterr().out.startswith(f"{tmp_path}/meshes/sheet_*.ply: 6 estimates of sheet")
     assert cli.main(["export", str(recording), "--out", str(out)]) == Exit.USER
     assert "sheet_000001.ply is there already" in capsys.readouterr().err
 

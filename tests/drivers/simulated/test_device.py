@@ -101,6 +101,7 @@ def test_defaults_are_the_demonstration_rig() -> None:
         ("simulated://sheet?seed=-1", r"seed = '-1' must be"),
         ("simulated://sheet?seed=1&seed=2", "seed is given twice"),
         ("simulated://sheet?color=64x48&color=64x48", "color is given twice"),
+        ("simulated://sheet?sed=1&rate=-5&tof=0x0&tof=9x9", r"'sed'; .*rate = '-5' must be .*tof = '0x0' must be"),
         ("simulated://sheet?rate=0", r"rate = '0' must be a number from 0.1 to 200"),
         ("simulated://sheet?rate=nan", r"rate = 'nan' must be"),
         ("simulated://sheet?rate=", r"rate = '' must be"),
