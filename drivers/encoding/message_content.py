@@ -63,7 +63,7 @@ def _check_truth(truth: SurfaceTruth) -> None:
     points = truth.rows * truth.columns
     size = f"SurfaceTruth of {truth.rows} × {truth.columns} points"
     _require(0 < points <= MAX_POINTS, f"{size}: 1 to {MAX_POINTS} are allowed")
-    _require(len(truth.points_f32) == 12 * points, f"{size} has {len(truth.points_f32)} bytes")
+    _require(_points("points_f32", truth.points_f32) == points, f"{size} has {len(truth.points_f32)} bytes")
 
 
 def _check_mesh(mesh: DeformedMesh) -> None:

@@ -114,6 +114,11 @@ def test_no_text_or_number_of_the_golden_messages_is_refused(name):
         (sample("sheet/theta", CompactState(tracker="sheet", theta_f32=b"123")), "content", "no numbers"),
         (sample("sheet/theta", CompactState(theta_f32=np.array([np.inf], "<f4").tobytes())), "number", "finite"),
         (sample("sim/truth", SurfaceTruth(rows=2**31, columns=2**31)), "content", "are allowed"),
+        (
+            sample("sim/truth", SurfaceTruth(rows=1, columns=1, points_f32=np.full(3, np.nan, "<f4").tobytes())),
+            "number",
+            "finite",
+        ),
         (sample("tof/model", changed(MODEL, width=2**31)), "range", "SensorModel.width"),
         (sample("tof/model", SensorModel(sensor="tof")), "content", "is no camera"),
         (sample("tof/model", changed(MODEL, header=Header(stamp={"seconds": 10**12}))), "range", "Timestamp.seconds"),
