@@ -18,7 +18,7 @@ READOUT_S = 1 / 30
 
 
 def solved(velocity: tuple[float, float, float], read_along: int = 1, bend: float = 0.0) -> Solution:
-    """Solution from boards that move [m/s] while rows (1) or columns (0) are read; each corner is where its own does."""
+    """Solution from boards that move [m/s] while rows (1) or columns (0) are read, each corner as its own does."""
     random, seen = np.random.default_rng(4), []
     described = board_views.board_points()
     made = described.copy()
