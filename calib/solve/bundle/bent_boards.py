@@ -5,7 +5,8 @@ disagree by smaller, and not that: of 30 simulated cameras each, with 6 to 12 po
 0.3 mm, focal lengths were 1.1 to 2.7 times as wrong as ± said without it.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,21 +59,41 @@ def shape_columns(
         jacobian: of the equations.
         displacements: of points of the board (k, 3) in its frame (k, m, 3) [m].
     """
-    layout, by_rows = equations.layout, sparse.csr_matrix(jacobian)
-    turns = np.stack([equations.base.boards[shot][:3, :3] for shot in layout.shots])
-    found = []
+    turns = np.stack([equations.base.boards[shot][:3, :3] for shot in equations.layout.shots])
+    found = np.zeros((int(equations.ends[-1]), displacements(np.zeros((1, 3))).shape[1]))
+    for each in by_places(equations, jacobian):
+        displaced = np.repeat(displacements(each.corners.points_b), 2, axis=0)
+        found[each.rows] = np.einsum("ni,nij,nkj->nk", each.by_place, turns[each.shots], displaced)
+    return found
+
+
+class ByPlaces(NamedTuple):
+    """Corners of a sensor, and what their residuals do if points of the board are elsewhere.
+
+    Attributes:
+        sensor: its name.
+        corners: of its views.
+        rows: of their residuals.
+        shots: row of the shot of each residual (n,).
+        by_place: derivatives of the residuals with respect to the places of the points in the rig (n, 3) [1/m].
+    """
+
+    sensor: str
+    corners: Corners
+    rows: slice
+    shots: NDArray[np.intp]
+    by_place: NDArray[np.float64]
+
+
+def by_places(equations: Equations, jacobian: sparse.csr_array) -> Iterator[ByPlaces]:
+    """Corners of each sensor; without those of boards between two shots."""
+    by_rows = sparse.csr_matrix(jacobian)
     for group, rows in zip(equations.groups, equations.slices(), strict=True):
-        count = displacements(np.zeros((1, 3))).shape[1]
-        if not isinstance(group.measured, Corners) or group.shots.ndim > 1:
-            found.append(np.zeros((rows.stop - rows.start, count)))
-            continue
-        shots = group.shots[group.views_of_rows]
-        starts = layout.board_start + 6 * shots + 3
-        every = np.arange(rows.start, rows.stop)
-        by_place = np.stack([np.asarray(by_rows[every, starts + axis]).ravel() for axis in range(3)], axis=1)
-        displaced = np.repeat(displacements(group.measured.points_b), 2, axis=0)
-        found.append(np.einsum("ni,nij,nkj->nk", by_place, turns[shots], displaced))
-    return np.concatenate(found)
+        if isinstance(group.measured, Corners) and group.shots.ndim == 1:
+            shots = group.shots[group.views_of_rows]
+            starts, every = equations.layout.board_start + 6 * shots + 3, np.arange(rows.start, rows.stop)
+            places = np.stack([np.asarray(by_rows[every, starts + axis]).ravel() for axis in range(3)], axis=1)
+            yield ByPlaces(group.sensor, group.measured, rows, shots, places)
 
 
 def _bends(points: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -1,7 +1,7 @@
 """Shape of the printed board: errors that all views share, which small residuals and agreeing halves do not show.
 
-A print that is longer along one axis, tags of another size than described, or a bent board are explained by wrong
-intrinsics instead. How large such an error is follows from one Gauss-Newton step with its column added to the
+A print that is longer along one axis or skewed, tags of another size than described, or a bent board are explained by
+wrong intrinsics instead. How large such an error is follows from one Gauss-Newton step with its column added to the
 equations, its deviation from the scatter of the distinct poses (a sandwich estimator, as in
 `calib.solve.bundle.uncertainty`).
 """
@@ -22,8 +22,8 @@ from calib.solve.validation.support import supported
 #: Errors are named from this many deviations on, …
 CERTAIN = 5.0
 
-#: … and if they change projections by this share of what is needed; a bend, which a lens that fits nearly imitates, by
-#: more.
+#: … and if they change projections by this share of what is needed; a bend or skew, which a lens that fits nearly and a
+#: motion imitate, by more.
 NOTICED, NOTICED_BEND = 0.15, 0.25
 
 #: Sizes of the errors that columns of the equations stand for: 1 %, 1 mm.
@@ -38,6 +38,7 @@ class Shape(Enum):
     """Kinds of errors, each with what to do."""
 
     STRETCH = "measure rows and columns with a ruler, and print without scaling"
+    SKEW = "measure both diagonals with a ruler, and print anew"
     TAGS = "measure a tag and a gap with a ruler, and correct the description"
     BEND = "glue it onto a flat plate"
 
@@ -47,8 +48,8 @@ class ShapeError:
     """An error of the board's shape.
 
     Attributes:
-        shape: length along x relative to y [%], size of the tags relative to the distances of their centres [%], or a
-            bend from the middle to the edge [mm].
+        shape: length along x relative to y [%], the angle between rows and columns beyond a right one [% of a radian],
+            size of the tags relative to the distances of their centres [%], or a bend from the middle to the edge [mm].
         size, sigma: its estimate and standard deviation.
         effect_px: how much projections change if it is taken into account, root mean square, at the distance of the
             scene or those of the boards where that is most [px].
@@ -65,6 +66,16 @@ class ShapeError:
         return self.shape != Shape.BEND
 
     @property
+    def is_bend(self) -> bool:
+        """True if the board is not flat."""
+        return self.shape == Shape.BEND
+
+    @property
+    def certainty(self) -> float:
+        """Size in standard deviations."""
+        return abs(self.size) / self.sigma
+
+    @property
     def finding(self) -> str:
         """One clause for people."""
         size = f"{abs(self.size):.2f} ± {self.sigma:.2f} %"
@@ -73,6 +84,9 @@ class ShapeError:
             longer, other = ("rows", "columns") if self.size > 0 else ("columns", "rows")
             change = effect.replace("change", "changes")
             return f"the board's {longer} are {size} longer than described, compared with its {other}, which {change}"
+        if self.shape == Shape.SKEW:
+            size = f"{np.degrees(abs(self.size) / 100):.2f}° ± {np.degrees(self.sigma / 100):.2f}°"
+            return f"the board's rows and columns are {size} from a right angle, which {effect.replace('e', 'es', 1)}"
         if self.shape == Shape.TAGS:
             than = "larger" if self.size > 0 else "smaller"
             change = effect.replace("change", "changes")
@@ -97,9 +111,9 @@ def shape_errors(solution: Solution, distance: float, needed_px: float) -> list[
         one
         for one in _estimates(solution, distance)
         if abs(one.size) > CERTAIN * one.sigma
-        and one.effect_px > (NOTICED if one.is_misprint else NOTICED_BEND) * needed_px
+        and one.effect_px > (NOTICED if one.shape in (Shape.STRETCH, Shape.TAGS) else NOTICED_BEND) * needed_px
     ]
-    misprints = sorted((one for one in found if one.is_misprint), key=lambda one: -abs(one.size) / one.sigma)
+    misprints = sorted((one for one in found if one.is_misprint), key=lambda one: -one.certainty)
     bends = sorted((one for one in found if not one.is_misprint), key=lambda one: -one.effect_px)
     return [*misprints[:1], *bends[:1]]
 
@@ -107,22 +121,29 @@ def shape_errors(solution: Solution, distance: float, needed_px: float) -> list[
 def _estimates(solution: Solution, distance: float) -> Iterator[ShapeError]:
     equations = solution.adjustment.equations
     columns = shape_columns(equations, equations.jacobian(np.zeros(equations.layout.size)), _displacements)
-    shapes = (Shape.STRETCH, Shape.TAGS, *(Shape.BEND,) * (columns.shape[1] - 2))
+    shapes = (Shape.STRETCH, Shape.SKEW, Shape.TAGS, *(Shape.BEND,) * len(_POWERS))
     every = further(equations, solution.adjustment.residuals, [column[:, None] for column in columns.T])
     for shape, one in zip(shapes, every, strict=False):  # of too few poses there are none
-        yield ShapeError(shape, one.sizes.item(), one.sigmas.item(), _effect(solution, one.changes, distance))
+        yield ShapeError(shape, one.sizes.item(), one.sigmas.item(), effect_px(solution, one.changes, distance))
 
 
 def _displacements(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Displacements of points of the board (n, 3) in its frame, for each error (n, 9, 3) [m]."""
+    """Displacements of points of the board (n, 3) in its frame, for each error (n, 10, 3) [m]."""
     low, high = points.min(axis=0), points.max(axis=0)
     x, y, _ = (points - (low + high) / 2).T
-    radius = max((high - low).max() / 2, 1e-12)
     none = np.zeros_like(x)
-    bends = [_BEND_M * (x / radius) ** a * (y / radius) ** b for a, b in _POWERS]
     stretch = np.stack([x, -y, none], axis=1) * _SHARE / 2
+    skew = np.stack([y, x, none], axis=1) * _SHARE / 2
     tags = np.stack([_from_tag(points[:, 0]), _from_tag(points[:, 1]), none], axis=1) * _SHARE
-    return np.stack([stretch, tags, *(np.stack([none, none, bend], axis=1) for bend in bends)], axis=1)
+    return np.concatenate([np.stack([stretch, skew, tags], axis=1), bends(points)], axis=1)
+
+
+def bends(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Displacements of points of the board (n, 3) in its frame, for each bend (n, 7, 3) [m]."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    x, y, _ = ((points - (low + high) / 2) / max((high - low).max() / 2, 1e-12)).T
+    out = _BEND_M * np.stack([x**a * y**b for a, b in _POWERS], axis=1)
+    return np.stack([np.zeros_like(out), np.zeros_like(out), out], axis=2)
 
 
 def _from_tag(places: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -138,8 +159,8 @@ def _from_tag(places: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.where(after > before, -after, before)[numbers] / 2
 
 
-def _effect(solution: Solution, changes: NDArray[np.float64], distance: float) -> float:
-    """Largest change of a sensor's projections [px], up to a motion of it.
+def effect_px(solution: Solution, changes: NDArray[np.float64], distance: float) -> float:
+    """Largest change of a sensor's projections [px] by changes of all parameters (n,), up to a motion of it.
 
     Counted at the ends of the boards' distances, too: in their middle, a motion makes up for most of a bend.
     """

@@ -13,6 +13,7 @@ from calib.solve.validation.cross_validation import Agreement, TooFewToSplitErro
 from calib.solve.validation.free_shape import free_shape
 from calib.solve.validation.other_lens import other_lenses, undescribed
 from calib.solve.validation.projection_uncertainty import UncertaintyMap
+from calib.solve.validation.rolling_shutter import motions
 from calib.solve.validation.square_pixels import not_square
 from calib.solve.validation.unlike_shots.changes import unseen
 from calib.solve.validation.unlike_shots.contradictions import Contradiction, outliers
@@ -84,8 +85,9 @@ def assess(
         for target in solution.task.sensors
         if target != source
     }
-    shape, free = shape_errors(solution, distance, needed_px), free_shape(solution)
-    unlike = unlike_shots(free, shape, needed_px)
+    shared = [*shape_errors(solution, distance, needed_px), *motions(solution, distance, needed_px)]
+    free = free_shape(solution)
+    unlike = unlike_shots(free, shared, needed_px)
     reasons, contradicting = [*unlike.reasons], unlike.contradicting
     reasons += exchanged(solution.cameras)
     reasons += weak_directions(solution, distance)
@@ -101,7 +103,7 @@ def assess(
     known = {of: field.rms * RADIUS_95 * _excess(of, agreements) for of, field in {**images, **pairs}.items()}
     reasons += _uncertain(known, needed_px)
     reasons += _narrow(solution, images)
-    reasons += [str(one) for one in shape if not one.is_misprint]  # why the halves may differ
+    reasons += [str(one) for one in shared if one.is_bend]  # why the halves may differ
     reasons = [*other_lenses(solution), *unlike.causes, *reasons] if reasons else []
     kept = [name for name, sensor in solution.task.sensors.items() if sensor.fixed_intrinsics]
     praise = _praise(agreements, images, known, distance) + unseen(unseen_change(free)) + _given(kept)

@@ -10,6 +10,7 @@ from calib.solve.solution import Solution
 from calib.solve.validation.board_shape import ShapeError
 from calib.solve.validation.distance_errors import distance_errors
 from calib.solve.validation.free_shape import FreeShape
+from calib.solve.validation.rolling_shutter import Motion
 from calib.solve.validation.unlike_shots import changes
 from calib.solve.validation.unlike_shots.contradictions import Contradiction, completed, contradictions
 from calib.solve.validation.unlike_shots.groups import groups
@@ -28,8 +29,8 @@ class ShotDoubts(NamedTuple):
     causes: Sequence[str]
 
 
-def unlike_shots(free: FreeShape, shape: Sequence[ShapeError], needed_px: float) -> ShotDoubts:
-    """Looks whether all shots show one board and one rig."""
+def unlike_shots(free: FreeShape, shared: Sequence[ShapeError | Motion], needed_px: float) -> ShotDoubts:
+    """Looks whether all shots show one board and one rig, beside the errors that they share."""
     solution = free.solution
     if wrong := distance_errors(solution, needed_px):
         return ShotDoubts([*map(str, wrong)], [], [])  # they pull everything else along
@@ -44,14 +45,14 @@ def unlike_shots(free: FreeShape, shape: Sequence[ShapeError], needed_px: float)
     if two or scattered:
         contradicting, scattered = [], [] if two else scattered  # without a rest, nothing contradicts it
     contradicting = completed(solution, contradicting)
-    misprinted = [str(one) for one in shape if one.is_misprint]
-    lasting = moved or refocused or misprinted or scattered or two
-    mixed = [] if lasting or contradicting or shape else groups(free, needed_px)
+    named = sorted((one for one in shared if not one.is_bend), key=lambda one: -one.certainty)[:1]
+    lasting = moved or refocused or named or scattered or two
+    mixed = [] if lasting or contradicting or shared else groups(free, needed_px)
     focus = {} if lasting or contradicting or mixed else focal_scatter(free, needed_px)
     cause = [] if lasting or solution.task.planes else _scattered(solution, contradicting, 0.0)  # or wrong distances
     reasons = [changes.of_place(one) for one in moved]
     reasons += [changes.of_optics(one, len(solution.task.sensors)) for one in refocused]
-    reasons += [*misprinted, *map(str, mixed), *(changes.of_focus(*each) for each in focus.items())]
+    reasons += [*map(str, [*named, *mixed]), *(changes.of_focus(*each) for each in focus.items())]
     reasons += [*map(str, [*two, *scattered]), *_contradicting(contradicting)]
     reasons += [changes.unexplained(one) for one, is_so in zip(changed, confirmed) if not is_so]
     return ShotDoubts(reasons, contradicting, [*map(str, cause)])

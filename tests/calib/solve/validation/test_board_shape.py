@@ -51,6 +51,15 @@ def test_a_print_that_is_scaled_along_one_axis_is_named_with_its_size(stretch: f
     assert assess(solved(stretch), 1.0, 1.0).verdict.startswith(f"Do not trust it yet: the board's {longer} are ")
 
 
+def test_a_print_without_right_angles_is_named_with_its_angle() -> None:
+    points_b = board_views.board_points()
+    solution = photographed(points_b, points_b @ np.array([[1, 0, 0], [0.01, 1, 0], [0, 0, 1]]))
+    (found,) = shape_errors(solution, 1.0, 1.0)
+    assert found.shape == Shape.SKEW
+    assert abs(found.size) == pytest.approx(1, rel=0.2)
+    assert "rows and columns are 0.5" in assess(solution, 1.0, 1.0).verdict
+
+
 @pytest.mark.parametrize(("gap", "than"), [(0.0095, "smaller"), (0.0115, "larger")])
 def test_tags_that_are_not_as_large_as_described_beside_their_gaps_are_named(gap: float, than: str) -> None:
     made, described = AprilGrid(6, 5, 0.045, 0.0105), AprilGrid(6, 5, 0.045, gap)
