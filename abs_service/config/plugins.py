@@ -1,7 +1,7 @@
 """Exchangeable parts: `type = "nurbs"` names the module whose dataclass `Settings` takes the rest of the table.
 
 The modules are those of a package such as `abs_service.tracker.models`, and those that installed distributions declare
-as entry points of the group of that name (docs/how-to/extending.md).
+as entry points of the group of that name (docs/how-to/extending).
 """
 
 import difflib

@@ -51,7 +51,7 @@ def test_every_page_of_the_four_parts_is_in_the_navigation():
     written = {
         path.relative_to(ROOT / "docs").as_posix()
         for folder in ("tutorial", "how-to", "explanation", "reference")
-        for path in (ROOT / "docs" / folder).glob("*.md")
+        for path in (ROOT / "docs" / folder).rglob("*.md")
     }
     assert written <= listed
 

@@ -1,4 +1,4 @@
-"""Programs that use the parts of docs/how-to/extending.md, and a rig file for one of them."""
+"""Programs that use the parts of docs/how-to/extending, and a rig file for one of them."""
 
 #: A thermal camera beside a depth camera; the second tracker does without.
 THERMAL = """

@@ -1,4 +1,4 @@
-"""The examples of docs/how-to/extending.md, installed beside the package, in a rig that tracks the sample recording."""
+"""The examples of docs/how-to/extending, installed beside the package, in a rig that tracks the sample recording."""
 
 import json
 import os
@@ -17,9 +17,9 @@ from abs_service import config
 from tests.abs_service.config.extending_programs import DISC, MARGIN, READING, SLIDING, THERMAL
 
 ROOT = Path(__file__).parents[3]
-PAGE = (ROOT / "docs" / "how-to" / "extending.md").read_text(encoding="utf-8")
-PARTS = dict(re.findall(r"```python\n# my_parts/(\w+)\.py\n(.*?)```", PAGE, re.DOTALL))
-PYPROJECT = PAGE.partition("```toml\n# pyproject.toml\n")[2].partition("```")[0]
+PAGES = {path.name: path.read_text(encoding="utf-8") for path in (ROOT / "docs/how-to/extending").glob("*.md")}
+PARTS = dict(re.findall(r"```python\n# my_parts/(\w+)\.py\n(.*?)```", "".join(PAGES.values()), re.DOTALL))
+PYPROJECT = PAGES["index.md"].partition("```toml\n# pyproject.toml\n")[2].partition("```")[0]
 SERVICE = ("-m", "abs_service")
 SAMPLE = ROOT / "recordings" / "sample.mcap"
 

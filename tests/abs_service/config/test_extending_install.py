@@ -1,4 +1,4 @@
-"""Parts that docs/how-to/extending.md installs are declared, and those that cannot be used are named."""
+"""Parts that docs/how-to/extending installs are declared, and those that cannot be used are named."""
 
 import os
 import re
@@ -8,7 +8,7 @@ import pytest
 from abs_service import config
 from tests.abs_service.config.extending_programs import ASKING, DERIVED
 from tests.abs_service.config.test_extending import (
-    PAGE,
+    PAGES,
     PARTS,
     PYPROJECT,
     SERVICE,
@@ -21,7 +21,7 @@ from tests.abs_service.config.test_extending import (
 
 def test_what_the_page_installs_declares_its_parts(tmp_path) -> None:
     """With the page's own command, but without its dependencies, which are here."""
-    (command,) = re.findall(r"^\.venv/bin/(pip install -e \S+) +#", PAGE, re.MULTILINE)
+    (command,) = re.findall(r"^\.venv/bin/(pip install -e \S+) +#", PAGES["index.md"], re.MULTILINE)
     project, site = tmp_path / "my-parts", tmp_path / "site"
     (project / "my_parts").mkdir(parents=True)
     (project / "pyproject.toml").write_text(PYPROJECT, encoding="utf-8")
