@@ -46,8 +46,7 @@ def test_every_file_that_a_page_names_exists():
 
 def test_every_page_of_the_four_parts_is_in_the_navigation():
     text = re.sub(r"!!python\S*", "", (ROOT / "mkdocs.yml").read_text(encoding="utf-8"))
-    parts = [part for part in yaml.safe_load(text)["nav"] if isinstance(part, dict)]
-    listed = {page for part in parts for pages in part.values() for page in pages if isinstance(page, str)}
+    listed = set(re.findall(r"[\w/-]+\.md", str(yaml.safe_load(text)["nav"])))
     written = {
         path.relative_to(ROOT / "docs").as_posix()
         for folder in ("tutorial", "how-to", "explanation", "reference")
