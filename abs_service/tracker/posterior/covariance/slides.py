@@ -17,10 +17,10 @@ from abs_service.tracker.posterior.optimum import Optimum
 from abs_service.tracker.terms.linearization import Part, PointLinearization
 from calib.jit import kernel
 
-#: Error of the directions [rad], root mean square, in which residuals tell of motion: of outlines; of images, since
-#: a print may hardly change along a direction; of distances, since a surface that bends follows another one beneath
-#: it that is so much inclined.
-EDGE_ERROR, PRINT_ERROR, NORMAL_ERROR = 0.1, 0.2, 0.3
+#: Error of the directions [rad], root mean square, in which residuals tell of motion: of images, since a print may
+#: hardly change along a direction; of outlines and distances, since a surface that bends follows another one beneath it
+#: that is so much inclined, and so do its edges.
+PRINT_ERROR, EDGE_ERROR, NORMAL_ERROR = 0.2, 0.2, 0.3
 
 #: A model moves rigidly if so many of its vertices lack no more than this share of such motions, in squares.
 _PROBES, _SMALL_SHARE = 60, 1e-3

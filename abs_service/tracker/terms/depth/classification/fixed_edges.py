@@ -29,6 +29,9 @@ CELL_PX, MIN_SHARE, MIN_LENGTH, LARGEST_GAP = 16, 0.8, 24, 8
 MIN_ELSEWHERE = 0.25
 #: So many returns farther than this beyond an edge, in all images so far, show that the sensor sees there [px].
 MIN_RETURNS, BEYOND_PX = 10, 2.0
+#: A place is unsettled if the same share of those that face the same side is fixed within so many pixels along that
+#: side and across it; in the image, all is unsettled so near to it [px].
+ALONG_PX, ACROSS_PX, AROUND_PX = 8, 2, 6
 #: The first pixels beyond an edge lie so near to the line through them, or beyond it.
 HALF_PX = 0.75
 Coordinates = NDArray[np.intp]
@@ -50,14 +53,20 @@ class Edge(NamedTuple):
 
 
 class FixedEdges:
-    """Pixels beyond fixed edges, learnt from the depth images so far."""
+    """Pixels beyond fixed edges, learnt from the depth images so far.
+
+    Attributes:
+        unsettled: pixels (height, width) around places near a side of the image where the object may end, or the field
+            of view: the outline has not changed, and nothing has returned beyond. All of them in the first images.
+    """
 
     def __init__(self) -> None:
+        self.unsettled = np.ones((0, 0), np.bool_)
         self._last = self._next = np.zeros((0, 2), np.intp)
         self._side, self._is_fixed = np.zeros(0, np.intp), np.zeros(0, np.bool_)
         self._edges: list[Edge] = []
         self._returned = np.zeros((0, 0), np.bool_)
-        self._later = LATER_IMAGES
+        self._later, self._begun = LATER_IMAGES, False
 
     def observe(
         self, missing: NDArray[np.bool_], areas: NDArray[np.bool_], expected: NDArray[np.bool_], window: Window
@@ -71,12 +80,14 @@ class FixedEdges:
             window: of the image; the first one has to be the whole image.
         """
         if not self._returned.size:
-            self._returned = ~missing
+            self._returned, self.unsettled = ~missing, np.ones(missing.shape, np.bool_)
         self._returned[window] |= ~missing
         self._edges = [edge for edge in self._edges if not self._is_refuted(edge)]
         self._compare(missing, window)
         self._later += 1
         if self._later >= LATER_IMAGES:
+            if self._begun:
+                self._settle()
             self._learn()
             self._begin(areas, expected, window)
         beyond = np.zeros(missing.shape, np.bool_)
@@ -89,6 +100,7 @@ class FixedEdges:
         last, beside, self._side = _outline(areas, grown(expected, NEAR_PX))
         self._last, self._next = last + corner(window), beside + corner(window)
         self._is_fixed, self._later = np.ones(len(last), np.bool_), 0
+        self._begun = True
 
     def _compare(self, missing: NDArray[np.bool_], window: Window) -> None:
         """Finds the places at which the outline is another one, or out of the window."""
@@ -98,6 +110,29 @@ class FixedEdges:
         known = np.flatnonzero(self._is_fixed)
         last, beside = (tuple((at[known] - (top, left)).T) for at in (self._last, self._next))
         self._is_fixed[known] = ~missing[last] & missing[beside]
+
+    def _settle(self) -> None:
+        """Finds the places at which the object may end, or the field of view."""
+        near = np.flatnonzero(_is_near(self._next, self._side, self._shape))
+        places, side = self._last[near], self._side[near]
+        is_fixed = self._is_fixed[near] & ~self._is_seen_beyond(places, side)
+        apart = np.abs(places[:, None] - places)
+        apart = np.where((side < 2)[:, None, None], apart, apart[..., ::-1])  # along the side, across it
+        beside = (apart <= (ALONG_PX, ACROSS_PX)).all(axis=2) & (side[:, None] == side)
+        fixed = np.count_nonzero(beside & is_fixed, axis=1)
+        found = places[is_fixed & (fixed >= MIN_SHARE * np.count_nonzero(beside, axis=1))]
+        self.unsettled = np.zeros(self._shape, np.bool_)
+        for row, column in found.tolist():
+            top, left = max(row - AROUND_PX, 0), max(column - AROUND_PX, 0)
+            self.unsettled[top : row + AROUND_PX + 1, left : column + AROUND_PX + 1] = True
+
+    def _is_seen_beyond(self, places: NDArray[np.intp], side: NDArray[np.intp]) -> NDArray[np.bool_]:
+        """True for places (k, 2) beyond which, towards a side (k,) of the image, an image has had a return."""
+        by = np.arange(int(BEYOND_PX), AROUND_PX + 1)
+        beyond = places + by[:, None, None] * np.array(_STEPS)[side]
+        inside = ((beyond >= 0) & (beyond < self._shape)).all(axis=2)
+        rows, columns = np.clip(beyond, 0, np.array(self._shape) - 1).transpose(2, 0, 1)
+        return np.asarray(np.count_nonzero(inside & self._returned[rows, columns], axis=0) > 1)
 
     def _learn(self) -> None:
         """Finds the edges that are fixed, if the rest of the outline is not."""
@@ -147,6 +182,13 @@ def _from_side(
     """Distances from a side of an image, and places along it, of pixels at rows and columns [px]."""
     (rows, columns), (height, width) = at, shape
     return ((columns, rows), (width - 1 - columns, rows), (rows, columns), (height - 1 - rows, columns))[side]
+
+
+def _is_near(places: NDArray[np.intp], side: NDArray[np.intp], shape: tuple[int, int]) -> NDArray[np.bool_]:
+    """True for places (k, 2) near the side (k,) of an image (height, width) that they are towards."""
+    away = np.array([_from_side((places[:, 0], places[:, 1]), one, shape)[0] for one in range(len(_STEPS))])
+    margins = np.array([_margin(one, shape) for one in range(len(_STEPS))])
+    return np.asarray(away[side, np.arange(len(side))] < margins[side])
 
 
 def _runs(places: NDArray[np.intp], side: int, shape: tuple[int, int]) -> list[NDArray[np.intp]]:

@@ -45,6 +45,7 @@ class Visibility:
         beyond: no return beyond the field of view, a part of the holes.
         free_m: distance to the nearest pixel of the object, across the line of sight [m], where the sensor looks past
             the object to a background, measured or without return; 0 elsewhere.
+        unsettled: where the object may end, or the field of view, see `FixedEdges`.
     """
 
     object: NDArray[np.bool_]
@@ -53,6 +54,7 @@ class Visibility:
     dropout: NDArray[np.bool_]
     beyond: NDArray[np.bool_]
     free_m: NDArray[np.float32]
+    unsettled: NDArray[np.bool_]
 
 
 class Compared(NamedTuple):
@@ -105,7 +107,8 @@ def classify(
     _recognize(distance, predicted, labels, agreement, is_object)
     nothing = np.zeros(distance.shape, np.bool_)
     if not is_object.any():
-        return Visibility(nothing, nothing, nothing, nothing, nothing | beyond, np.zeros(distance.shape, np.float32))
+        free_m = np.zeros(distance.shape, np.float32)
+        return Visibility(nothing, nothing, nothing, nothing, nothing | beyond, free_m, nothing)
     near = _extended(predicted)
     pixels = Compared(*(np.empty(distance.shape, np.bool_) for _ in Compared._fields))
     _compare(distance, near, labels, is_object, agreement, pixels)
@@ -116,7 +119,7 @@ def classify(
         hole, past = _holes(missing & ~(single | beyond), np.isfinite(predicted), near / focal, empty)
         hole |= beyond
     away = _depth_inside(~shown) * near / np.float32(focal)
-    return Visibility(shown, foreground, hole, single, nothing | beyond, where(behind | past, away))
+    return Visibility(shown, foreground, hole, single, nothing | beyond, where(behind | past, away), nothing)
 
 
 @kernel

@@ -12,7 +12,7 @@ from abs_service.pairing.images import Window
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.synthesis.projection import Projection
 from abs_service.tracker.synthesis.window import WHOLE, corner
-from abs_service.tracker.terms.depth.classification.fixed_edges import LATER_IMAGES, MARGIN
+from abs_service.tracker.terms.depth.classification.fixed_edges import MARGIN
 from abs_service.tracker.terms.depth.classification.outline_distance import inwards
 from abs_service.tracker.terms.depth.classification.visibility import Visibility
 from abs_service.tracker.terms.depth.outline.observed_outline import ObservedRimOutline
@@ -98,7 +98,7 @@ class RimOutline:
         return ObservedRimOutline(
             image=image,
             edges=edges,
-            is_sure=self._are_ends(edges, predicted, places, distance, window),
+            is_sure=self._are_ends(edges, predicted, places, distance, seen.unsettled, window),
             hidden=len(free) - len(edges.outer),
             covered=self._edges.some(np.flatnonzero(covered)),
             along=rim_directions(places, directions),
@@ -146,18 +146,20 @@ class RimOutline:
         predicted: Surface,
         places: NDArray[np.float64],
         distance: NDArray[np.float32],
+        unsettled: NDArray[np.bool_],
         window: Window,
     ) -> NDArray[np.bool_]:
         """True for edges at places (k, 2) where the outline is the object's end, and no silhouette or end of the view.
 
-        The latter is doubted in the first images, near a side of the image, if a window (rows, columns) has no return
-        towards it: later, what the end of the view cuts is known.
+        The latter is doubted near a side of the image, if a window (rows, columns) has no return towards it, and as
+        long as the outline there has been the same in every image.
         """
         are_ends = ~turns_away(self._camera, predicted, edges.outer, edges.inner)
-        if self._images > LATER_IMAGES:
+        if not unsettled.any():
             return are_ends
         size = np.array([self._camera.width, self._camera.height])
         near = np.concatenate([places > (1 - MARGIN) * size, places < MARGIN * size], axis=1).T
         first, (width, height) = np.array(corner(window)[::-1], np.float32), size.tolist()
         towards = [read(distance, first, places + BESIDE_PX * step, (width, height)) for step in _TO_SIDES]
-        return are_ends & ~np.any(near & ~np.isfinite(towards), axis=0)
+        is_open = read(unsettled.astype(np.float32), first, places, (width, height)) > 0
+        return are_ends & ~(is_open & np.any(near & ~np.isfinite(towards), axis=0))

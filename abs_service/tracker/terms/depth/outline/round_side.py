@@ -23,6 +23,10 @@ _CERTAIN_SINE, _GROWING_SINE, _LEAST_MEASURED = 0.95, 0.85, 0.65
 #: an end meets a silhouette, its corner wanders as well.
 _NEIGHBOURS, _BESIDE = 7, 5
 
+#: A body that turns away on one side does so on the other: a side that may be round is if more than `_NEIGHBOURS` round
+#: edges face against it, up to 45°, as the cosine tells.
+_OPPOSITE = 0.7
+
 
 def is_round_side(
     camera: Camera,
@@ -61,9 +65,17 @@ def is_round_side(
     both = _smoothed(np.stack([near, extrapolated], axis=1), near_by)
     may_be = (both[:, 0] > _LEAST_MEASURED) & (both[:, 1] > _GROWING_SINE)
     is_round, beside = may_be & (both[:, 1] > _CERTAIN_SINE), near_by[:, :_BESIDE]
-    for _ in places:
-        is_round |= may_be & is_round[beside].any(axis=1)
-    return np.asarray(is_round[beside].any(axis=1))
+    is_round = _grown(is_round, may_be, beside)
+    across = inwards @ inwards[is_round].T < -_OPPOSITE
+    is_round |= may_be & (np.count_nonzero(across, axis=1) > _NEIGHBOURS)
+    return np.asarray(_grown(is_round, may_be, beside)[beside].any(axis=1))
+
+
+def _grown(is_round: NDArray[np.bool_], may_be: NDArray[np.bool_], beside: NDArray[np.intp]) -> NDArray[np.bool_]:
+    """The round edges (k,), and those beside them (k, count) that may be round, and so on."""
+    for _ in may_be:
+        is_round = is_round | (may_be & is_round[beside].any(axis=1))
+    return is_round
 
 
 def _smoothed(values: NDArray[np.float64], near_by: NDArray[np.intp]) -> NDArray[np.float64]:

@@ -107,3 +107,26 @@ def test_a_board_alone_before_nothing_is_not_held_by_blind_columns(half_length_m
         status.append(tracker.track(distance, time_s=k / 30, mask=seen))
     assert status[-1].status == expected
     assert ("nothing holds the surface along itself" in "".join(status[-1].reasons)) == (expected == "DEGRADED")
+
+
+@pytest.mark.parametrize(("half_height_m", "frayed_m"), [(0.07, 0.0), (0.03, 0.001)])
+@pytest.mark.parametrize(("half_length_m", "expected"), [(1.0, "DEGRADED"), (0.2, "TRACKING")])
+def test_an_outline_that_has_not_changed_does_not_hold_a_board(
+    half_height_m: float, frayed_m: float, half_length_m: float, expected: str
+):
+    """It rests for eight images and is then drawn along itself by 6 mm a frame, beneath the last columns.
+
+    The end of a view that is shorter than a fixed edge, or all of whose outline stands still, is none that is known.
+    """
+    rays = CAMERA.unproject(np.ones((CAMERA.height, CAMERA.width)))
+    x, y = 0.7 * rays[..., 0] / rays[..., 2], 0.7 * rays[..., 1] / rays[..., 2]
+    generator, tracker, status = np.random.default_rng(3), a.Tracker(CAMERA, a.Nurbs()), []
+    for k in range(14):
+        noise, frayed = generator.standard_normal((2, *x.shape))
+        on = (np.abs(x - 0.006 * max(0, k - 8) + frayed_m * frayed) < half_length_m) & (
+            np.abs(y) < half_height_m + frayed_m * frayed
+        )
+        on[:, :7] = on[:, -7:] = False
+        distance = np.where(on, 0.7 + 0.1 * x**2 + 0.0015 * noise, np.nan)
+        status.append(tracker.track(distance, time_s=k / 30, mask=on).status)
+    assert status == [expected] * 14

@@ -60,3 +60,18 @@ def test_a_plain_roll_may_turn_about_its_axis_unseen(half_angle: float, expected
     found = a.Tracker(CAMERA, a.Nurbs()).track(distance, time_s=0, mask=on)
     assert found.status == expected
     assert ("nothing holds the surface along itself" in "".join(found.reasons)) == (expected == "DEGRADED")
+
+
+@pytest.mark.parametrize(("right", "expected"), [(np.pi / 2, True), (np.deg2rad(50), False)])
+def test_a_side_that_may_be_round_is_if_the_opposite_one_is(right: float, expected: bool):
+    """The left one ends at 50°; a coarse image shows a silhouette so."""
+    rows, left = np.arange(90, 150, 6), picture(np.deg2rad(50), sigma=0)
+    distance, on = (
+        np.where(np.arange(CAMERA.width) < 160, one, two) for one, two in zip(left, picture(right, sigma=0))
+    )
+    first, last = np.flatnonzero(on[90])[[0, -1]]
+    places = np.array([(first + 2.5, row) for row in rows] + [(last - 3.0, row) for row in rows])
+    inwards = np.repeat([[1.0, 0.0], [-1.0, 0.0]], len(rows), axis=0)
+    radial = (distance * np.linalg.norm(CAMERA.unproject(np.ones(on.shape)), axis=-1)).astype(np.float32)
+    found = is_round_side(CAMERA, radial, places, np.full(len(places), 3.0), inwards)
+    assert np.all(found == expected)
