@@ -97,7 +97,7 @@ def _settings(defaults: Any, changes: Sequence[str]) -> Any:
             raise EvaluateOptionError(
                 f"--set {change}: must be {known[key].__name__}, as in {getattr(defaults, key)!r}"
             )
-        if known[key] is int and value < 0:
+        if type(value) is int and value < 0:
             raise EvaluateOptionError(f"--set {change}: counts something; must be 0 or more")
     return replace(defaults, **values)
 

@@ -94,19 +94,11 @@ def test_json_is_one_line_for_each_experiment(experiment, tmp_path: Path, capsys
 
 
 def test_the_progress_counts_experiments(experiment, tmp_path: Path, monkeypatch) -> None:
-    shown = []
-
-    class Console(types.SimpleNamespace):
-        def status(self, label: str) -> nullcontext[types.SimpleNamespace]:
-            return nullcontext(types.SimpleNamespace(update=shown.append))
-
-    def run(settings: Settings, context: Context) -> Findings:
-        context.progress("measuring")
-        return found(2.5)(settings, context)
-
-    monkeypatch.setattr(running, "Console", Console)
-    experiment("one", run)
-    experiment("two", run)
+    shown: list[str] = []
+    status = nullcontext(types.SimpleNamespace(update=shown.append))
+    monkeypatch.setattr(running, "Console", lambda stderr: types.SimpleNamespace(status=lambda label: status))
+    for name in ("one", "two"):
+        experiment(name, lambda settings, context: context.progress("measuring") or found(2.5)(settings, context))
     assert __main__.main(["one", "two", "--out", str(tmp_path)]) == Exit.OK
     assert shown == ["1 of 2, one: measuring", "2 of 2, two: measuring"]
 
