@@ -127,6 +127,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         if not given:
             parser.print_help(sys.stderr)
             return Exit.USER
+        if given[0].startswith("-") and given[0] not in ("-h", "--help", "--version"):
+            parser.error(f"{given[0]}: no such option before a command")
         chosen = parser.parse_args(given[:1]).command
         name, given = f"{name} {chosen}".strip(), given[1:]
         with _ended_by_interrupt():

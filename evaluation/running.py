@@ -53,21 +53,22 @@ def group(module: ModuleType) -> str:
 @contextmanager
 def started(names: Sequence[str], arguments: argparse.Namespace) -> Iterator[dict[str, Callable[[], Report]]]:
     """A function for each experiment that returns its report: it runs here, or has begun in a process beside others."""
+    labels = {name: f"{number} of {len(names)}, {name}" for number, name in enumerate(names, start=1)}
     if arguments.jobs == 1:
-        yield {name: partial(measure, name, arguments) for name in names}
+        yield {name: partial(measure, name, label, arguments) for name, label in labels.items()}
         return
     with ProcessPoolExecutor(arguments.jobs, get_context("spawn")) as processes:
-        yield {name: processes.submit(measure, name, arguments).result for name in names}
+        yield {name: processes.submit(measure, name, label, arguments).result for name, label in labels.items()}
 
 
-def measure(name: str, arguments: argparse.Namespace) -> Report:
-    """Runs one experiment."""
+def measure(name: str, label: str, arguments: argparse.Namespace) -> Report:
+    """Runs one experiment; `label` names it while it runs."""
     chosen = available()[name]
     traced = origin([name], arguments)
     settings = _settings(chosen.QUICK if arguments.quick else chosen.Settings(), arguments.set)
     start_s = time.monotonic()
-    with Console(stderr=True).status(name) as status:
-        context = experiment.Context(arguments.seed, arguments.data, lambda text: status.update(f"{name}: {text}"))
+    with Console(stderr=True).status(label) as status:
+        context = experiment.Context(arguments.seed, arguments.data, lambda text: status.update(f"{label}: {text}"))
         findings = chosen.run(settings, context)
     conditions = {
         "commit": provenance.commit(Path(__file__).parent) or "unknown",
@@ -96,7 +97,7 @@ def _settings(defaults: Any, changes: Sequence[str]) -> Any:
             raise EvaluateOptionError(
                 f"--set {change}: must be {known[key].__name__}, as in {getattr(defaults, key)!r}"
             )
-        if known[key] is int and value < 0:
+        if type(value) is int and value < 0:
             raise EvaluateOptionError(f"--set {change}: counts something; must be 0 or more")
     return replace(defaults, **values)
 

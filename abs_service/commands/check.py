@@ -112,7 +112,7 @@ def describe(rig: config.ServiceConfig, source: str, toml: str = "", recording: 
         "trackers": {name: _tracker(rig, name) for name in rig.trackers},
         "publishes": [keys.key(rig.name, keys.state(name)) for name in rig.trackers],
         "images": images,
-        "records": str(rig.record.directory) if rig.record.enabled else None,
+        "records": str(rig.record.directory.resolve()) if rig.record.enabled else None,
         "disk": disk.lasts(rig, 1e6 * images["recorded_mb_s"][1]),
     }
 

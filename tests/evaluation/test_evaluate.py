@@ -6,6 +6,7 @@ import subprocess
 import sys
 import types
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -90,6 +91,16 @@ def test_json_is_one_line_for_each_experiment(experiment, tmp_path: Path, capsys
     __main__.main(["all", "--out", str(tmp_path), "--json"])
     lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     assert [(line["experiment"], line["verdict"]) for line in lines] == [("a", "met"), ("b", "missed")]
+
+
+def test_the_progress_counts_experiments(experiment, tmp_path: Path, monkeypatch) -> None:
+    shown: list[str] = []
+    status = nullcontext(types.SimpleNamespace(update=shown.append))
+    monkeypatch.setattr(running, "Console", lambda stderr: types.SimpleNamespace(status=lambda label: status))
+    for name in ("one", "two"):
+        experiment(name, lambda settings, context: context.progress("measuring") or found(2.5)(settings, context))
+    assert __main__.main(["one", "two", "--out", str(tmp_path)]) == Exit.OK
+    assert shown == ["1 of 2, one: measuring", "2 of 2, two: measuring"]
 
 
 def test_settings_of_one_experiment_can_be_changed(experiment, tmp_path: Path) -> None:

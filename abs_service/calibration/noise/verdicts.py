@@ -198,7 +198,7 @@ def _outside(found: NoiseCalibration) -> Verdict:
     beyond = extremes(found.model, (near / _OUTSIDE, far * _OUTSIDE), (0.0, 65535.0))
     text = (
         f"Outside what was measured σ stays between {beyond[0] * 1e3:.2g} and {beyond[1] * 1e3:.2g} mm, and μ within "
-        f"{beyond[2] * 1e3:.2g} mm, up to {far * _OUTSIDE:.0f} m and at any amplitude."
+        f"{float(f'{beyond[2] * 1e3:.2g}'):g} mm, up to {far * _OUTSIDE:.0f} m and at any amplitude."
     )
     sound = all(map(math.isfinite, beyond)) and beyond[0] > 0
     grows = beyond[1] > 1.001 * high

@@ -79,13 +79,17 @@ def with_cameras(sequence: Sequence, cameras: Mapping[str, Camera]) -> Sequence:
     return replace(sequence, camera=camera, cameras=known)
 
 
-def of_recording(path: Path, sensor: str, most: int) -> list[Sequence]:
+def _ignore() -> None: ...
+
+
+def of_recording(path: Path, sensor: str, most: int, advance: Callable[[], None] = _ignore) -> list[Sequence]:
     """Sequences of one sensor in a recording of abs-service.
 
     Args:
         path: of the file.
         sensor: name; "" for the only depth sensor.
         most: maximum number of frames; the first ones are read.
+        advance: called with each depth image that is read.
 
     Raises:
         SequenceError: unknown sensor, or no name given and not exactly one depth sensor.
@@ -93,10 +97,12 @@ def of_recording(path: Path, sensor: str, most: int) -> list[Sequence]:
     """
     recording = Recording(path)
     frames = (item for item in recording.frames() if isinstance(item, Frame))
-    return of_frames(path.name, frames, recording.cameras, sensor, most)
+    return of_frames(path.name, frames, recording.cameras, sensor, most, advance)
 
 
-def of_device(uri: str, sensor: str, most: int, clock: Callable[[], int]) -> list[Sequence]:
+def of_device(
+    uri: str, sensor: str, most: int, clock: Callable[[], int], advance: Callable[[], None] = _ignore
+) -> list[Sequence]:
     """Sequences of one sensor of a live device; arguments and errors as in `of_recording`.
 
     Raises:
@@ -105,7 +111,7 @@ def of_device(uri: str, sensor: str, most: int, clock: Callable[[], int]) -> lis
     """
     device = open_device(uri, clock)
     try:
-        collected = _Collected(most * max(1, len(device.capabilities.streams)))
+        collected = _Collected(most * max(1, len(device.capabilities.streams)), advance)
         device.start(collected)
         collected.wait()
         device.stop()
@@ -117,8 +123,9 @@ def of_device(uri: str, sensor: str, most: int, clock: Callable[[], int]) -> lis
 
 
 def of_frames(
-    name: str, frames: Iterable[Frame], cameras: Mapping[str, Camera], sensor: str, most: int
-) -> list[Sequence]:
+    name: str, frames: Iterable[Frame], cameras: Mapping[str, Camera], sensor: str, most: int,
+    advance: Callable[[], None] = _ignore,
+) -> list[Sequence]:  # fmt: skip
     """Groups frames into sequences by exposure setting; arguments and errors as in `of_recording`."""
     gathered: dict[str, _Gathered] = {}
     others = FrameAverager()
@@ -130,6 +137,8 @@ def of_frames(
             raise SequenceError(f"{name}: there are several depth sensors, {chosen} and {frame.sensor}; choose one")
         if frame.sensor == chosen or not chosen:
             gathered.setdefault(_setting(frame), _Gathered()).add(frame)
+            if frame.kind is Kind.DEPTH:
+                advance()
         else:
             others.add(frame)
         if sum(len(one.depth) for one in gathered.values()) > most:
@@ -193,14 +202,17 @@ class _Gathered:
 class _Collected(Sink):
     """Frame sink with a maximum number of frames."""
 
-    def __init__(self, most: int) -> None:
+    def __init__(self, most: int, advance: Callable[[], None]) -> None:
         self.frames: list[Frame] = []
+        self._advance = advance
         self.reason = ""
         self._most = most
         self._more = threading.Semaphore(0)
 
     def on_frame(self, frame: Frame) -> None:
         self.frames.append(frame)
+        if frame.kind is Kind.DEPTH:
+            self._advance()
         self._more.release()
 
     def on_state(self, state: DeviceState, reason: str) -> None:

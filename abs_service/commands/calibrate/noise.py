@@ -27,7 +27,7 @@ import json
 import math
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -40,6 +40,7 @@ from abs_service.calibration.shots import sequences
 from abs_service.commands.calibrate.inputs import calibrations
 from abs_service.commands.images import camera_file
 from abs_service.commands.parts.options import OptionError, number, whole
+from abs_service.commands.parts.progress import bars
 from abs_service.config import plugins
 from abs_service.report import page, provenance
 from abs_service.report.content import Level, Report, to_json
@@ -90,8 +91,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Reads the sources, fits, writes and reports."""
     console = Console(stderr=True)
-    with console.status("reading"):
-        groups = _groups(arguments)
+    with bars() as progress:
+        task = progress.add_task("depth images", total=arguments.frames * len(arguments.sources))
+        groups = _groups(arguments, lambda: progress.advance(task))
     paths = [Path(source) for source in arguments.sources if "://" not in source]
     paths += [path for path in (arguments.target, arguments.calibration) if path is not None]
     trace = provenance.trace(arguments.command_line, paths)
@@ -118,8 +120,10 @@ def run(arguments: argparse.Namespace) -> int:
     return worst
 
 
-def _groups(arguments: argparse.Namespace) -> dict[str, list[tuple[sequences.Sequence, float | StaticBoard]]]:
-    """Sequences of all sources by exposure setting, each with its target."""
+def _groups(
+    arguments: argparse.Namespace, advance: Callable[[], None]
+) -> dict[str, list[tuple[sequences.Sequence, float | StaticBoard]]]:
+    """Sequences of all sources by exposure setting, each with its target; calls `advance` for each depth image."""
     depths = _depths(arguments.distance_m, len(arguments.sources))
     if arguments.target is not None and not math.isnan(depths[0]):
         raise OptionError("--target, --distance-m: give only one of them; a board tells its own distance")
@@ -127,7 +131,7 @@ def _groups(arguments: argparse.Namespace) -> dict[str, list[tuple[sequences.Seq
     cameras = _cameras(arguments.calibration)
     groups: dict[str, list[tuple[sequences.Sequence, float | StaticBoard]]] = {}
     for source, depth in zip(arguments.sources, depths):
-        for one in _read(source, arguments):
+        for one in _read(source, arguments, advance):
             seen = sequences.with_cameras(one, cameras)
             where = depth if target is None else board_poses.static_board(target, seen)
             groups.setdefault(seen.exposure, []).append((seen, where))
@@ -145,12 +149,12 @@ def _cameras(path: Path | None) -> dict[str, Camera]:
     return {} if path is None else {name: each.camera for name, each in calibrations.load(path).sensors.items()}
 
 
-def _read(source: str, arguments: argparse.Namespace) -> list[sequences.Sequence]:
+def _read(source: str, arguments: argparse.Namespace, advance: Callable[[], None]) -> list[sequences.Sequence]:
     path = Path(source)
     if "://" in source:
-        return sequences.of_device(source, arguments.sensor, arguments.frames, time.monotonic_ns)
+        return sequences.of_device(source, arguments.sensor, arguments.frames, time.monotonic_ns, advance)
     if not path.is_dir():
-        return sequences.of_recording(path, arguments.sensor, arguments.frames)
+        return sequences.of_recording(path, arguments.sensor, arguments.frames, advance)
     if arguments.camera is None:
         raise OptionError(f"{source}: --camera has to say which camera took the images of a folder")
     depth = camera_file.load(arguments.camera).depth
@@ -159,7 +163,7 @@ def _read(source: str, arguments: argparse.Namespace) -> list[sequences.Sequence
         Geometry(depth.geometry), depth.invalid,
     )  # fmt: skip
     folder = ImageFolder({"depth": images})
-    return sequences.of_frames(path.name, folder.frames(), folder.cameras, "depth", arguments.frames)
+    return sequences.of_frames(path.name, folder.frames(), folder.cameras, "depth", arguments.frames, advance)
 
 
 def _region(arguments: argparse.Namespace, shape: Sequence[int]) -> NDArray[np.bool_]:

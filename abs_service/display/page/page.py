@@ -128,7 +128,7 @@ class Page:
         self._scene.show_mesh(tracker, view, self._scales[name].colors(FIELDS[name].values(view)), stale)
         self._scene.show_first(tracker, view, self._panel.shows[0])
         self._scene.show_gravity(tracker, view, gravity.down(self._feed, tracker))
-        self._trails.extend(tracker, (mesh.header.boot_id, mesh.mesh_version), view.vertices, mesh.header.t_host_ns)
+        self._trails.extend(tracker, (mesh.header.boot_id, mesh.mesh_version), self._drawn[tracker], self._feed.now_s)
         self._scene.show_trails(tracker, self._trails.lines(tracker))
 
     def _mesh_view(self, mesh: DeformedMesh, with_image: bool) -> MeshView | None:
@@ -200,7 +200,7 @@ class Page:
             self._panel.show_legend(self._scales[self._panel.field].end)
         self._panel.grey(RECORDING, unavailable(self._feed))
         self._panel.show_table(table.rows(self._feed, tracker))
-        self._panel.show_plots(plots(numbers, self._feed.now_s))
+        self._panel.show_plots(plots(numbers, self._trails.sigmas(tracker), self._feed.now_s))
         self._reinitialization.look()
 
     def _trail_buttons(self) -> dict[str, Button]:

@@ -151,7 +151,9 @@ class Panel:
             shown.remove()
 
     def show_plots(self, plots: Mapping[str, Curves]) -> None:
-        """Shows curves of the last minute by title."""
+        """Shows curves of the last minute by title, and no others."""
+        for title in self._plots.keys() - plots.keys():
+            self._plots.pop(title).remove()
         for title, curves in plots.items():
             data, known = complete(list(curves.values())), self._plots.get(title)
             series = uplot.Series(label="s"), *_series(curves)

@@ -184,3 +184,11 @@ def test_a_process_of_a_rig_does_not_begin_with_imports_that_it_may_never_need(c
     )
     out = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout
     assert out.strip() == "[]"
+
+
+@pytest.mark.parametrize("given", [["--bogus"], ["-q", "run"], ["calibrate", "--bogus"]])
+def test_an_option_that_stands_before_a_command_and_is_none_is_named(given, capsys):
+    with pytest.raises(SystemExit) as error:
+        cli.main(given)
+    assert error.value.code == Exit.USER
+    assert "no such option before a command" in capsys.readouterr().err

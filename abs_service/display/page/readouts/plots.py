@@ -14,11 +14,12 @@ Curves = Mapping[str, NDArray[np.float64]]
 STEPS, COMPONENTS = round(2 * MINUTE_S), 5
 
 
-def plots(numbers: Sequence[Numbers], now_s: float) -> dict[str, Curves]:
+def plots(numbers: Sequence[Numbers], sigmas: Mapping[str, NDArray[np.float64]], now_s: float) -> dict[str, Curves]:
     """Curves by title; each point is the mean of half a second.
 
     Args:
         numbers: of the last minute, oldest first.
+        sigmas: arrival [s] and σ [mm] (n, 2) of vertices, by name.
         now_s: monotonic time [s].
     """
     times_s = np.array([one.t_s for one in numbers]) - now_s
@@ -41,7 +42,9 @@ def plots(numbers: Sequence[Numbers], now_s: float) -> dict[str, Curves]:
         "estimates a second": {"rate": a_second(times_s, np.ones(len(numbers)))},
         "lost a second": {name: a_second(times_s, amounts) for name, amounts in lost(numbers).items()},
     }
-    return {"latency [ms]": means.pop("latency [ms]")} | rates | means
+    chosen = {name: binned(column[:, 0] - now_s, column[:, 1]) for name, column in sigmas.items()}
+    found = {"latency [ms]": means.pop("latency [ms]")} | rates | means
+    return found | {"σ of the followed vertices [mm]": chosen} if chosen else found
 
 
 def lost(numbers: Sequence[Numbers]) -> dict[str, NDArray[np.floating]]:

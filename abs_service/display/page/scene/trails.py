@@ -1,15 +1,17 @@
-"""Trails of vertices that a user picks: where each was in the last seconds."""
+"""Vertices that a user picks: where each was in the last seconds, and its σ over the last minute."""
 
 import threading
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.display.page.acting.gestures import Ray
+from abs_service.display.page.numbers import MINUTE_S
 from abs_service.display.page.pictures import under_ray
-from abs_service.display.page.scene.fields import MeshView, joined
+from abs_service.display.page.scene.fields import Drawn, MeshView, joined, sigma
 
 #: Length of a trail [ns].
 TRAIL_NS = 10_000_000_000
@@ -18,13 +20,21 @@ TRAIL_NS = 10_000_000_000
 GAP_NS = 500_000_000
 
 
+@dataclass(slots=True)
+class _Followed:
+    """A vertex: its places [m] by exposure [ns], and its σ [mm] by arrival [s]."""
+
+    places: list[tuple[int, NDArray[np.float64]]] = field(default_factory=list)
+    sigmas: list[tuple[float, float]] = field(default_factory=list)
+
+
 class Trails:
     """Trails of vertices; safe from any thread."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._meshes: dict[str, object] = {}  # by tracker
-        self._places: dict[tuple[str, int], list[tuple[int, NDArray[np.float64]]]] = {}  # by tracker and vertex
+        self._followed: dict[tuple[str, int], _Followed] = {}  # by tracker and vertex
 
     def follow(self, meshes: Mapping[str, MeshView], ray: Ray) -> bool:
         """Begins a trail of the vertex that a ray meets; False if it meets no mesh.
@@ -43,36 +53,39 @@ class Trails:
         for tracker, view in meshes.items():
             if vertex < len(view.vertices):
                 with self._lock:
-                    self._places.setdefault((tracker, vertex), [])
+                    self._followed.setdefault((tracker, vertex), _Followed())
                 break
             vertex -= len(view.vertices)
         return True
 
-    def extend(self, tracker: str, mesh: object, vertices: NDArray[np.float64], exposure_ns: int) -> None:
-        """Adds where the vertices are.
+    def extend(self, tracker: str, mesh: object, drawn: Drawn, now_s: float) -> None:
+        """Adds where the vertices are, and their σ.
 
         Args:
             tracker: its name.
             mesh: identity of its mesh; the vertices of another one are others, so that trails end.
-            vertices: positions (n, 3) [m].
-            exposure_ns: time of them [ns]; an earlier one, after a jump in a recording, begins the trails anew.
+            drawn: the mesh. An earlier exposure, after a jump in a recording, begins the trails anew.
+            now_s: time of its arrival [s].
         """
+        exposure_ns, deviations_mm = drawn.exposure_ns, sigma(drawn.view)
         with self._lock:
             if self._meshes.setdefault(tracker, mesh) != mesh:
                 self._meshes[tracker] = mesh
-                self._places = {key: places for key, places in self._places.items() if key[0] != tracker}
-            for (name, vertex), places in self._places.items():
+                self._followed = {key: one for key, one in self._followed.items() if key[0] != tracker}
+            for (name, vertex), one in self._followed.items():
                 if name != tracker:
                     continue
-                if places and exposure_ns < places[-1][0]:
-                    places.clear()
-                kept = [one for one in places if exposure_ns - TRAIL_NS <= one[0] < exposure_ns]
-                places[:] = [*kept, (exposure_ns, vertices[vertex])]
+                if one.places and exposure_ns < one.places[-1][0]:
+                    one.places, one.sigmas = [], []
+                kept = [place for place in one.places if exposure_ns - TRAIL_NS <= place[0] < exposure_ns]
+                one.places = [*kept, (exposure_ns, drawn.view.vertices[vertex])]
+                recent = [value for value in one.sigmas if now_s - MINUTE_S <= value[0] <= now_s]
+                one.sigmas = [*recent, (now_s, float(deviations_mm[vertex]))]
 
     def lines(self, tracker: str) -> NDArray[np.float32]:
         """Lines (n, 2, 3) [m] of a tracker's trails."""
         with self._lock:
-            trails = [places for (name, _), places in self._places.items() if name == tracker]
+            trails = [one.places for (name, _), one in self._followed.items() if name == tracker]
             pairs = [
                 (before[1], after[1])
                 for places in trails
@@ -81,7 +94,16 @@ class Trails:
             ]
         return np.array(pairs, np.float32).reshape(-1, 2, 3)
 
+    def sigmas(self, tracker: str) -> dict[str, NDArray[np.float64]]:
+        """Arrival [s] and σ [mm] (n, 2) of a tracker's followed vertices over the last minute, by name."""
+        with self._lock:
+            return {
+                f"vertex {vertex}": np.array(one.sigmas).reshape(-1, 2)
+                for (name, vertex), one in self._followed.items()
+                if name == tracker
+            }
+
     def forget(self) -> None:
         """Ends all trails."""
         with self._lock:
-            self._places.clear()
+            self._followed.clear()

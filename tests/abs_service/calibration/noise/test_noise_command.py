@@ -2,6 +2,7 @@
 
 import json
 import math
+import time
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -131,6 +132,15 @@ def test_the_command_writes_a_table_for_the_rig_file_and_a_report(tmp_path: Path
     page = (tmp_path / "lab-1.2.html").read_text(encoding="utf-8")
     assert page.count("<figure>") >= 5
     assert "--distance-m 0.8 1.2 1.6" in page
+
+
+def test_every_depth_image_that_is_read_is_counted(tmp_path: Path) -> None:
+    source, counted = "simulated://wall?sensors=tof&tof=32x24&rate=200", []
+    taken, head = frames(source, 0, 12)
+    sequences.of_frames("x", taken, {"tof": head.camera}, "", 50, lambda: counted.append("file"))
+    assert counted.count("file") == 12
+    sequences.of_device(source, "", 5, time.monotonic_ns, lambda: counted.append("device"))
+    assert counted.count("device") >= 5
 
 
 @pytest.mark.slow

@@ -89,6 +89,15 @@ def test_a_plot_shows_the_curves_that_it_is_given_last(server, added):
     assert added.count(plot) == 1
 
 
+def test_a_plot_without_curves_is_taken_away_and_comes_back(server, added):
+    panel, curves = Panel(server, {}), {"Θ1": np.ones(STEPS)}
+    panel.show_plots({"Θ": curves, "σ": curves})
+    panel.show_plots({"Θ": curves})
+    panel.show_plots({"Θ": curves, "σ": curves})
+    assert [getattr(plot, "title", "") for plot in added].count("σ") == 2
+    assert [getattr(plot, "title", "") for plot in added].count("Θ") == 1
+
+
 def test_plots_have_the_same_minute_however_little_of_it_has_values(server, added):
     Panel(server, {}).show_plots({"rate": {"rate": np.full(STEPS, np.nan)}})
     assert added[-1].scales["x"]["range"] == (-60.0, 0.0)

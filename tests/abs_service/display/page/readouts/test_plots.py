@@ -28,7 +28,7 @@ def test_thetas_of_another_model_are_left_out_of_the_curves():
 
 
 def test_sigma_is_plotted_and_an_unknown_one_left_out():
-    drawn = plots([numbers(9.6, [0.0], deviation_mm=np.nan), numbers(9.7, [0.0], deviation_mm=0.7)], 10.0)
+    drawn = plots([numbers(9.6, [0.0], deviation_mm=np.nan), numbers(9.7, [0.0], deviation_mm=0.7)], {}, 10.0)
     assert drawn["σ of a vertex, median [mm]"]["σ"][-1] == 0.7
     assert drawn["latency [ms]"]["search"][-1] == 10.0
     assert drawn["log-likelihood of a vertex"]["tof"][-1] == -1.0
@@ -36,13 +36,19 @@ def test_sigma_is_plotted_and_an_unknown_one_left_out():
 
 def test_losses_are_plotted_by_component_as_what_came_between_two_estimates():
     given = [(7.2, 40), (7.7, 40), (8.2, 43), (8.7, 43), (9.2, 0), (9.7, 2)]  # the camera's process began anew
-    drawn = plots([numbers(t_s, [0.0], lost={"capture": number, "record": 0}) for t_s, number in given], 10.0)
+    drawn = plots([numbers(t_s, [0.0], lost={"capture": number, "record": 0}) for t_s, number in given], {}, 10.0)
     assert list(drawn["lost a second"]) == ["capture"]
     np.testing.assert_array_equal(drawn["lost a second"]["capture"][-6:], [np.nan, 0, 6, 0, 0, 4])
 
 
+def test_sigma_of_followed_vertices_has_a_plot_of_its_own_while_there_are_some():
+    title, numbers_now = "σ of the followed vertices [mm]", [numbers(9.7, [0.0])]
+    assert title not in plots(numbers_now, {}, 10.0)
+    assert plots(numbers_now, {"vertex 7": np.array([[9.6, 0.4], [9.7, 0.6]])}, 10.0)[title]["vertex 7"][-1] == 0.5
+
+
 def test_without_losses_their_plot_says_zero():
-    drawn = plots([numbers(9.2, [0.0]), numbers(9.7, [0.0])], 10.0)
+    drawn = plots([numbers(9.2, [0.0]), numbers(9.7, [0.0])], {}, 10.0)
     assert drawn["lost a second"]["all"][-1] == 0
 
 

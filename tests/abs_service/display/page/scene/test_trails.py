@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from abs_service.display.page.scene.fields import MeshView
+from abs_service.display.page.scene.fields import Drawn, MeshView
 from abs_service.display.page.scene.trails import GAP_NS, TRAIL_NS, Trails
 
 FRAME_NS = 33_000_000
@@ -11,8 +11,15 @@ SQUARE = np.array([[0.0, 0, 1], [0.1, 0, 1], [0, 0.1, 1], [0.1, 0.1, 1]])
 FACES = np.array([[0, 1, 2], [1, 3, 2]], np.int32)
 
 
-def view(vertices):
-    return MeshView(vertices, vertices, FACES, np.empty((0, 6)), np.empty((0, 0)), None)
+UNKNOWN = np.empty((0, 6))
+
+
+def view(vertices, covariance=UNKNOWN):
+    return MeshView(vertices, vertices, FACES, covariance, np.empty((0, 0)), None)
+
+
+def drawn(vertices, time_ns, covariance=UNKNOWN):
+    return Drawn(view(vertices, covariance), time_ns, None)
 
 
 MESHES = {"left": view(SQUARE), "right": view(np.add(SQUARE, (1.0, 0, 0)))}
@@ -33,12 +40,12 @@ def trails():
 
 def extend(trails, times_ns, mesh="first"):
     for time_ns in times_ns:
-        trails.extend("right", mesh, np.add(SQUARE, (0, 0, 1e-9 * time_ns)), time_ns)
+        trails.extend("right", mesh, drawn(np.add(SQUARE, (0, 0, 1e-9 * time_ns)), time_ns), 1e-9 * time_ns)
 
 
 def test_the_vertex_under_the_click_is_followed(trails):
     extend(trails, [0, FRAME_NS, 2 * FRAME_NS])
-    trails.extend("left", "first", SQUARE, 0)
+    trails.extend("left", "first", drawn(SQUARE, 0), 0.0)
     lines = trails.lines("right")
     np.testing.assert_allclose(lines[:, :, :2], np.full((2, 2, 2), 0.1))
     np.testing.assert_allclose(lines[:, :, 2] - 1, np.array([[0, 0.033], [0.033, 0.066]]), atol=1e-6)
@@ -58,6 +65,19 @@ def test_a_trail_is_ten_seconds_long(trails):
     extend(trails, range(0, 2 * TRAIL_NS, FRAME_NS))
     lines = trails.lines("right")
     assert 1e-9 * TRAIL_NS - 0.1 < lines[-1, 1, 2] - lines[0, 0, 2] <= 1e-9 * TRAIL_NS
+
+
+def test_sigma_of_a_followed_vertex_is_kept_for_a_minute(trails):
+    for second in range(90):
+        covariance = np.zeros((4, 6))
+        covariance[3, [0, 3, 5]] = (1e-3 * second) ** 2 / 3
+        trails.extend("right", "first", drawn(SQUARE, second * 1_000_000_000, covariance), float(second))
+    found = trails.sigmas("right")
+    assert list(found) == ["vertex 3"]
+    np.testing.assert_allclose(found["vertex 3"], np.arange(29, 90)[:, None].repeat(2, axis=1))
+    assert trails.sigmas("left") == {}
+    trails.forget()
+    assert trails.sigmas("right") == {}
 
 
 def test_nothing_is_drawn_across_a_gap(trails):
