@@ -1,4 +1,4 @@
-"""When a supervisor gives up a process, and how long it waits for one."""
+"""Limits of a supervisor: when it gives up a process, and how long it waits for one."""
 
 from dataclasses import dataclass
 
