@@ -5,6 +5,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 
+from abs_service.capture.delivery_rate import DeliveryRate
 from abs_service.capture.image_check import RepeatedImages, is_empty
 from drivers.contract.capabilities import StreamInfo
 from drivers.contract.device import DeviceState, Sink
@@ -47,6 +48,7 @@ class StallDetector:
         self.on_truth = sink.on_truth
         self._heads = heads
         self._streams = {stream.key: stream for stream in streams if stream.sensor in heads}
+        self._delivery_rate = DeliveryRate(self._streams)
         self._clock = clock
         self._first_epoch = first_epoch
         self._repeated_images = repeated_images
@@ -66,6 +68,8 @@ class StallDetector:
         if sensor is None:
             self._counters["unwanted"] += 1
             return
+        if frame.key in self._streams:
+            self._delivery_rate.add(frame.key, self._clock())
         empty = is_empty(frame)
         self._note_content(frame, empty)
         if self._is_repeated(frame, empty):
@@ -113,6 +117,8 @@ class StallDetector:
         if self.state[0] != DeviceState.STREAMING:
             return self.state
         now_ns = self._clock()
+        for (sensor, name), slow in self._delivery_rate.look(now_ns):
+            self.on_warning(f"{sensor}/{name} rate", slow and f"{sensor}/{name}: {slow}")
         verdict = self.state
         for key, stream in self._streams.items():
             silent_ns = now_ns - self._latest_ns.get(key, now_ns)

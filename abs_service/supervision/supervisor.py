@@ -160,7 +160,7 @@ class Supervisor:
             return
         started = {"component": child.component, "child": child.process.pid, "restarts": child.restarts}
         _log.info("%s is started", child.component, extra={"fields": started})
-        child.lacks &= child.exit_code == Exit.USER  # whether its files are right by now, its health tells
+        child.lacks = child.awaits_correction  # whether its files are right by now, its health tells
         child.state, child.starts = ChildState.RUNNING, child.starts + 1
         child.reason = child.reason if child.lacks else ""
         child.started_ns, child.threads, child.looked_at = now_ns, {}, {}

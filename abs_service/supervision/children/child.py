@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 from abs_service.supervision.children.child_process import NO_PROCESS, Process, ThreadTimes, longest_wait_ns
+from abs_service.supervision.exit_codes import Exit
 from abs_service.supervision.process_setup import log_lines
 
 #: A label of the health of `run` for each process, after which the component's name follows: its state, and why.
@@ -80,6 +81,11 @@ class Child:
     def condition(self) -> str:
         """State and its reason, in words."""
         return f"{self.state.value}: {self.reason}" if self.reason else self.state.value
+
+    @property
+    def awaits_correction(self) -> bool:
+        """True if a file of it was wrong when it started again, which somebody has to put right."""
+        return self.lacks and self.exit_code == Exit.USER
 
     def waited_ns(self, now_ns: int) -> int:
         """Longest time that one of its threads has waited for a processor since its last health [ns]."""

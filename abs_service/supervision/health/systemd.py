@@ -57,9 +57,11 @@ class Notifier:
         due = self._watchdog_ns and view.now_ns - self._proven_ns >= self._watchdog_ns // 4
         # Each tracker by itself: one that works does not hide another one that does not. One that was started again for
         # another configuration may compile kernels for longer than systemd waits; the supervisor limits that.
-        if due and all(
+        proven = all(
             view.live.prepares(f"track/{name}") or count != self._proven.get(name) for name, count in counts.items()
-        ):
+        )
+        # A service that is started anew with a wrong file ends for good; this one goes on when the file is put right.
+        if due and (proven or any(child.awaits_correction for child in view.children)):
             self._proven, self._proven_ns = counts, view.now_ns
             self._send("WATCHDOG=1")
 

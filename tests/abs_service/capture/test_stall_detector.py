@@ -105,6 +105,39 @@ def test_images_in_which_nothing_is_are_counted_and_told_and_are_no_stall(data):
     assert camera.detector.take_warnings() == {"head/depth empty": ""}
 
 
+@pytest.mark.parametrize(("share", "told"), [(1, False), (2, False), (3, True)])
+def test_a_stream_with_far_fewer_images_than_promised_is_told_until_they_come(share, told):
+    camera = Camera()
+    told_now = show_every(camera, share, 11)
+    text = "head/depth: 10.0 of 30 images a second; see its cable, its port and its exposure"
+    assert told_now == {"head/depth rate": text if told else ""}
+    assert show_every(camera, 1, 11) == {"head/depth rate": ""}
+
+
+def test_a_process_that_stood_still_does_not_blame_the_camera():
+    camera = Camera()
+    show_every(camera, 1, 3)
+    camera.now_ns += 4 * 10**9
+    camera.detector.on_frame(image(noisy(1)))
+    camera.now_ns += 4 * 10**9
+    assert camera.detector.check()[0] is not DeviceState.FAILED
+    assert show_every(camera, 1, 9) == {}
+    assert show_every(camera, 1, 2) == {"head/depth rate": ""}
+
+
+def show_every(camera, share, seconds):
+    """One of so many images, for some seconds; the warnings."""
+    warnings = {}
+    for period in range(seconds * 30):
+        if period % share == 0:
+            camera.show(noisy(camera.now_ns), periods=1)
+        else:
+            camera.now_ns += PERIOD_NS
+        assert camera.detector.check()[0] is DeviceState.STREAMING
+        warnings |= camera.detector.take_warnings()
+    return warnings
+
+
 def test_an_image_with_one_measurement_is_not_empty():
     data = np.full((48, 64), np.nan, "<f4")
     data[31, 43] = 1.5

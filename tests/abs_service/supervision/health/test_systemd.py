@@ -1,11 +1,8 @@
-"""Notifications to systemd, over a real datagram socket and with a clock of the test; and the unit file."""
+"""Notifications to systemd, over a real datagram socket and with a clock of the test."""
 
 import os
-import re
-import shutil
 import signal
 import socket
-import subprocess
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -14,13 +11,14 @@ import pytest
 from absmsg.v1.health_pb2 import Health
 
 from abs_service.bus.contract import Sample
+from abs_service.supervision.children.child import Child
+from abs_service.supervision.exit_codes import Exit
 from abs_service.supervision.health import systemd
 from abs_service.supervision.health.rig_state import RigState
 from abs_service.supervision.health.rig_view import RigView
 from abs_service.tracking.log.tracker_log import EstimateReport
 
 S = 1_000_000_000
-UNIT = Path(__file__).parents[4] / "docker" / "abs-service@.service"
 
 
 class Manager:
@@ -31,7 +29,7 @@ class Manager:
         self._socket.bind(str(folder / "notify"))
         address = {"NOTIFY_SOCKET": str(folder / "notify"), "WATCHDOG_USEC": "40000000"}
         self.notifier = systemd.notifier(address | environment)
-        self.now_ns = 0
+        self.now_ns, self.children = 0, ()
         self.live = RigState(trackers, lambda: self.now_ns)
 
     def received(self):
@@ -54,7 +52,7 @@ class Manager:
     def after(self, seconds):
         """Messages sent until then, without the status texts."""
         self.now_ns += int(seconds * S)
-        self.notifier.update(RigView("demo", "", Path(), self.live, (), 0.0, self.now_ns, ""))
+        self.notifier.update(RigView("demo", "", Path(), self.live, self.children, 0.0, self.now_ns, ""))
         return [message for message in self.received() if not message.startswith("STATUS=")]
 
     def close(self):
@@ -125,6 +123,18 @@ def test_a_tracker_that_compiles_kernels_again_is_alive(start):
         manager.estimates("a")
         fed += [second for message in manager.after(1) if message == "WATCHDOG=1"]
     assert fed == list(range(10, 91, 10))
+
+
+def test_a_rig_that_waits_for_a_right_file_is_not_ended(start):
+    manager = start("sheet")
+    manager.says("track/sheet")
+    manager.estimates("sheet")
+    assert manager.after(1) == ["READY=1", "WATCHDOG=1"]
+    assert not manager.after(60)
+    manager.children = (Child("capture", (), 0, lacks=True, exit_code=Exit.USER),)
+    assert manager.after(20) == ["WATCHDOG=1"]
+    manager.children = (Child("capture", (), 0, lacks=True),)
+    assert not manager.after(20), "the host lacks something, which a new start may give back"
 
 
 def test_a_rig_without_trackers_lives_by_its_images(start):
@@ -219,28 +229,3 @@ def test_a_running_rig_tells_systemd_when_it_is_ready_alive_and_ending(launch, e
         assert process.wait(20) == 0
     order = [message for message in received if message in ("READY=1", "WATCHDOG=1", "STOPPING=1")]
     assert order == ["READY=1", *["WATCHDOG=1"] * (len(order) - 2), "STOPPING=1"]
-
-
-class TestTheUnit:
-    @pytest.fixture(autouse=True)
-    def analyze(self):
-        if shutil.which("systemd-analyze") is None:
-            pytest.skip("no systemd-analyze: it is in the package systemd")
-
-    def run(self, *arguments):
-        return subprocess.run(["systemd-analyze", *arguments], capture_output=True, text=True, timeout=60, check=False)
-
-    def test_its_exposure_is_at_most_two_and_a_half(self):
-        found = self.run("security", "--offline=true", "--no-pager", str(UNIT))
-        score = re.search(r"Overall exposure level for \S+: ([\d.]+)", found.stdout)
-        assert score, found.stderr
-        assert float(score[1]) <= 2.5
-
-    def test_systemd_understands_every_line(self, tmp_path):
-        program = tmp_path / "abs-service"
-        program.write_text("#!/bin/sh\n")
-        program.chmod(0o755)
-        copy = tmp_path / "abs-service@lab.service"
-        copy.write_text(UNIT.read_text().replace("/opt/abs-service/bin/abs-service", str(program)))
-        found = self.run("verify", "--man=no", str(copy))
-        assert (found.returncode, [line for line in found.stderr.splitlines() if "abs-service" in line]) == (0, [])
