@@ -39,8 +39,8 @@ class Shape(Enum):
 
     STRETCH = "measure rows and columns with a ruler, and print without scaling"
     SKEW = (
-        "measure both diagonals with a ruler, and print anew if they differ; otherwise the board was carried along while "
-        "a rolling shutter read the rows: hold it still"
+        "measure both diagonals with a ruler, and print anew if they differ; otherwise the board was carried along "
+        "while a rolling shutter read the rows: hold it still"
     )
     TAGS = "measure a tag and a gap with a ruler, and correct the description"
     BEND = "glue it onto a flat plate"
