@@ -99,6 +99,7 @@ def detect(target: Target, image: Image, largest_saturated: float = MAX_SATURATE
     _check_saturation(quality.saturated_fraction(target, ids, pixels, image), largest_saturated)
     _check_sharp(edge, narrow, spacing, has_markers=isinstance(target, Charuco | AprilGrid))
     if isinstance(target, Circles | AsymmetricCircles):
+        pixels = ellipse.centers(target, ids, pixels, levels)
         pixels = pixels - ellipse.center_bias(target, ids, pixels)
     else:
         pixels, is_corner = saddle.refine(levels, pixels, int(np.clip(round(_REFINED * spacing), 2, 10)))

@@ -1,9 +1,10 @@
-"""Bias of a disc's image: its centre of area is not the image of the disc's centre, by perspective and by the lens."""
+"""Images of discs: their centres of area, and why these are not the images of the discs' centres."""
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from calib.board.corners.to_8bit import Grey
 from calib.board.target import AsymmetricCircles, Circles
 
 #: Largest degree of the polynomials that describe what a homography leaves, and least number of discs for each
@@ -13,7 +14,69 @@ _DEGREE, _FOR_EACH = 4, 3
 #: Number of points on the rim of a disc.
 _RIM = 32
 
+#: Area of a disc that is surely black, in radii, and of what is around it, in parts of the way to the next disc.
+_BLACK, _WHITE, _AROUND = 0.6, 0.15, 0.3
+
+#: Discs beside another one are as far away at most, in distances to the next.
+_BESIDE = 1.6
+
+#: Least radius of a disc that is black across many pixels, which noise can tear apart; the edges of others say all.
+_LARGE_PX = 6.0
+
+#: Darkness from which on a pixel counts, in deviations on black and white, and its range; as much below 1, it counts
+#: fully.
+_NOISE, _LEAST = 4.0, (0.1, 0.35)
+
+#: Largest tone of a disc, as part of the white around it, and largest distance of its centre from the one found, in
+#: radii.
+_DARK, _MOVED = 0.8, 0.3
+
 Array = NDArray[np.float64]
+
+
+def centers(target: Circles | AsymmetricCircles, ids: NDArray[np.intp], pixels: Array, levels: Grey) -> Array:
+    """Centres of area of discs (n, 2) [px], from those that a search found (n, 2).
+
+    A search by thresholds takes noise on black for parts of discs, which moved centres by up to 0.8 px. Here pixels
+    count by how dark they are beside the black and the white of their own disc; what is nearly one of these is it.
+    """
+    points, found, radius = target.points()[ids, :2], pixels.copy(), target.diameter / 2
+    away = np.linalg.norm(points[:, None] - points, axis=2) / radius
+    to_next = np.partition(away, 1, axis=1)[:, 1].min()
+    white, around = (1 + share * (to_next - 2) for share in (_WHITE, _AROUND))
+    for index, distances in enumerate(away):
+        beside = distances < _BESIDE * to_next  # through a fisheye, only those tell how large a disc is
+        along, _, rank, _ = np.linalg.lstsq(points[beside] - points[index], pixels[beside] - pixels[index], rcond=None)
+        if rank == len(along):
+            found[index] = _center(levels, pixels[index], radius * along.T, white, around)
+    return found
+
+
+def _center(levels: Grey, start: Array, axes: Array, white: float, around: float) -> Array:
+    """Centre of one disc (2,), whose radii along the board are `axes` (2, 2) [px]; `start` where it cannot be told."""
+    if np.linalg.svd(axes, compute_uv=False)[-1] < _LARGE_PX:
+        return start
+    reach = np.ceil(around * np.linalg.norm(axes, axis=1)) + 1
+    low = np.maximum(np.floor(start - reach), 0).astype(int)
+    high = np.minimum(np.ceil(start + reach) + 1, levels.shape[::-1]).astype(int)
+    rows, columns = np.mgrid[low[1] : high[1], low[0] : high[0]]
+    places = np.stack([columns.ravel(), rows.ravel()], axis=1) - start
+    tones = levels[low[1] : high[1], low[0] : high[0]].ravel().astype(np.float64)
+    away = np.linalg.norm(np.linalg.solve(axes, places.T), axis=0)
+    plane = np.column_stack([np.ones(len(places)), places])
+    is_white = (away > white) & (away < around)
+    if is_white.sum() < len(plane.T) or not np.any(away < _BLACK):
+        return start
+    bright = np.maximum(plane @ np.linalg.lstsq(plane[is_white], tones[is_white], rcond=None)[0], 1.0)
+    dark = float(np.median((tones / bright)[away < _BLACK]))
+    if dark > _DARK:
+        return start
+    darkness = (1 - tones / bright) / (1 - dark)
+    noise = max(np.std(darkness[is_white]), np.std(darkness[away < _BLACK]))
+    least = float(np.clip(_NOISE * noise, *_LEAST))
+    shares = np.clip((darkness - least) / (1 - 2 * least), 0, 1) * (away < around)
+    moved = shares @ places / shares.sum()
+    return start + moved if np.linalg.norm(np.linalg.solve(axes, moved)) < _MOVED else start
 
 
 def center_bias(target: Circles | AsymmetricCircles, ids: NDArray[np.intp], pixels: Array) -> Array:

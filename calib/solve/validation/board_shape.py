@@ -38,7 +38,10 @@ class Shape(Enum):
     """Kinds of errors, each with what to do."""
 
     STRETCH = "measure rows and columns with a ruler, and print without scaling"
-    SKEW = "measure both diagonals with a ruler, and print anew"
+    SKEW = (
+        "measure both diagonals with a ruler, and print anew if they differ; otherwise the board was carried along "
+        "while a rolling shutter read the rows: hold it still"
+    )
     TAGS = "measure a tag and a gap with a ruler, and correct the description"
     BEND = "glue it onto a flat plate"
 

@@ -18,7 +18,7 @@ from calib.solve.bundle.further import further
 from calib.solve.solution import Solution
 from calib.solve.validation.board_shape import CERTAIN, bends, effect_px
 
-#: Motions that change projections by this share of what is needed are named; stills of real boards have less.
+#: Motions that change projections by this share of what is needed are named.
 NOTICED = 0.25
 
 #: Size of the motions that columns of the equations stand for [m].
@@ -56,19 +56,14 @@ class Motion:
         )
 
 
-def motions(solution: Solution, distance: float, needed_px: float) -> list[Motion]:
-    """The surest motion of those that are certain and matter, if any.
+def motions(solution: Solution, distance: float) -> list[Motion]:
+    """The surest motion of those that are certain, if any; smaller effects make projections known worse.
 
     Args:
         solution: from all shots.
         distance: of the scene [m].
-        needed_px: required accuracy of projections [px].
     """
-    found = [
-        one
-        for one in _estimates(solution, distance)
-        if abs(one.size) > CERTAIN * one.sigma and one.effect_px > NOTICED * needed_px
-    ]
+    found = [one for one in _estimates(solution, distance) if one.certainty > CERTAIN]
     return sorted(found, key=lambda one: -one.certainty)[:1]
 
 

@@ -13,8 +13,8 @@ from calib.solve.validation.cross_validation import Agreement, TooFewToSplitErro
 from calib.solve.validation.free_shape import free_shape
 from calib.solve.validation.other_lens import other_lenses, undescribed
 from calib.solve.validation.projection_uncertainty import UncertaintyMap
-from calib.solve.validation.rolling_shutter import motions
-from calib.solve.validation.square_pixels import not_square
+from calib.solve.validation.rolling_shutter import NOTICED, Motion, motions
+from calib.solve.validation.square_pixels import doubts, not_square, remarks
 from calib.solve.validation.unlike_shots.changes import unseen
 from calib.solve.validation.unlike_shots.contradictions import Contradiction, outliers
 from calib.solve.validation.unlike_shots.findings import unlike_shots
@@ -85,7 +85,9 @@ def assess(
         for target in solution.task.sensors
         if target != source
     }
-    shared = [*shape_errors(solution, distance, needed_px), *motions(solution, distance, needed_px)]
+    moved, pixels = motions(solution, distance), not_square(solution, distance)
+    motion = [one for one in moved if one.effect_px > NOTICED * needed_px]
+    shared = [*shape_errors(solution, distance, needed_px), *motion]
     free = free_shape(solution)
     unlike = unlike_shots(free, shared, needed_px)
     reasons, contradicting = [*unlike.reasons], unlike.contradicting
@@ -93,20 +95,23 @@ def assess(
     reasons += weak_directions(solution, distance)
     reasons += outliers(solution, {one.shot for one in contradicting})
     reasons += undescribed(solution, needed_px)
-    reasons += not_square(solution)
+    reasons += doubts(pixels, needed_px)
     try:
         agreements = cross_validate(solution, distance, note, half)
         reasons += _disagreeing(agreements, needed_px)
     except TooFewToSplitError as error:
         agreements = []
         reasons.append(f"two halves could not be compared: {error}")
-    known = {of: field.rms * RADIUS_95 * _excess(of, agreements) for of, field in {**images, **pairs}.items()}
+    known = {
+        of: RADIUS_95 * float(np.hypot(field.rms * _excess(of, agreements), _bias(of, moved)))
+        for of, field in {**images, **pairs}.items()
+    }
     reasons += _uncertain(known, needed_px)
     reasons += _narrow(solution, images)
     reasons += [str(one) for one in shared if one.is_bend]  # why the halves may differ
     reasons = [*other_lenses(solution), *unlike.causes, *reasons] if reasons else []
     kept = [name for name, sensor in solution.task.sensors.items() if sensor.fixed_intrinsics]
-    praise = _praise(agreements, images, known, distance) + unseen(unseen_change(free)) + _given(kept)
+    praise = _praise(agreements, images, known, distance) + remarks(pixels) + unseen(unseen_change(free)) + _given(kept)
     verdict = f"Do not trust it yet: {reasons[0]}" if reasons else praise
     return Assessment(not reasons, verdict, reasons, contradicting, agreements, images, pairs, distance)
 
@@ -114,6 +119,11 @@ def assess(
 def _excess(of: str, agreements: Sequence[Agreement]) -> float:
     """Factor by which a projection is known worse than its deviation says, as the halves differ beyond chance."""
     return max((each.ratio for each in agreements if each.of == of and each.ratio > MAX_RATIO), default=1.0)
+
+
+def _bias(of: str, moved: Sequence[Motion]) -> float:
+    """Deviation of a coordinate in a sensor's image by motions, which are in no covariance [px]."""
+    return sum(one.effect_px for one in moved if one.sensor == of) / np.sqrt(2)
 
 
 def _praise(
