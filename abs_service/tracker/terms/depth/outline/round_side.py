@@ -23,9 +23,9 @@ _CERTAIN_SINE, _GROWING_SINE, _LEAST_MEASURED = 0.95, 0.85, 0.65
 #: an end meets a silhouette, its corner wanders as well.
 _NEIGHBOURS, _BESIDE = 7, 5
 
-#: A body that turns away on one side does so on the other: a side that may be round is if more than `_NEIGHBOURS` round
-#: edges face against it, up to 45°, as the cosine tells.
-_OPPOSITE = 0.7
+#: A body that turns away at so many edges as `_BESIDE` does so along its whole side, and on the opposite one: edges
+#: that face the same way or against it, up to 45°, are round as the cosine tells, if they are measured to be steep.
+_PARALLEL = 0.7
 
 
 def is_round_side(
@@ -63,19 +63,14 @@ def is_round_side(
     at_near, at_far = (centers[1:] + centers[:-1]) / 2
     extrapolated = near + (near - far) * at_near / (at_far - at_near)
     both = _smoothed(np.stack([near, extrapolated], axis=1), near_by)
-    may_be = (both[:, 0] > _LEAST_MEASURED) & (both[:, 1] > _GROWING_SINE)
+    is_steep = both[:, 0] > _LEAST_MEASURED
+    may_be = is_steep & (both[:, 1] > _GROWING_SINE)
     is_round, beside = may_be & (both[:, 1] > _CERTAIN_SINE), near_by[:, :_BESIDE]
-    is_round = _grown(is_round, may_be, beside)
-    across = inwards @ inwards[is_round].T < -_OPPOSITE
-    is_round |= may_be & (np.count_nonzero(across, axis=1) > _NEIGHBOURS)
-    return np.asarray(_grown(is_round, may_be, beside)[beside].any(axis=1))
-
-
-def _grown(is_round: NDArray[np.bool_], may_be: NDArray[np.bool_], beside: NDArray[np.intp]) -> NDArray[np.bool_]:
-    """The round edges (k,), and those beside them (k, count) that may be round, and so on."""
-    for _ in may_be:
-        is_round = is_round | (may_be & is_round[beside].any(axis=1))
-    return is_round
+    for _ in places:
+        is_round |= may_be & is_round[beside].any(axis=1)
+    parallel = np.abs(inwards @ inwards[is_round].T) > _PARALLEL
+    is_round |= is_steep & (np.count_nonzero(parallel, axis=1) >= _BESIDE)
+    return np.asarray(is_round[beside].any(axis=1))
 
 
 def _smoothed(values: NDArray[np.float64], near_by: NDArray[np.intp]) -> NDArray[np.float64]:

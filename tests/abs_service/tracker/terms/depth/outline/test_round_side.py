@@ -63,7 +63,7 @@ def test_a_plain_roll_may_turn_about_its_axis_unseen(half_angle: float, expected
 
 
 @pytest.mark.parametrize(("right", "expected"), [(np.pi / 2, True), (np.deg2rad(50), False)])
-def test_a_side_that_may_be_round_is_if_the_opposite_one_is(right: float, expected: bool):
+def test_a_steep_side_is_round_if_the_opposite_one_is(right: float, expected: bool):
     """The left one ends at 50°; a coarse image shows a silhouette so."""
     rows, left = np.arange(90, 150, 6), picture(np.deg2rad(50), sigma=0)
     distance, on = (
