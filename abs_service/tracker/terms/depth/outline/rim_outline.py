@@ -107,7 +107,14 @@ class RimOutline:
             off_px=off_px,
             doubtful=doubtful,
             kernel=self._kernel,
+            classes=self._of_vertices(predicted.vertices.shape[2], is_cut),
         )
+
+    def _of_vertices(self, count: int, is_cut: NDArray[np.bool_]) -> bytes:
+        """Classes of all `count` vertices, as in `RimFit`; edges (k,) that are cut now end at a border."""
+        found = np.zeros(count, np.uint8)
+        found[self._rim.outer] = 1 + np.where(is_cut, np.uint8(RimClass.BORDER), self.classes)
+        return found.tobytes()
 
     def _classify(self, image: OutlineImage, predicted: Surface, distance: NDArray[np.float32]) -> None:
         """Finds the free edges in the first image, and the gaps between them and the end of the object."""
