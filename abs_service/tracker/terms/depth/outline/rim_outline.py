@@ -76,8 +76,7 @@ class RimOutline:
         window: Window = WHOLE,
     ) -> ObservedRimOutline:
         """See `Outline`."""
-        deviation = self._raggedness.deviation
-        off_px = max(self._min_off_px, self._raggedness.off_px)
+        deviation, off_px = self._raggedness.deviation, max(self._min_off_px, self._raggedness.off_px)
         part, away = inwards(distance, seen, int(np.ceil(FARTHEST * deviation)) + 1)
         first = np.add(corner(window), corner(part))[::-1].astype(np.float32)
         image = OutlineImage(self._camera, self._projection, away, first)
