@@ -161,6 +161,7 @@ def mesh(header: common_pb2.Header, estimate: Estimate, identity: Identity) -> d
         mesh_version=identity.mesh_version,
         vertices_f32=estimate.vertices.astype("<f4").tobytes(),
         covariance_f32=_upper(estimate.vertex_covariance) if _is_known(estimate) else b"",
+        rim_classes_u8=next((fit.rim.classes for fit in estimate.fits if fit.rim.classes), b""),
     )
 
 

@@ -70,6 +70,8 @@ def _check_mesh(mesh: DeformedMesh) -> None:
     vertices = _points("vertices_f32", mesh.vertices_f32)
     covariances = len(mesh.covariance_f32)
     _require(covariances in (0, 24 * vertices), f"{covariances} bytes are not {vertices} covariances")
+    classes = len(mesh.rim_classes_u8)
+    _require(classes in (0, vertices), f"{classes} rim classes are not those of {vertices} vertices")
 
 
 def _check_topology(topology: MeshTopology) -> None:

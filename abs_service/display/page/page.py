@@ -133,8 +133,7 @@ class Page:
 
     def _mesh_view(self, mesh: DeformedMesh, with_image: bool) -> MeshView | None:
         """View of a mesh to draw; None as long as its faces are unknown."""
-        topology = self._feed.topology(mesh)
-        if topology is None:
+        if (topology := self._feed.topology(mesh)) is None:
             return None
         measured, camera = np.empty((0, 0)), None
         for topic in self._feed.streams() if with_image else ():
@@ -149,6 +148,7 @@ class Page:
             np.frombuffer(mesh.covariance_f32, "<f4").reshape(-1, 6).astype(float),
             measured,
             camera,
+            mesh.rim_classes_u8,
         )
 
     def _camera(self, frame: Frame) -> Camera | None:
@@ -159,7 +159,7 @@ class Page:
     def _draw_images(self) -> None:
         self._scene.show_cameras(self._feed.cameras(), self._panel.shows[2])
         chosen = self._drawn.get(self._panel.tracker)
-        vertices, faces = joined(one.view for one in self._drawn.values())
+        vertices, faces, classes = joined(one.view for one in self._drawn.values())
         for topic in self._feed.streams():
             found = self._feed.frame(topic, chosen.exposure_ns if chosen else 0)
             if found is None or (camera := self._camera(found[0])) is None:
@@ -171,7 +171,7 @@ class Page:
                 measured = self._measured[frame.sensor] = Measured(pictures.radial(frame, camera), camera)
                 points_r, _, spacing_m = pictures.cloud(measured.distance, camera)
                 self._scene.show_points(frame.sensor, points_r, spacing_m, stale, self._panel.shows[1])
-            drawn = pictures.with_mesh(pictures.grey(image) if stale else image, camera, vertices, faces)
+            drawn = pictures.with_mesh(pictures.grey(image) if stale else image, camera, vertices, faces, classes)
             name = topic.removesuffix("/image")
             self._panel.show_image(name, words.stream(name, age_s, self._feed.image_rate_hz(topic)), drawn)
             if frame.kind == Kind.DEPTH:

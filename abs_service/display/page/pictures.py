@@ -22,7 +22,11 @@ WIDTH, POINTS = 480, 20_000
 #: Percentiles of an image's values at the ends of its colours.
 SHOWN_PERCENT = (1, 99)
 
-MESH, RIM, NO_RETURN = (255, 255, 255), (0, 230, 160), (22, 37, 110)
+MESH, NO_RETURN = (255, 255, 255), (22, 37, 110)
+
+#: Colours of the rim by `DeformedMesh.rim_classes_u8`: green where it is a free edge or unknown, orange for contact,
+#: violet for a silhouette, grey for what is occluded, and blue for a border of the image.
+RIM = ((0, 230, 160), (0, 230, 160), (255, 150, 30), (200, 110, 255), (170, 170, 170), (60, 150, 255))
 
 _BAYER = {
     "bayer_rggb8": cv2.COLOR_BayerRGGB2RGB,
@@ -91,7 +95,13 @@ def picture(frame: Frame) -> Picture:
     return np.asarray(colored, np.uint8)
 
 
-def with_mesh(image: Picture, camera: Camera, vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> Picture:
+def with_mesh(
+    image: Picture,
+    camera: Camera,
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int32],
+    classes: NDArray[np.uint8] | None = None,
+) -> Picture:
     """A picture `WIDTH` pixels wide, with the edges of a mesh and its rim drawn over it.
 
     Args:
@@ -99,6 +109,7 @@ def with_mesh(image: Picture, camera: Camera, vertices: NDArray[np.float64], fac
         camera: that took it.
         vertices: positions (n, 3) [m] in rig coordinates.
         faces: vertex indices (m, 3); none draws nothing.
+        classes: of the rim, for each vertex (n,); none draws it in one colour.
     """
     drawn = _enlarged(image)
     if not len(faces):
@@ -108,7 +119,12 @@ def with_mesh(image: Picture, camera: Camera, vertices: NDArray[np.float64], fac
     lines = drawn.copy()
     cv2.polylines(lines, list(corners[edges[within[edges].all(axis=1)]]), False, MESH, 1, cv2.LINE_AA, 4)
     drawn = cv2.addWeighted(drawn, 0.6, lines, 0.4, 0)
-    cv2.polylines(drawn, list(corners[rim[within[rim].all(axis=1)]]), False, RIM, 2, cv2.LINE_AA, 4)
+    rim = rim[within[rim].all(axis=1)]
+    # Corners of the mesh have no class of their own.
+    of_edges = np.zeros(len(rim), np.uint8) if classes is None else classes[rim].max(axis=1)
+    of_edges[of_edges >= len(RIM)] = 0  # of a later version
+    for number, color in enumerate(RIM):
+        cv2.polylines(drawn, list(corners[rim[of_edges == number]]), False, color, 2, cv2.LINE_AA, 4)
     return np.asarray(drawn, np.uint8)
 
 

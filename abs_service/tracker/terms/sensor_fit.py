@@ -28,6 +28,8 @@ class RimFit:
         occluded: on free edges, but not visible.
         covered: on edges that something hid in the first image, or that its border cut.
         uncovered: of these, measured surface of the object now continues beyond the mesh.
+        classes: a byte for each vertex of the mesh (n,): 0 inside it or unknown, else 1 and its `RimClass`; none if no
+            outline is known.
     """
 
     visible: int = 0
@@ -37,6 +39,7 @@ class RimFit:
     occluded: int = 0
     covered: int = 0
     uncovered: int = 0
+    classes: bytes = b""
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,7 +25,7 @@ _sym_db = _symbol_database.Default()
 from absmsg.v1 import common_pb2 as absmsg_dot_v1_dot_common__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1d\x61\x62smsg/v1/deformed_mesh.proto\x12\tabsmsg.v1\x1a\x16\x61\x62smsg/v1/common.proto\"\x86\x01\n\x0c\x44\x65\x66ormedMesh\x12!\n\x06header\x18\x01 \x01(\x0b\x32\x11.absmsg.v1.Header\x12\x0f\n\x07tracker\x18\x02 \x01(\t\x12\x14\n\x0cmesh_version\x18\x03 \x01(\x04\x12\x14\n\x0cvertices_f32\x18\x04 \x01(\x0c\x12\x16\n\x0e\x63ovariance_f32\x18\x05 \x01(\x0c\"\xc0\x01\n\x0cMeshTopology\x12!\n\x06header\x18\x01 \x01(\x0b\x32\x11.absmsg.v1.Header\x12\x0f\n\x07tracker\x18\x02 \x01(\t\x12\x14\n\x0cmesh_version\x18\x03 \x01(\x04\x12\x19\n\x11rest_vertices_f32\x18\x04 \x01(\x0c\x12\x11\n\tfaces_u32\x18\x05 \x01(\x0c\x12\x11\n\tcolors_u8\x18\x06 \x01(\x0c\x12%\n\x05\x62\x61sis\x18\x07 \x01(\x0b\x32\x16.absmsg.v1.VertexBasis\"\x8b\x01\n\x0bVertexBasis\x12\x0f\n\x07support\x18\x01 \x01(\r\x12\x1a\n\x12\x63ontrol_points_u16\x18\x02 \x01(\x0c\x12\x11\n\tvalue_f32\x18\x03 \x01(\x0c\x12\x13\n\x0b\x61long_u_f32\x18\x04 \x01(\x0c\x12\x13\n\x0b\x61long_w_f32\x18\x05 \x01(\x0c\x12\x12\n\noffset_f32\x18\x06 \x01(\x0c\x62\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1d\x61\x62smsg/v1/deformed_mesh.proto\x12\tabsmsg.v1\x1a\x16\x61\x62smsg/v1/common.proto\"\x9e\x01\n\x0c\x44\x65\x66ormedMesh\x12!\n\x06header\x18\x01 \x01(\x0b\x32\x11.absmsg.v1.Header\x12\x0f\n\x07tracker\x18\x02 \x01(\t\x12\x14\n\x0cmesh_version\x18\x03 \x01(\x04\x12\x14\n\x0cvertices_f32\x18\x04 \x01(\x0c\x12\x16\n\x0e\x63ovariance_f32\x18\x05 \x01(\x0c\x12\x16\n\x0erim_classes_u8\x18\x06 \x01(\x0c\"\xc0\x01\n\x0cMeshTopology\x12!\n\x06header\x18\x01 \x01(\x0b\x32\x11.absmsg.v1.Header\x12\x0f\n\x07tracker\x18\x02 \x01(\t\x12\x14\n\x0cmesh_version\x18\x03 \x01(\x04\x12\x19\n\x11rest_vertices_f32\x18\x04 \x01(\x0c\x12\x11\n\tfaces_u32\x18\x05 \x01(\x0c\x12\x11\n\tcolors_u8\x18\x06 \x01(\x0c\x12%\n\x05\x62\x61sis\x18\x07 \x01(\x0b\x32\x16.absmsg.v1.VertexBasis\"\x8b\x01\n\x0bVertexBasis\x12\x0f\n\x07support\x18\x01 \x01(\r\x12\x1a\n\x12\x63ontrol_points_u16\x18\x02 \x01(\x0c\x12\x11\n\tvalue_f32\x18\x03 \x01(\x0c\x12\x13\n\x0b\x61long_u_f32\x18\x04 \x01(\x0c\x12\x13\n\x0b\x61long_w_f32\x18\x05 \x01(\x0c\x12\x12\n\noffset_f32\x18\x06 \x01(\x0c\x62\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -33,9 +33,9 @@ _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'absmsg.v1.deformed_mesh_pb2
 if not _descriptor._USE_C_DESCRIPTORS:
   DESCRIPTOR._loaded_options = None
   _globals['_DEFORMEDMESH']._serialized_start=69
-  _globals['_DEFORMEDMESH']._serialized_end=203
-  _globals['_MESHTOPOLOGY']._serialized_start=206
-  _globals['_MESHTOPOLOGY']._serialized_end=398
-  _globals['_VERTEXBASIS']._serialized_start=401
-  _globals['_VERTEXBASIS']._serialized_end=540
+  _globals['_DEFORMEDMESH']._serialized_end=227
+  _globals['_MESHTOPOLOGY']._serialized_start=230
+  _globals['_MESHTOPOLOGY']._serialized_end=422
+  _globals['_VERTEXBASIS']._serialized_start=425
+  _globals['_VERTEXBASIS']._serialized_end=564
 # @@protoc_insertion_point(module_scope)

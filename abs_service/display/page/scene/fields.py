@@ -29,6 +29,7 @@ class MeshView:
         covariance: of every vertex, (n, 6) [m²]: xx, xy, xz, yy, yz, zz; (0, 6) if unknown.
         measured: radial distances (height, width) [m] of its exposure, NaN without return; (0, 0) if there are none.
         camera: of that image; None if there is none.
+        rim: classes of the vertices (n,), see `DeformedMesh.rim_classes_u8`; none if they are unknown.
     """
 
     vertices: NDArray[np.float64]
@@ -37,6 +38,7 @@ class MeshView:
     covariance: NDArray[np.float64]
     measured: NDArray[np.floating]
     camera: Camera | None
+    rim: bytes = b""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,14 +56,15 @@ class ShownMesh:
     state: object
 
 
-def joined(views: Iterable[MeshView]) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
-    """Vertices (n, 3) [m] and faces (m, 3) of several meshes as one."""
-    vertices, faces, number = [np.empty((0, 3))], [np.empty((0, 3), np.int32)], 0
+def joined(views: Iterable[MeshView]) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.uint8]]:
+    """Vertices (n, 3) [m], faces (m, 3) and classes of the rim (n,) of several meshes as one."""
+    vertices, faces, classes, number = [np.empty((0, 3))], [np.empty((0, 3), np.int32)], [np.empty(0, np.uint8)], 0
     for view in views:
         vertices.append(view.vertices)
         faces.append(view.faces + np.int32(number))
+        classes.append(np.frombuffer(view.rim or bytes(len(view.vertices)), np.uint8))
         number += len(view.vertices)
-    return np.concatenate(vertices), np.concatenate(faces)
+    return np.concatenate(vertices), np.concatenate(faces), np.concatenate(classes)
 
 
 def displacement(view: MeshView) -> Values:

@@ -43,7 +43,7 @@ class Trails:
             meshes: by tracker.
             ray: in rig coordinates.
         """
-        vertices, faces = joined(meshes.values())
+        vertices, faces, _ = joined(meshes.values())
         if not len(faces):
             return False
         edge_m = float(np.median(np.linalg.norm(vertices[faces[:, 0]] - vertices[faces[:, 1]], axis=1)))

@@ -71,9 +71,23 @@ def test_the_rim_is_drawn_where_the_camera_sees_it():
     drawn = pictures.with_mesh(np.zeros((48, 64, 3), np.uint8), CAMERA, corners, FACES)
     assert drawn.shape == (360, 480, 3)
     factor = pictures.WIDTH / 64
-    rim = np.argwhere((drawn == pictures.RIM).all(axis=2))
+    rim = np.argwhere((drawn == pictures.RIM[0]).all(axis=2))
     low, high = rim.min(axis=0), rim.max(axis=0)
     np.testing.assert_allclose([*low, *high], factor * (np.array([12, 16, 36, 48]) + 0.5) - 0.5, atol=2)
+
+
+def test_the_rim_has_the_colours_of_its_classes():
+    corners = plane_points()[[12, 12, 36, 36], [16, 48, 16, 48]]
+    image = np.zeros((48, 64, 3), np.uint8)
+    colors = []
+    for number in range(6):
+        classes = np.array([number, number, 0, 0], np.uint8)  # of the side above, and what meets it
+        drawn = pictures.with_mesh(image, CAMERA, corners, FACES, classes)
+        colors.append({tuple(color) for color in drawn.reshape(-1, 3).tolist()} & {*pictures.RIM})
+    free, others = pictures.RIM[0], pictures.RIM[2:]
+    assert colors == [{free}, {free}, *({free, other} for other in others)]
+    unknown = pictures.with_mesh(image, CAMERA, corners, FACES, np.full(4, 99, np.uint8))
+    np.testing.assert_array_equal(unknown, pictures.with_mesh(image, CAMERA, corners, FACES))
 
 
 def test_what_is_behind_the_camera_is_not_drawn():

@@ -40,6 +40,7 @@ class ObservedRimOutline:
         off_px: an edge that is farther from the outline is off it [px].
         doubtful: pixels of the window (rows, columns) near the outline that are held against no vertex.
         kernel: `rim_cost` of the camera's lens.
+        classes: of every vertex, as in `RimFit`.
     """
 
     image: OutlineImage
@@ -53,6 +54,7 @@ class ObservedRimOutline:
     off_px: float
     doubtful: NDArray[np.bool_]
     kernel: Callable[..., None]
+    classes: bytes = b""
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
         """Cost (population,) of every deformed mesh."""
@@ -100,6 +102,7 @@ class ObservedRimOutline:
             occluded=self.hidden + int(np.count_nonzero(~known)),
             covered=len(outer),
             uncovered=int(np.count_nonzero(beyond > 0)),
+            classes=self.classes,
         )
 
     def _displacement(

@@ -76,8 +76,7 @@ class RimOutline:
         window: Window = WHOLE,
     ) -> ObservedRimOutline:
         """See `Outline`."""
-        deviation = self._raggedness.deviation
-        off_px = max(self._min_off_px, self._raggedness.off_px)
+        deviation, off_px = self._raggedness.deviation, max(self._min_off_px, self._raggedness.off_px)
         part, away = inwards(distance, seen, int(np.ceil(FARTHEST * deviation)) + 1)
         first = np.add(corner(window), corner(part))[::-1].astype(np.float32)
         image = OutlineImage(self._camera, self._projection, away, first)
@@ -107,7 +106,14 @@ class RimOutline:
             off_px=off_px,
             doubtful=doubtful,
             kernel=self._kernel,
+            classes=self._of_vertices(predicted.vertices.shape[2], is_cut),
         )
+
+    def _of_vertices(self, count: int, is_cut: NDArray[np.bool_]) -> bytes:
+        """Classes of all `count` vertices, as in `RimFit`; edges (k,) that are cut now end at a border."""
+        found = np.zeros(count, np.uint8)
+        found[self._rim.outer] = 1 + np.where(is_cut, np.uint8(RimClass.BORDER), self.classes)
+        return found.tobytes()
 
     def _classify(self, image: OutlineImage, predicted: Surface, distance: NDArray[np.float32]) -> None:
         """Finds the free edges in the first image, and the gaps between them and the end of the object."""

@@ -1,5 +1,7 @@
 """Quantities of a mesh's vertices and their colours."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -28,10 +30,12 @@ def view(vertices, faces, first=None, covariance=None, measured=None) -> MeshVie
 
 def test_several_meshes_are_drawn_as_one():
     vertices, faces = grid(lambda x, y: 1 + 0 * x)
-    both, sides = fields.joined([view(vertices, faces), view(vertices + 1.0, faces)])
+    known = replace(view(vertices + 1.0, faces), rim=bytes([3] * len(vertices)))
+    both, sides, classes = fields.joined([view(vertices, faces), known])
+    assert classes.tolist() == [0] * len(vertices) + [3] * len(vertices)
     np.testing.assert_array_equal(both[sides[len(faces) :]], vertices[faces] + 1.0)
     np.testing.assert_array_equal(both[sides[: len(faces)]], vertices[faces])
-    assert [part.shape for part in fields.joined([])] == [(0, 3), (0, 3)]
+    assert [part.shape for part in fields.joined([])] == [(0, 3), (0, 3), (0,)]
 
 
 def test_displacement_is_the_distance_from_the_first_pose():

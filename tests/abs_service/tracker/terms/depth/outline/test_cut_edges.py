@@ -7,6 +7,7 @@ from abs_service.tracker.synthesis.window import WHOLE
 from abs_service.tracker.terms.depth.classification.visibility import classify, surfaces_of
 from abs_service.tracker.terms.depth.outline.observed_outline import ObservedRimOutline
 from abs_service.tracker.terms.depth.outline.rim import Rim
+from abs_service.tracker.terms.depth.outline.rim_classes import RimClass
 from abs_service.tracker.terms.depth.outline.rim_outline import RimOutline
 from tests.abs_service.tracker.scenes import sparse
 from tests.abs_service.tracker.terms.depth.outline.outline_scene import CAMERA, MESH, begun, moved, picture
@@ -37,6 +38,16 @@ def test_a_free_edge_at_which_the_view_ends_is_cut_by_it_until_something_returns
         assert len(seen.edges.outer) == all_of_them - cut
         assert len(seen.covered.outer) == cut
         assert seen.fit(here).visible == all_of_them - cut
+
+
+def test_every_vertex_of_the_rim_has_its_class_and_what_is_cut_now_ends_at_a_border():
+    known, here, count = begun(ALONE), moved(MESH, 0.0), len(Rim.of(MESH).outer)
+    for beyond, cut in ((1000, 0), (RIGHT, OF_A_SIDE)):
+        classes = np.frombuffer(look(known, here, columns_from(beyond)).fit(here).classes, np.uint8)
+        assert len(classes) == len(MESH.vertices)
+        assert np.count_nonzero(classes == 1 + RimClass.BORDER) == cut
+        assert np.count_nonzero(classes == 1 + RimClass.FREE) == count - cut
+        assert set(np.flatnonzero(classes)) == set(Rim.of(MESH).outer)
 
 
 def test_it_stays_cut_while_the_mesh_slides_away_from_it_and_where_nothing_is_looked_at():
