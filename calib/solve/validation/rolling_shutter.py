@@ -6,7 +6,7 @@ explain most of it, so that neither residuals nor halves show it. One step of th
 large it is, beside a bend of the board, which looks like it in part.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -18,7 +18,7 @@ from calib.solve.bundle.further import further
 from calib.solve.solution import Solution
 from calib.solve.validation.board_shape import CERTAIN, bends, effect_px
 
-#: Motions that change projections by this share of what is needed are named.
+#: Motions that change projections by this share of what is needed matter.
 NOTICED = 0.25
 
 #: Size of the motions that columns of the equations stand for [m].
@@ -65,6 +65,11 @@ def motions(solution: Solution, distance: float) -> list[Motion]:
     """
     found = [one for one in _estimates(solution, distance) if one.certainty > CERTAIN]
     return sorted(found, key=lambda one: -one.certainty)[:1]
+
+
+def noticed(found: Sequence[Motion], needed_px: float) -> list[Motion]:
+    """Those that matter where projections are needed to `needed_px` [px]."""
+    return [one for one in found if one.effect_px > NOTICED * needed_px]
 
 
 def _estimates(solution: Solution, distance: float) -> Iterator[Motion]:

@@ -13,7 +13,7 @@ from calib.solve.validation.cross_validation import Agreement, TooFewToSplitErro
 from calib.solve.validation.free_shape import free_shape
 from calib.solve.validation.other_lens import other_lenses, undescribed
 from calib.solve.validation.projection_uncertainty import UncertaintyMap
-from calib.solve.validation.rolling_shutter import NOTICED, Motion, motions
+from calib.solve.validation.rolling_shutter import Motion, motions, noticed
 from calib.solve.validation.square_pixels import doubts, not_square, remarks
 from calib.solve.validation.unlike_shots.changes import unseen
 from calib.solve.validation.unlike_shots.contradictions import Contradiction, outliers
@@ -85,10 +85,8 @@ def assess(
         for target in solution.task.sensors
         if target != source
     }
-    moved, pixels = motions(solution, distance), not_square(solution, distance)
-    motion = [one for one in moved if one.effect_px > NOTICED * needed_px]
-    shared = [*shape_errors(solution, distance, needed_px), *motion]
-    free = free_shape(solution)
+    moved, pixels, free = motions(solution, distance), not_square(solution, distance), free_shape(solution)
+    shared = [*shape_errors(solution, distance, needed_px), *noticed(moved, needed_px)]
     unlike = unlike_shots(free, shared, needed_px)
     reasons, contradicting = [*unlike.reasons], unlike.contradicting
     reasons += exchanged(solution.cameras)
@@ -102,10 +100,7 @@ def assess(
     except TooFewToSplitError as error:
         agreements = []
         reasons.append(f"two halves could not be compared: {error}")
-    known = {
-        of: RADIUS_95 * float(np.hypot(field.rms * _excess(of, agreements), _bias(of, moved)))
-        for of, field in {**images, **pairs}.items()
-    }
+    known = _known({**images, **pairs}, agreements, moved)
     reasons += _uncertain(known, needed_px)
     reasons += _narrow(solution, images)
     reasons += [str(one) for one in shared if one.is_bend]  # why the halves may differ
@@ -116,13 +111,23 @@ def assess(
     return Assessment(not reasons, verdict, reasons, contradicting, agreements, images, pairs, distance)
 
 
+def _known(
+    fields: Mapping[str, UncertaintyMap], agreements: Sequence[Agreement], moved: Sequence[Motion]
+) -> dict[str, float]:
+    """Errors of projections that 95 % are below, by name [px]; motions are in no covariance."""
+    return {
+        of: RADIUS_95 * float(np.hypot(field.rms * _excess(of, agreements), _bias(of, moved)))
+        for of, field in fields.items()
+    }
+
+
 def _excess(of: str, agreements: Sequence[Agreement]) -> float:
     """Factor by which a projection is known worse than its deviation says, as the halves differ beyond chance."""
     return max((each.ratio for each in agreements if each.of == of and each.ratio > MAX_RATIO), default=1.0)
 
 
 def _bias(of: str, moved: Sequence[Motion]) -> float:
-    """Deviation of a coordinate in a sensor's image by motions, which are in no covariance [px]."""
+    """Deviation of a coordinate in a sensor's image by motions [px]."""
     return sum(one.effect_px for one in moved if one.sensor == of) / np.sqrt(2)
 
 

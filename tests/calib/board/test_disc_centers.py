@@ -27,7 +27,7 @@ def test_noise_on_black_moves_no_centre(target: Circles | AsymmetricCircles, see
     random = np.random.default_rng(seed)
     light = photograph(target, VGA, T_sb, black=0.08, white=0.8, noise=0.0, seed=seed)
     electrons = random.poisson(2500 * light) + random.normal(0, 5, light.shape)
-    found = detect(target, as_bytes(255 * np.clip(electrons / 2500, 0, 1) ** 0.45))
+    found = detect(target, as_bytes((255 * np.clip(electrons / 2500, 0, 1) ** 0.45).astype(np.float32)))
     points = transform(T_sb, target.points())
     places = points[:, :2] / points[:, 2:] * (VGA.fx, VGA.fy) + (VGA.cx, VGA.cy)
     errors = [np.linalg.norm(found.pixels - order[found.ids], axis=1).max() for order in (places, places[::-1])]
