@@ -105,12 +105,12 @@ def test_images_in_which_nothing_is_are_counted_and_told_and_are_no_stall(data):
     assert camera.detector.take_warnings() == {"head/depth empty": ""}
 
 
-@pytest.mark.parametrize(("share", "told"), [(1, False), (2, False), (3, True)])
-def test_a_stream_with_far_fewer_images_than_promised_is_told_until_they_come(share, told):
+@pytest.mark.parametrize(("share", "reported"), [(1, False), (2, False), (3, True)])
+def test_a_stream_with_far_fewer_images_than_promised_is_told_until_they_come(share, reported):
     camera = Camera()
-    told_now = show_every(camera, share, 11)
+    reported_now = show_every(camera, share, 11)
     text = "head/depth: 10.0 of 30 images a second; see its cable, its port and its exposure"
-    assert told_now == {"head/depth rate": text if told else ""}
+    assert reported_now == {"head/depth rate": text if reported else ""}
     assert show_every(camera, 1, 11) == {"head/depth rate": ""}
 
 

@@ -74,9 +74,9 @@ def test_the_covariance_of_every_vertex_travels_as_its_six_different_entries():
 def test_the_classes_of_the_rim_are_those_of_the_first_sensor_that_tells_them():
     assert estimate_messages.mesh(Header(), ESTIMATE, IDENTITY).rim_classes_u8 == b""
     fits = tuple(replace(fit, rim=RimFit(classes=one)) for fit, one in zip(ESTIMATE.fits, (b"", bytes([1, 0, 5]))))
-    told = replace(ESTIMATE, fits=(*fits, replace(ESTIMATE.fits[0], rim=RimFit(classes=bytes(3)))))
+    reported = replace(ESTIMATE, fits=(*fits, replace(ESTIMATE.fits[0], rim=RimFit(classes=bytes(3)))))
     expected = fits[1].rim.classes if len(fits) > 1 else bytes(3)
-    assert estimate_messages.mesh(Header(), told, IDENTITY).rim_classes_u8 == expected
+    assert estimate_messages.mesh(Header(), reported, IDENTITY).rim_classes_u8 == expected
 
 
 def test_every_sensor_is_named_with_what_it_contributed_and_what_was_lost():
