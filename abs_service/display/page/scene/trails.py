@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from abs_service.display.page.acting.gestures import Ray
 from abs_service.display.page.numbers import MINUTE_S
 from abs_service.display.page.pictures import under_ray
-from abs_service.display.page.scene.fields import Drawn, MeshView, joined, sigma
+from abs_service.display.page.scene.fields import MeshView, ShownMesh, joined, sigma
 
 #: Length of a trail [ns].
 TRAIL_NS = 10_000_000_000
@@ -58,7 +58,7 @@ class Trails:
             vertex -= len(view.vertices)
         return True
 
-    def extend(self, tracker: str, mesh: object, drawn: Drawn, now_s: float) -> None:
+    def extend(self, tracker: str, mesh: object, drawn: ShownMesh, now_s: float) -> None:
         """Adds where the vertices are, and their σ.
 
         Args:

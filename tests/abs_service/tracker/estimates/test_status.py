@@ -1,6 +1,7 @@
 """Status of an estimate, with its reasons."""
 
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
@@ -144,7 +145,7 @@ def test_every_reason_says_what_to_do():
         assert len(reason.partition(" – ")[2]) > 20
 
 
-def on_the_rim(off_m: float = 0.0, **rim: int) -> SensorFit:
+def on_the_rim(off_m: float = 0.0, **rim: Any) -> SensorFit:
     return replace(fit(1.0), rim=RimFit(off_m=off_m, **rim))
 
 

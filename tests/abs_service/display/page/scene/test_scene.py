@@ -4,6 +4,7 @@ import time
 from contextlib import nullcontext, redirect_stdout
 from io import StringIO
 from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -71,7 +72,7 @@ def test_the_last_mesh_is_seen_also_if_none_follows(monkeypatch):
     monkeypatch.setattr("abs_service.display.page.scene.scene._light", lambda scene: None)
     monkeypatch.setattr("abs_service.display.page.scene.scene.glb", lambda vertices, faces, colors: tuple(colors[0]))
     server = Recorder()
-    scene = Scene(server)
+    scene = Scene(cast(Any, server))
 
     def show(grey, stale=False):
         scene.show_mesh("sheet", view_of(TRIANGLE), np.full((3, 3), grey, np.uint8), stale)
@@ -96,7 +97,7 @@ def test_the_last_mesh_is_seen_also_if_none_follows(monkeypatch):
 @pytest.mark.realtime
 @pytest.mark.timeout(120)
 def test_what_moves_is_drawn_without_compiling_shaders_again(server, browser):
-    scene = Scene(server)
+    scene = Scene(cast(Any, server))
     show(scene, 0)
     page = browser.new_page(viewport={"width": 500, "height": 300})
     page.set_default_timeout(1e3 * PATIENCE_S)

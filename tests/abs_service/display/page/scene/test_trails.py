@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from abs_service.display.page.scene.fields import Drawn, MeshView
+from abs_service.display.page.scene.fields import MeshView, ShownMesh
 from abs_service.display.page.scene.trails import GAP_NS, TRAIL_NS, Trails
 
 FRAME_NS = 33_000_000
@@ -19,7 +19,7 @@ def view(vertices, covariance=UNKNOWN):
 
 
 def drawn(vertices, time_ns, covariance=UNKNOWN):
-    return Drawn(view(vertices, covariance), time_ns, None)
+    return ShownMesh(view(vertices, covariance), time_ns, None)
 
 
 MESHES = {"left": view(SQUARE), "right": view(np.add(SQUARE, (1.0, 0, 0)))}

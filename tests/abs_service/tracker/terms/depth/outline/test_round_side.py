@@ -70,7 +70,7 @@ def test_a_steep_side_is_round_if_the_opposite_one_is(right: float, expected: bo
         np.where(np.arange(CAMERA.width) < 160, one, two) for one, two in zip(left, picture(right, sigma=0))
     )
     first, last = np.flatnonzero(on[90])[[0, -1]]
-    places = np.array([(first + 2.5, row) for row in rows] + [(last - 3.0, row) for row in rows])
+    places = np.array([(first + 2.5, row) for row in rows] + [(last - 3.0, row) for row in rows], float)
     inwards = np.repeat([[1.0, 0.0], [-1.0, 0.0]], len(rows), axis=0)
     radial = (distance * np.linalg.norm(CAMERA.unproject(np.ones(on.shape)), axis=-1)).astype(np.float32)
     found = is_round_side(CAMERA, radial, places, np.full(len(places), 3.0), inwards)
