@@ -147,7 +147,7 @@ def _fill(
     number = 4 * (r * place.shape[1] + c) + missing
     for row in range(first_row, last_row + 1):
         for column in range(first_column, last_column + 1):
-            at_b, at_c = weights_at(at, per_area, row, column)
+            at_b, at_c = weights_at(at, per_area, np.float32(row), np.float32(column))
             if at_b >= edge and at_c >= edge and one - at_b - at_c >= edge:
                 near = near_a + at_b * near_b + at_c * near_c
                 if near > nearness[row, column]:
@@ -231,7 +231,7 @@ def _fill_torn(at: Triangle, torn: NDArray[np.bool_]) -> None:
     left, right = max(int(np.ceil(leftmost)), 0), min(int(np.floor(rightmost)), width - 1)
     for row in range(max(int(np.ceil(highest)), 0), min(int(np.floor(lowest)), height - 1) + 1):
         for column in range(left, right + 1):
-            at_b, at_c = weights_at(at, per_area, row, column)
+            at_b, at_c = weights_at(at, per_area, np.float32(row), np.float32(column))
             if at_b >= 0 and at_c >= 0 and at_b + at_c <= one:
                 torn[row, column] = True
 

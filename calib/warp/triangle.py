@@ -1,4 +1,4 @@
-"""A triangle in an image: the pixels around it, and the barycentric weights of a pixel, in single precision."""
+"""A triangle in an image: the pixels around it, and the barycentric weights of a pixel."""
 
 from typing import NamedTuple
 
@@ -49,7 +49,15 @@ def rows_of(at: Triangle) -> tuple[np.float32, np.float32]:
 
 
 @kernel
-def weights_at(at: Triangle, per_area: np.float32, row: int, column: int) -> tuple[np.float32, np.float32]:
-    """Barycentric weights of b and c at a pixel's centre; a has the rest of 1. `per_area` is 1 / area."""
-    x, y = np.float32(column) - at.ax, np.float32(row) - at.ay
+def weights_at(
+    at: Triangle, per_area: np.floating, row: np.floating, column: np.floating
+) -> tuple[np.floating, np.floating]:
+    """Barycentric weights of b and c at a pixel's centre; a has the rest of 1.
+
+    Args:
+        at: the triangle.
+        per_area: 1 / area, in the precision of the result.
+        row, column: of the pixel, in that precision.
+    """
+    x, y = column - at.ax, row - at.ay
     return (x * at.cy - y * at.cx) * per_area, (at.bx * y - at.by * x) * per_area

@@ -89,11 +89,11 @@ class Plane(NamedTuple):
     Attributes:
         at: the face.
         per_area: 1 / area.
-        near_a, near_b, near_c: of the corners, the second and third from the first.
+        near_a, near_b, near_c: of the corners.
     """
 
     at: Triangle
-    per_area: np.float32
+    per_area: np.float64
     near_a: np.float32
     near_b: np.float32
     near_c: np.float32
@@ -104,16 +104,16 @@ def _plane(seen: Projected, face: NDArray[np.int32]) -> tuple[Plane, bool]:
     """The plane of a face (3,) of a population of one, and whether the camera sees all corners."""
     at, near_a, near_b, near_c = face_in_image(seen, 0, face)
     is_seen = not np.isnan(near_a + near_b + near_c) and at.area != 0
-    return Plane(at, np.float32(1) / at.area, near_a, near_b - near_a, near_c - near_a), is_seen
+    return Plane(at, 1 / np.float64(at.area), near_a, near_b, near_c), is_seen
 
 
 @kernel
-def _nearness_in(plane: Plane, row: int, column: int) -> np.float32:
+def _nearness_in(plane: Plane, row: int, column: int) -> np.floating | float:
     """1/z of a face at a pixel's centre, 0 beside it."""
-    at_b, at_c = weights_at(plane.at, plane.per_area, row, column)
-    zero, one = np.float32(0), np.float32(1)
-    near = plane.near_a + at_b * plane.near_b + at_c * plane.near_c
-    return near if min(at_b, at_c, one - at_b - at_c) >= zero else zero
+    of_b, of_c = weights_at(plane.at, plane.per_area, np.float64(row), np.float64(column))
+    of_a = 1 - of_b - of_c
+    inside = of_a >= 0 and of_b >= 0 and of_c >= 0
+    return of_a * plane.near_a + of_b * plane.near_b + of_c * plane.near_c if inside else 0.0
 
 
 @kernel
@@ -128,7 +128,8 @@ def _nearest(seen: Projected, faces: NDArray[np.int32], nearness: NDArray[np.flo
         left, right = max(int(np.ceil(leftmost)), 0), min(int(np.floor(rightmost)), width - 1)
         for row in range(max(int(np.ceil(highest)), 0), min(int(np.floor(lowest)), height - 1) + 1):
             for column in range(left, right + 1):
-                nearness[row, column] = max(nearness[row, column], _nearness_in(plane, row, column))
+                near = np.float32(_nearness_in(plane, row, column))
+                nearness[row, column] = max(nearness[row, column], near)
 
 
 @kernel
@@ -145,4 +146,5 @@ def _nearest_at(seen: Projected, faces: NDArray[np.int32], few: FewPixels, nearn
                 pixel = few.order[k]
                 column = int(np.int64(few.columns[pixel]))  # one form of what is called
                 if left <= column <= right:
-                    nearness[pixel] = max(nearness[pixel], _nearness_in(plane, row, column))
+                    near = np.float32(_nearness_in(plane, row, column))
+                    nearness[pixel] = max(nearness[pixel], near)

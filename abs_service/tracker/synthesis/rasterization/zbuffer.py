@@ -115,7 +115,8 @@ def _rasterize(
             first_column, last_column = int(np.ceil(leftmost / step)) - left, int(np.floor(rightmost / step)) - left
             for row in range(max(first_row, 0), min(last_row, height - 1) + 1):
                 for column in range(max(first_column, 0), min(last_column, width - 1) + 1):
-                    at_b, at_c = weights_at(at, per_area, (row + top) * step, (column + left) * step)
+                    y, x = np.float32((row + top) * step), np.float32((column + left) * step)
+                    at_b, at_c = weights_at(at, per_area, y, x)
                     at_a = one - at_b - at_c
                     near = at_a * near_a + at_b * near_b + at_c * near_c
                     if at_a >= 0 and at_b >= 0 and at_c >= 0 and near > nearness[k, row, column]:
@@ -146,7 +147,7 @@ def _collect(
                     continue
                 at, near_a, near_b, near_c = face_in_image(seen, k, faces[f])
                 y, x = (row + top) * step, (column + left) * step
-                at_b, at_c = weights_at(at, one / at.area, y, x)
+                at_b, at_c = weights_at(at, one / at.area, np.float32(y), np.float32(x))
                 z = 1 / nearness[k, row, column]
                 # The image's y axis points down: faces that are clockwise in it are front faces.
                 samples.pixel[k, i] = (y + 1) * stride + x + 1 if at.area < 0 else 0
