@@ -117,7 +117,7 @@ class StallDetector:
         if self.state[0] != DeviceState.STREAMING:
             return self.state
         now_ns = self._clock()
-        for (sensor, name), slow in self._delivery_rate.look(now_ns):
+        for (sensor, name), slow in self._delivery_rate.check(now_ns):
             self.on_warning(f"{sensor}/{name} rate", slow and f"{sensor}/{name}: {slow}")
         verdict = self.state
         for key, stream in self._streams.items():

@@ -64,7 +64,7 @@ def cameras(rig: config.ServiceConfig, name: str, device: Device) -> dict[str, C
     return found
 
 
-def described(rig: config.ServiceConfig) -> ConfiguredSensors:
+def configured_sensors(rig: config.ServiceConfig) -> ConfiguredSensors:
     """The configuration itself, and the noise models of its sensors with their outliers."""
     noises = {}
     for sensor, table in rig.sensors.items():

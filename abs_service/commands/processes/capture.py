@@ -52,7 +52,7 @@ def run(arguments: argparse.Namespace) -> int:
         bus.answer_queries(keys.SCHEMA, sensor_metadata.SCHEMA_MESSAGE, sensor_metadata.schema)
         if headers.host_clock:
             clock_offsets.answer(bus, headers)
-        metadata = MetadataPublisher(bus, headers, rig_devices.described(rig))
+        metadata = MetadataPublisher(bus, headers, rig_devices.configured_sensors(rig))
         publishers = {name: FramePublisher(bus, headers, name) for name in rig.devices}
         view_hz = {name: table.view_hz for name, table in rig.sensors.items()}
         points = {
@@ -118,7 +118,7 @@ def follow(reconfigured: threading.Event, configure: Callable[[], None]) -> None
 
 
 def _configure(metadata: MetadataPublisher, arguments: argparse.Namespace) -> None:
-    metadata.configure(rig_devices.described(rig_process.load_config(arguments)))
+    metadata.configure(rig_devices.configured_sensors(rig_process.load_config(arguments)))
 
 
 def _watch(stop: threading.Event, supervisors: list[DeviceSupervisor], *ticks: Callable[[], None]) -> None:

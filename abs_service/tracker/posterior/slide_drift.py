@@ -27,7 +27,7 @@ class SlideDrift:
     """
 
     def __init__(self) -> None:
-        self._variance = np.zeros(6)
+        self.restart()
 
     def restart(self) -> None:
         """Restarts without drift, after a relocation, which has an error of its own."""

@@ -59,12 +59,13 @@ def not_square(solution: Solution, distance: float) -> dict[str, NotSquare]:
             continue
         camera, given = solution.cameras[name], solution.task.sensors[name].factory
         columns = layout.columns(name, ["fx", "fy"])
-        slopes = solution.covariance[:, columns] @ np.array([-1 / camera.fx, 1 / camera.fy])
-        variance = float(slopes[columns] @ np.array([-1 / camera.fx, 1 / camera.fy]))
+        slope = np.array([-1 / camera.fx, 1 / camera.fy])
+        covariances = solution.covariance[:, columns] @ slope  # of all parameters with the ratio
+        variance = float(covariances[columns] @ slope)
         ratio = float(np.log(camera.fy / camera.fx))
         as_given = any(abs(ratio - np.log(each.fy / each.fx)) < SQUARE for each in given)
         if CERTAIN * np.sqrt(variance) < abs(ratio) < MEANT and not as_given:
-            effect = effect_px(solution, -slopes / variance * ratio, distance)
+            effect = effect_px(solution, -covariances / variance * ratio, distance)
             found[name] = NotSquare(ratio, float(np.sqrt(variance)), effect)
     return found
 

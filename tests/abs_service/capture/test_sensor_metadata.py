@@ -56,7 +56,7 @@ def rig(tmp_path):
 @pytest.fixture
 def metadata(rig):
     bus = LoopbackBus()
-    return bus, MetadataPublisher(bus, HeaderFactory("demo", WallClock()), rig_devices.described(rig))
+    return bus, MetadataPublisher(bus, HeaderFactory("demo", WallClock()), rig_devices.configured_sensors(rig))
 
 
 def test_what_the_sensors_are_is_announced_with_the_calibration_of_the_configuration(rig, metadata):
@@ -99,7 +99,7 @@ def test_a_fisheye_camera_is_published_and_restored_from_recordings():
 def test_another_configuration_while_all_is_published_comes_with_the_next_time(rig, metadata, tmp_path):
     bus, metadata = metadata
     metadata.add(rig_devices.cameras(rig, "cam", FakeDevice()))
-    other = rig_devices.described(config.loads(RIG.replace("1e-2", "5e-2"), "rig.toml", tmp_path))
+    other = rig_devices.configured_sensors(config.loads(RIG.replace("1e-2", "5e-2"), "rig.toml", tmp_path))
     threads = []
 
     def reload(_):

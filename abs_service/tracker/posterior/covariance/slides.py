@@ -58,6 +58,10 @@ class Slides:
         return np.asarray(_motions(self.vertices, *_frame(self.vertices)) @ self.motions[:, which], np.float64)
 
 
+#: Of a model that does not slide.
+NO_SLIDES = Slides(0.0, np.inf, np.zeros(0), np.zeros((6, 0)), np.zeros((0, 3)), 0.0)
+
+
 class SlideObservability:
     """Information of the sensors on rigid motions of the surface.
 
@@ -76,10 +80,10 @@ class SlideObservability:
 
     def of(self, optimum: Optimum) -> Slides:
         """The slides of the estimate of a frame; its priors do not count."""
+        if not self._is_free:
+            return NO_SLIDES
         vertices = optimum.vertices.astype(np.float64)
         frame = _frame(vertices)
-        if not self._is_free:
-            return Slides(0.0, np.inf, np.zeros(0), np.zeros((6, 0)), vertices, frame[1])
         known, feigned = np.zeros((2, len(optimum.sensed), 6, 6))
         for k, part in enumerate(optimum.sensed):
             known[k], feigned[k] = _information(part, *frame)
