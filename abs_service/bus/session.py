@@ -13,11 +13,11 @@ from enum import StrEnum
 
 import zenoh
 
-from abs_service.bus.pools import own_size
 from abs_service.bus.security import expiry
 from abs_service.bus.security.mutual_tls import NO_SECURITY, MutualTls, NoSecurity
+from abs_service.bus.zenoh_session import connection, shared_memory
+from abs_service.bus.zenoh_session.pools import own_size
 from drivers.encoding.message_check import LARGEST_IMAGE
-from drivers.zenoh_session import connection, shared_memory
 
 _log = logging.getLogger(__name__)
 

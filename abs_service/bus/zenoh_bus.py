@@ -14,8 +14,8 @@ from abs_service.bus.contract import EVENTS, Publisher, Qos, Sample, Subscriptio
 from abs_service.bus.security import link_log
 from abs_service.bus.security.mutual_tls import NO_SECURITY, MutualTls, NoSecurity
 from abs_service.bus.session import SessionMode, open_session
-from drivers.zenoh_session.callbacks import from_non_daemon_thread
-from drivers.zenoh_session.shared_memory import copied
+from abs_service.bus.zenoh_session.callbacks import from_non_daemon_thread
+from abs_service.bus.zenoh_session.shared_memory import copied
 
 _log = logging.getLogger(__name__)
 

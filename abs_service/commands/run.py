@@ -5,6 +5,7 @@
   abs-service run --no-record --json         one JSON object per estimate, for scripts
   abs-service run --view                     with a page in the browser that shows mesh, points and images
   abs-service run --seed 3 --duration 20     another simulated motion, for 20 s
+  abs-service run rig.toml --connect tcp/192.168.1.7:7447    tracks and records what `capture --listen` takes there
 
 Applications connect to bus.endpoint; the keys are abs/<rig>/<tracker>/state and so on. Ctrl-C ends everything in order.
 """
@@ -13,18 +14,18 @@ import argparse
 import logging
 import os
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
 from urllib.parse import parse_qsl, urlencode, urlsplit, urlunsplit
 
 from abs_service import config
 from abs_service.bus import keys
-from abs_service.bus.session import SessionMode
+from abs_service.bus.session import SessionMode, check_endpoint
 from abs_service.bus.stamps import WallClock
 from abs_service.commands.parts import rig_process
-from abs_service.commands.parts.log import logs
+from abs_service.commands.parts.log import logs, notes
 from abs_service.commands.parts.options import port, whole
 from abs_service.commands.parts.rig_in_memory import RigInMemory, in_memory
 from abs_service.commands.running import outcome, settled_file, view
@@ -63,7 +64,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--no-record", action="store_true", help="keep nothing on disk")
     parser.add_argument("--out", metavar="DIR", type=Path, help="folder of the recordings instead of record.directory")
     parser.add_argument("--rig", metavar="NAME", help="name on the wire instead of the configuration's")
-    parser.add_argument("--seed", metavar="N", type=SEED, help="seed of all simulated devices")
+    devices = parser.add_mutually_exclusive_group()
+    devices.add_argument("--seed", metavar="N", type=SEED, help="seed of all simulated devices")
+    devices.add_argument("--connect", metavar="ENDPOINT", help="open no device: `capture` does, which listens here")
     parser.add_argument("--view", action="store_true", help="serve a page that shows the rig, as `abs-service view`")
     parser.add_argument("--view-port", metavar="N", type=port, help=f"--view at this port (default: {view.PORT})")
     parser.add_argument("--view-only", action="store_true", help="--view without anything that acts on the rig")
@@ -87,11 +90,12 @@ def run(arguments: argparse.Namespace) -> int:
         rig_process.open_bus_at(rig.bus.endpoint, SessionMode.ROUTER, rig, arguments) as bus,
         in_memory(rig, config.named(arguments.config)) as file,
         choice.shown(as_json=arguments.json) as display,
-        _logging_to(display, logs.on_stderr(arguments)) if not arguments.log_file else nullcontext(),
+        notes.logging_to(display, logs.on_stderr(arguments)) if not arguments.log_file else nullcontext(),
         metrics.served(rig.run.metrics_port) as measure,
     ):
         starts = starting(display, arguments)
-        supervisor = Supervisor(children(rig, file.path, page), starts, time.monotonic_ns, limits(rig))
+        processes = children(rig, file.path, page, arguments.connect)
+        supervisor = Supervisor(processes, starts, time.monotonic_ns, limits(rig))
         about = (rig.name, rig.bus.endpoint, rig.record.directory)
         notifier = systemd.notifier(os.environ)
         watchers = (notifier.update, measure, lambda _: forked.ensure_running())
@@ -116,6 +120,7 @@ def effective(rig: config.ServiceConfig, arguments: argparse.Namespace) -> confi
 
     Raises:
         KeyNameError: the rig cannot be called so.
+        BusError: no other host can be reached so.
     """
     record = {"enabled": rig.record.enabled and not arguments.no_record}
     if arguments.out:
@@ -126,8 +131,12 @@ def effective(rig: config.ServiceConfig, arguments: argparse.Namespace) -> confi
             name: device.model_copy(update={"uri": with_seed(device.uri, arguments.seed)})
             for name, device in devices.items()
         }
+    routers = rig.bus.routers
+    if arguments.connect:
+        routers = (*routers, check_endpoint(arguments.connect, key="--connect"))
     changes = {
         "name": keys.check_name(rig.name if arguments.rig is None else arguments.rig),
+        "bus": rig.bus.model_copy(update={"routers": routers}),
         "devices": devices,
         "record": rig.record.model_copy(update=record),
     }
@@ -163,7 +172,8 @@ def renewal(file: RigInMemory, arguments: argparse.Namespace, page: Sequence[str
     changes = file.exchange(read)
     for component in changes.ends:
         logging.getLogger(__name__).warning("%s ends: %s has it no longer", component, arguments.config)
-    return Renewal(file.rig.record.directory, children(file.rig, file.path, page), changes.components, changes.ends)
+    processes = children(file.rig, file.path, page, arguments.connect)
+    return Renewal(file.rig.record.directory, processes, changes.components, changes.ends)
 
 
 def page_options(arguments: argparse.Namespace) -> list[str] | None:
@@ -183,18 +193,22 @@ def with_seed(uri: str, seed: int) -> str:
     return urlunsplit(parts._replace(query=urlencode(query, safe=",")))
 
 
-def children(rig: config.ServiceConfig, path: Path, page: Sequence[str] | None = None) -> list[Child]:
+def children(
+    rig: config.ServiceConfig, path: Path, page: Sequence[str] | None = None, captured_at: str | None = None
+) -> list[Child]:
     """The processes of a rig; the recorder is to stop last.
 
     Args:
         rig: the effective configuration.
         path: the file that it is in.
         page: options of `abs-service view`; None: without it.
+        captured_at: endpoint of the host that captures; None: this one does.
     """
+    captures = [] if captured_at else [Child("capture", ("capture", str(path)), 0)]
     trackers = [Child(f"track/{name}", ("track", str(path), name), 1) for name in rig.trackers]
     recorder = [Child("record", ("record", str(path)), 2)] if rig.record.enabled else []
     pages = [] if page is None else [Child("view", ("view", str(path), *page), 0)]
-    return [Child("capture", ("capture", str(path)), 0), *trackers, *recorder, *pages]
+    return [*captures, *trackers, *recorder, *pages]
 
 
 def limits(rig: config.ServiceConfig) -> Limits:
@@ -224,25 +238,3 @@ def _pass_on(display: Display, as_json: bool, tracebacks: Tracebacks, component:
             display.note(line if log_lines.parse(line) else log_lines.line(time.time(), "info", component, line, {}))
         else:
             display.note(f"{component}: {line}")
-
-
-class _Notes(logging.Handler):
-    def __init__(self, display: Display, formatter: logging.Formatter | None) -> None:
-        super().__init__()
-        self._display = display
-        self.setFormatter(formatter)
-
-    def emit(self, record: logging.LogRecord) -> None:
-        self._display.note(self.format(record))
-
-
-@contextmanager
-def _logging_to(display: Display, as_json: bool) -> Iterator[None]:
-    """Log records as notes of the display, because lines written past it would tear a table apart."""
-    root = logging.getLogger()
-    before = root.handlers[:]
-    root.handlers[:] = [_Notes(display, log_lines.JsonFormatter("run") if as_json else None)]
-    try:
-        yield
-    finally:
-        root.handlers[:] = before

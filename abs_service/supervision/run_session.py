@@ -11,9 +11,9 @@ from queue import SimpleQueue
 from abs_service.bus import keys
 from abs_service.bus.contract import Sample
 from abs_service.bus.health import Health, Level
-from abs_service.bus.pools import EndedPools
 from abs_service.bus.queues import LatestQueue
 from abs_service.bus.stamps import HeaderFactory, WallClock
+from abs_service.bus.zenoh_session.pools import EndedPools
 from abs_service.supervision.children.child import PROCESS, Child, ChildState
 from abs_service.supervision.health import rig_state
 from abs_service.supervision.health.rig_view import Display, RigView
@@ -202,7 +202,7 @@ class RunSession:
             self._health.label(f"{PROCESS}{component}", "")
         for topic in (*renewal.ends, *(monitors.keys() - self._silence_monitors.keys())):
             self._health.report(topic, Level.OK)
-        if "capture" not in renewal.components:
+        if "capture" in known - set(renewal.components):  # not if another host captures
             self._supervisor.children["capture"].process.wake()
         for component in [one for one in renewal.starts if one in known]:
             self._supervisor.renew(component)

@@ -143,7 +143,8 @@ class RigView:
             compiled = self.live.compiled()
             return f"Compiling kernels for this rig: {compiled} …" if compiled else "Loading kernels …"
         if "capture" not in self.live.received:
-            return "Starting the processes …"
+            starts = any(child.component == "capture" for child in self.children)
+            return "Starting the processes …" if starts else "Waiting for the host that captures …"
         if any(tracker.last is None for tracker in self.live.trackers.values()):
             return "Waiting for the first estimate …"
         return ""

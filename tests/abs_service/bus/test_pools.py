@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from abs_service.bus.pools import READ_NS, UNIT_BYTES, EndedPools, free_pool, own_size
+from abs_service.bus.zenoh_session.pools import READ_NS, UNIT_BYTES, EndedPools, free_pool, own_size
 
 
 def test_a_pool_of_this_process_tells_whose_it_is():

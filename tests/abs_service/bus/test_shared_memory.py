@@ -1,6 +1,5 @@
 """Pools in shared memory fit into what is free of it."""
 
-import json
 import os
 import resource
 from pathlib import Path
@@ -8,14 +7,11 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-import zenoh
 
 from abs_service.bus import session, zenoh_bus
 from abs_service.bus.contract import IMAGES
-from drivers.remote.address import Address
-from drivers.remote.link import open_link
-from drivers.zenoh_session import shared_memory
-from drivers.zenoh_session.shared_memory import may_be_locked
+from abs_service.bus.zenoh_session import shared_memory
+from abs_service.bus.zenoh_session.shared_memory import may_be_locked
 from tests.waiting import eventually, repeating
 
 MB = 1 << 20
@@ -101,11 +97,3 @@ def test_a_bus_passes_no_byte_on_of_what_was_overwritten(open_bus, monkeypatch):
     with repeating(lambda: publisher.put(b"pixels"), 0.01):
         assert eventually(lambda: arrived)
     assert (arrived[0].payload, arrived[0].overwritten) == (b"", True)
-
-
-def test_a_rig_elsewhere_is_connected_to_without_shared_memory(monkeypatch):
-    monkeypatch.setattr(shared_memory, "FOLDER", Path("/nowhere"))
-    configured = []
-    monkeypatch.setattr(zenoh, "open", lambda config: configured.append(json.loads(str(config))))
-    open_link(Address())
-    assert configured[0]["transport"]["shared_memory"]["enabled"] is False

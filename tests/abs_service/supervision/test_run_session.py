@@ -1,4 +1,3 @@
-import argparse
 import io
 import signal
 import threading
@@ -10,12 +9,9 @@ from absmsg.v1.deformation_state_pb2 import DeformationState
 from absmsg.v1.deformed_mesh_pb2 import MeshTopology
 from absmsg.v1.health_pb2 import Health
 
-from abs_service import config
 from abs_service.bus import keys
 from abs_service.bus.contract import EVENTS
-from abs_service.bus.keys import KeyNameError
 from abs_service.bus.stamps import HeaderFactory, WallClock
-from abs_service.commands import run
 from abs_service.display.terminal.lines import PlainDisplay
 from abs_service.display.terminal.output import Output
 from abs_service.supervision.children.child import Child
@@ -47,54 +43,6 @@ def rig_file(tmp_path, endpoint):
     path = tmp_path / "rig.toml"
     path.write_text(RIG.format(endpoint=endpoint))
     return path
-
-
-def arguments(*given):
-    parser = argparse.ArgumentParser()
-    run.add_arguments(parser)
-    return parser.parse_args(given)
-
-
-class TestWhatTheCommandLineChanges:
-    def changed(self, rig_file, *given):
-        return run.effective(config.load(rig_file), arguments(*given))
-
-    def test_nothing_by_default(self, rig_file):
-        assert self.changed(rig_file) == config.load(rig_file)
-
-    def test_name_seed_folder_and_recording(self, rig_file, tmp_path, monkeypatch):
-        monkeypatch.chdir(tmp_path)
-        (tmp_path / "here").symlink_to("here")  # a loop, which the check of the folder names
-        rig = self.changed(rig_file, "--rig", "other", "--seed", "9", "--out", "here", "--no-record")
-        assert (rig.name, rig.record.directory, rig.record.enabled) == ("other", tmp_path / "here", False)
-        assert rig.devices["sim"].uri == "simulated://sheet?seed=9&tof=32x24&sensors=tof"
-
-    def test_a_name_that_cannot_be_a_key_is_refused(self, rig_file):
-        with pytest.raises(KeyNameError):
-            self.changed(rig_file, "--rig", "a/b")
-
-    @pytest.mark.parametrize(
-        ("uri", "seeded"),
-        [
-            ("simulated://sheet", "simulated://sheet?seed=5"),
-            ("simulated://board?sensors=tof,color&seed=1", "simulated://board?sensors=tof,color&seed=5"),
-            ("replay://a.mcap?loop=1", "replay://a.mcap?loop=1"),
-        ],
-    )
-    def test_the_seed_reaches_simulated_devices_only(self, uri, seeded):
-        assert run.with_seed(uri, 5) == seeded
-
-
-def test_a_rig_has_one_process_per_tracker_and_stops_its_recorder_last(tmp_path):
-    rig = config.load_default()
-    children = run.children(rig, tmp_path / "x.toml")
-    assert [child.component for child in sorted(children, key=lambda child: child.stage)] == [
-        "capture",
-        "track/sheet",
-        "record",
-    ]
-    off = rig.model_copy(update={"record": rig.record.model_copy(update={"enabled": False})})
-    assert "record" not in [child.component for child in run.children(off, tmp_path / "x.toml")]
 
 
 class Bench:

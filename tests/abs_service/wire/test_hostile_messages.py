@@ -1,4 +1,4 @@
-"""Nothing that comes from the bus ends a process: recorder, tracker and remote device behind the edge."""
+"""Nothing that comes from the bus ends a process: recorder and tracker behind the edge."""
 
 import threading
 import time
@@ -23,18 +23,13 @@ from abs_service.pairing.waiting_stream import FOREIGN
 from abs_service.recording.recorder import Recorder
 from abs_service.recording.recorder_settings import RecorderSettings
 from abs_service.wire.checked_bus import CheckedBus
-from drivers.contract.capabilities import StreamInfo
 from drivers.contract.frame import Frame, Geometry, Kind
 from drivers.encoding import codec, encoded_image
 from drivers.encoding.encoded_image import ImageCodec
-from drivers.remote.device import IMAGES, TRUTHS, RemoteDevice
-from drivers.remote.link import Link
-from drivers.remote.probe import RemoteRig
 from tests.abs_service.bus.loopback import LoopbackBus, health_now
 from tests.abs_service.recording.recorder_rig import depth, read, recordings
 from tests.abs_service.wire.hostile import MODEL, TOPICS, samples
 from tests.abs_service.wire.test_edge import sample
-from tests.drivers.recording_sink import RecordingSink
 from tests.waiting import eventually
 
 HOSTILE = st.lists(samples(), min_size=1, max_size=5)
@@ -151,40 +146,6 @@ class TestTracker:
         clocks.measure()
         known = clocks.offset("there")
         assert known is None or known.error_ns >= 0
-
-
-class FakeLink(Link):
-    """A link with messages from the test."""
-
-    def __init__(self):
-        self.listeners = {}
-
-    def subscribe(self, rig, pattern, on_message):
-        self.listeners[pattern] = on_message
-
-    def watch_liveliness(self, rig, on_gone):
-        pass
-
-    def unsubscribe(self):
-        self.listeners = {}
-
-
-class TestRemoteDevice:
-    @given(HOSTILE, st.booleans())
-    def test_nothing_ends_it(self, hostile, same_clock):
-        link, sink = FakeLink(), RecordingSink()
-        streams = (StreamInfo("tof", "depth", Kind.DEPTH, "16UC1", 32, 24, 30.0),)
-        device = RemoteDevice("remote://", "demo", link, RemoteRig({}, streams, same_clock), time.monotonic_ns)
-        device.start(sink)
-        for one in hostile:
-            pattern = TRUTHS if one.topic.endswith("truth") else IMAGES
-            link.listeners[pattern](one.topic, one.payload, one.attachment)
-        bus = LoopbackBus()
-        health = Health(bus, "capture", HeaderFactory("demo", WallClock()))
-        health.count_up_to(device.counters)
-        for name, value in device.gauges.items():
-            health.gauge(name, value)
-        assert health_now(health, bus).component == "capture"
 
 
 def test_every_kind_of_key_is_among_the_topics():

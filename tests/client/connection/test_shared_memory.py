@@ -5,7 +5,7 @@ import resource
 import pytest
 from abs_client.connection import shared_memory as of_client
 
-from drivers.zenoh_session import shared_memory as of_service
+from abs_service.bus.zenoh_session import shared_memory as of_service
 
 MB = 1 << 20
 

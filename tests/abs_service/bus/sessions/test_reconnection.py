@@ -10,8 +10,6 @@ from abs_client.connection.session import client_settings
 
 from abs_service.bus.session import SessionMode, open_session
 from abs_service.bus.zenoh_bus import ZenohBus
-from drivers.remote.address import Address
-from drivers.remote.link import open_link
 from tests.system.running import wait_until
 
 #: Longest time between two questions: a try takes 2 s, and another second may pass before the next [s].
@@ -21,7 +19,6 @@ CLIENT = SessionMode.CLIENT
 
 CLIENTS = {
     "bus": lambda endpoint: open_session(endpoint, SessionMode.CLIENT),
-    "remote": lambda endpoint: open_link(Address(port=int(endpoint.rpartition(":")[2]))),
     "client": lambda endpoint: zenoh.open(zenoh.Config.from_json5(json.dumps(client_settings(endpoint)))),
 }
 

@@ -9,7 +9,7 @@ import zenoh
 
 FOLDER = Path("/dev/shm")
 PROCESS = Path("/proc/self")
-#: Eight pools of a large rig, at 32 MB and what `abs_service.bus.pools` adds [bytes].
+#: Eight pools of a large rig, at 32 MB and what `abs_service.bus.zenoh_session.pools` adds [bytes].
 LOCKED_BYTES = 8 * (36 << 20)
 #: Bit of the capability that lifts the limit of locked memory (capabilities(7)).
 CAP_IPC_LOCK = 14

@@ -1,4 +1,4 @@
-"""A connection to a router, in zenoh's configuration: that of the bus and of a rig elsewhere."""
+"""A connection to a router, in zenoh's configuration."""
 
 import socket
 import threading

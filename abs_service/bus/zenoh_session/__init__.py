@@ -1,0 +1,1 @@
+"""What a session of zenoh needs: connection, callbacks, shared memory and its pools."""
