@@ -1,1 +1,1 @@
-"""What a session of zenoh needs: connection, callbacks, shared memory and its pools."""
+"""Parts of a session of zenoh: connection, callbacks, shared memory and its pools."""

@@ -1,4 +1,4 @@
-"""What the command line of `run` changes in a configuration, and the processes that follow."""
+"""Changes of a configuration by the command line of `run`, and the processes that follow."""
 
 import argparse
 
