@@ -144,7 +144,7 @@ class RigView:
             return f"Compiling kernels for this rig: {compiled} …" if compiled else "Loading kernels …"
         if "capture" not in self.live.received:
             starts = any(child.component == "capture" for child in self.children)
-            return "Starting the processes …" if starts else "Waiting for the host that captures …"
+            return "Starting the processes …" if starts else f"Waiting for a host that captures {self.rig} …"
         if any(tracker.last is None for tracker in self.live.trackers.values()):
             return "Waiting for the first estimate …"
         return ""

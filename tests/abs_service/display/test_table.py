@@ -135,6 +135,11 @@ def test_before_the_first_message_the_table_shows_the_stage_of_the_start():
     assert view(live).recording is None
 
 
+def test_a_rig_that_opens_no_device_waits_for_the_host_that_does():
+    elsewhere = view(RigState(["sheet"], Clock()), children=[Child("track/sheet", (), 1)])
+    assert "Waiting for a host that captures demo" in drawn(elsewhere)
+
+
 def test_markup_in_what_others_say_is_only_text(live):
     take_health(live, Health(component="capture", level=Health.LEVEL_ERROR, message="[red]odd[/blue]"))
     live.trackers["sheet"].last = report(reasons=("[/] [bold",))
