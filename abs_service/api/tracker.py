@@ -135,9 +135,12 @@ class Tracker:
             plan = wiring.plan(settings, name)
             rig = wiring.rig(settings, name, cameras)
             self._region = RegionOrMask(plan.region.build())
-            self._session = TrackingSession(rig, replace(plan, region=self._region))
         except (wiring.PlanError, NoiseError, DetectionError) as error:
             raise ArgumentError(arguments.in_arguments(str(error))) from None
+        try:
+            self._session = TrackingSession(rig, replace(plan, region=self._region))
+        except DetectionError as error:
+            raise ArgumentError(f"template.{error}") from None
         if budget_ms is not None:
             checks.positive("budget_ms", budget_ms, "more than 0, or None for no limit")
         self._budget_ns = np.inf if budget_ms is None else float(budget_ms) * 1e6
