@@ -134,9 +134,12 @@ class Tracker:
         try:
             plan = wiring.plan(settings, name)
             rig = wiring.rig(settings, name, cameras)
-            self._region = RegionOrMask(plan.region.build())
-        except (wiring.PlanError, NoiseError, DetectionError) as error:
+        except (wiring.PlanError, NoiseError) as error:
             raise ArgumentError(arguments.in_arguments(str(error))) from None
+        try:
+            self._region = RegionOrMask(plan.region.build())
+        except DetectionError as error:
+            raise ArgumentError(f"region.{error}") from None
         try:
             self._session = TrackingSession(rig, replace(plan, region=self._region))
         except DetectionError as error:

@@ -129,6 +129,7 @@ def test_what_a_noise_model_depends_on_must_be_given(noise, missing):
             r"noise = <class .*must be settings, such as noise=a\.noise\.Constant\(0\.001\)",
         ),
         ({"texture": a.noise.Constant(0.001)}, r'texture\.type = "constant": must be intensity, color, grey or bayer'),
+        ({"region": {"type": "mask", "file": "/no.png"}}, r"^region\.file = '/no\.png': cannot be read: No such file"),
         ({"template": {"type": "mesh", "path": "/no.obj"}}, r"^template\.path = '/no\.obj': there is no such file"),
         ({"region": np.ones((3, 3))}, r"^Tracker: region = .*: must be a table"),
         ({"bayer": ["rggb"]}, r"bayer = \['rggb'\]: must be one of rggb"),
