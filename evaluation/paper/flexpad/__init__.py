@@ -8,8 +8,8 @@ not have either; mean over eight sequences, with its standard deviation and smal
 frames) and of the eight bends (root mean square).
 Goals: below as `LEAST_…` and `MOST_…`. Until 2026-11-23 they were ratios of 1, which hardly can be missed; the present
 ones were set before they were first run, by one who knew the earlier figures, so another seed is reported as well.
-Seeds: two motions of each direction, drawn from the context's seed; docs/results/experiments.md has seeds 0 and 2 (1 shares half of
-them with 0).
+Seeds: two motions of each direction, drawn from the context's seed; docs/results/experiments.md has seeds 0 and 2 (1
+shares half of them with 0).
 """
 
 from dataclasses import dataclass, replace
