@@ -112,7 +112,7 @@ class RigView:
             files=counters["files"],
             recorded=counters["recorded"],
             dropped=dropped(counters),
-            forecast=health.labels.get("forecast", ""),
+            forecast=health.labels.get("forecast", "") if self.streams else "",  # configurations alone last for years
         )
 
     @property

@@ -170,3 +170,11 @@ def test_a_file_name_from_the_network_stays_in_the_folder_and_the_forecast_is_sh
     assert (shown := view(live).recording)
     assert shown.file == Path("/takes/passwd")
     assert "2.6 days on this disk" in drawn(view(live), width=120)
+
+
+def test_how_long_the_disk_lasts_is_not_told_before_there_are_images():
+    live, waiting = RigState(["sheet"], Clock()), recorder(50_000)
+    waiting.labels["forecast"] = "211.6 days on this disk"
+    take_health(live, waiting)
+    assert (shown := view(live).recording)
+    assert shown.forecast == ""
