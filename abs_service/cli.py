@@ -34,7 +34,7 @@ COMMANDS = {
     "devices": "list attached devices, with a remedy for those that cannot be used",
     "calibrate": "calibrate intrinsics, extrinsics and noise of a rig's sensors",
     "stiffness": "bending stiffness of a strip that hangs from a gripper, from a recording",
-    "import": "turn a folder of images into a recording",
+    "import": "turn a folder of images, or a file of another program, into a recording",
     "export": "write a recording for viewers, or its estimates as CSV, NPZ, OBJ or PLY",
     "info": "describe recordings: sensors, rates, gaps, losses, tracking, sizes",
     "recover": "recover truncated or damaged recordings",

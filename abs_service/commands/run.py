@@ -99,7 +99,8 @@ def run(arguments: argparse.Namespace) -> int:
         about = (rig.name, rig.bus.endpoint, rig.record.directory)
         notifier = systemd.notifier(os.environ)
         watchers = (notifier.update, measure, lambda _: forked.ensure_running())
-        session = RunSession(bus, *about, rig.trackers, supervisor, display, WallClock(), watchers)
+        clock, captured_at = WallClock(), arguments.connect or ""
+        session = RunSession(bus, *about, rig.trackers, supervisor, display, clock, watchers, captured_at)
         session.answer_reloads(partial(renewal, file, arguments, page))
         rig_process.on_hangup(session.reload, stop)
         try:

@@ -48,7 +48,7 @@ RELIANCE = Wording(
     {level: str(level) for level in Level},
     {
         Level.GOOD: "Good: this can be relied on.",
-        Level.DOUBTFUL: "Doubtful: read what follows before you rely on this.",
+        Level.DOUBTFUL: "Doubtful: read the reasons before you rely on this.",
         Level.BAD: "Bad: do not use this.",
     },
 )

@@ -75,7 +75,7 @@ def residual_field(pixels: NDArray[np.floating], residuals: NDArray[np.floating]
             *pixels[::every].T, *residuals[::every].T, lengths[::every],
             angles="xy", scale_units="xy", scale=unit / (0.03 * width), width=0.0025, cmap="viridis",
         )  # fmt: skip
-        field.quiverkey(arrows, 0.9, 1.03, unit, f"{unit:.2g} px", labelpos="E")
+        plots.key_of_arrows(figure, field, arrows, unit)
     _as_image(field, width, height)
     scatter.plot(*residuals.T, ".", markersize=2.5, color="tab:blue", alpha=0.6)
     reach = 1.05 * float(np.abs(residuals).max(initial=0.0)) or 1.0

@@ -78,6 +78,7 @@ class RunSession:
         display: shows the state.
         clock: time.
         watchers: see the state as often as the display does.
+        captured_at: endpoint of the host that captures; "" if this one does.
     """
 
     def __init__(
@@ -91,6 +92,7 @@ class RunSession:
         display: Display,
         clock: WallClock,
         watchers: Sequence[Callable[[RigView], None]] = (),
+        captured_at: str = "",
     ) -> None:
         self._bus, self._rig, self._endpoint, self._directory = bus, rig, endpoint, directory
         # Before the first estimate, the tracker itself says why there is none.
@@ -98,10 +100,8 @@ class RunSession:
         self._monitor = partial(SilenceMonitor, clock.monotonic, math.inf)
         self._silence_monitors = {keys.state(name): self._monitor() for name in trackers}
         self._renewals: SimpleQueue[Renewal] = SimpleQueue()
-        self._supervisor = supervisor
-        self._display = display
-        self._clock = clock
-        self._watchers = watchers
+        self._supervisor, self._display, self._clock = supervisor, display, clock
+        self._watchers, self._captured_at = watchers, captured_at
         self._begin_ns = self._queried_ns = clock.monotonic()
         self._live = rig_state.RigState(trackers, clock.monotonic)
         self._headers = HeaderFactory(rig, clock)
@@ -173,14 +173,14 @@ class RunSession:
             host_clock=self._headers.host_clock,
             refused=self._bus.trouble,
             rivals=self._publishers.trouble,
+            captured_at=self._captured_at,
             silent={key.partition("/")[0]: one.found for key, one in self._silence_monitors.items() if one.found},
         )
 
     def _listen(self, seconds: float) -> None:
         end_ns = self._clock.monotonic() + int(seconds * 1e9)
         while (remaining_ns := end_ns - self._clock.monotonic()) > 0:
-            arrived = self._inbox.take(remaining_ns * 1e-9)
-            if arrived is None:
+            if (arrived := self._inbox.take(remaining_ns * 1e-9)) is None:
                 break
             self._take(*arrived)
         view = self.view()
@@ -239,12 +239,12 @@ class RunSession:
             self._health.count_up_to({f"restarts.{child.component}": child.restarts})
             starved = child.state is ChildState.RUNNING and child.reason
             level = Level.ERROR if child.lacks else Level.WARNING if starved else _LEVELS.get(child.state, Level.OK)
-            why = f"{child.component} {child.condition}" if child.reason else ""
-            self._health.report(child.component, level, why)
+            self._health.report(child.component, level, f"{child.component} {child.condition}" if child.reason else "")
             self._health.label(f"{PROCESS}{child.component}", child.condition)
         self._health.count_up_to({"malformed": self._live.malformed, "not_shown": sum(self._inbox.dropped.values())})
         if self._health.due():
             self._bus.report(self._health)
-            rivals = self._publishers.trouble
-            self._health.report("publishers", Level.ERROR if rivals else Level.OK, rivals)
+            view = self.view()
+            for topic, trouble in ("publishers", view.rivals), ("host that captures", view.capture_silence):
+                self._health.report(topic, Level.ERROR if trouble else Level.OK, trouble)
         self._health.tick()

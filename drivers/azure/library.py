@@ -16,7 +16,7 @@ from typing import Any
 from drivers.contract.device import SdkMissingError
 
 #: The wheel's only requirement is NumPy, which is here.
-_INSTALL = ".venv/bin/pip install --no-deps pyk4a-bundle"
+_OPTIONS = "--no-deps"
 #: The library of Microsoft's own packages, where the wheel is not installed.
 _SYSTEM = "libk4a.so.1.4"
 _ERROR = 1
@@ -101,7 +101,7 @@ def load() -> Any:
             getattr(sdk, function).argtypes = arguments
         sdk.k4a_set_debug_message_handler(_listen, None, _ERROR)
         return sdk
-    raise SdkMissingError("pyk4a-bundle", command=_INSTALL, newest_python=(3, 12))
+    raise SdkMissingError("pyk4a-bundle", options=_OPTIONS, newest_python=(3, 12))
 
 
 def forget() -> None:

@@ -3,9 +3,26 @@
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 #: The Python that runs.
 PYTHON = sys.version_info[:2]
+
+
+def pip_install(arguments: str) -> str:
+    """Command that installs packages into the environment that runs: that of a clone, or of a service."""
+    environment = Path(sys.prefix)
+    return f"{'.venv' if _of_a_clone(environment) else environment}/bin/pip install {arguments}"
+
+
+def install_extra(name: str) -> str:
+    """Command that adds an extra of this project to the environment that runs; for a shell in the clone."""
+    editable = "-e " if _of_a_clone(Path(sys.prefix)) else ""
+    return pip_install(f"{editable}'.[{name}]'")
+
+
+def _of_a_clone(environment: Path) -> bool:
+    return environment.name == ".venv"
 
 
 class DeviceError(Exception):
@@ -26,7 +43,7 @@ class SdkMissingError(FinalError):
     Args:
         package: the package that cannot be imported.
         extra: the extra of this project that installs it, "" if there is none.
-        command: what installs it where no extra can.
+        options: of `pip install`, where no extra installs it.
         newest_python: the last version, such as (3, 13), that its wheels are for, if there are later ones.
         error: of its import; a library of the system may be missing that it needs.
     """
@@ -36,7 +53,7 @@ class SdkMissingError(FinalError):
         package: str,
         extra: str = "",
         *,
-        command: str = "",
+        options: str = "",
         newest_python: tuple[int, int] | None = None,
         error: ImportError | None = None,
     ) -> None:
@@ -49,7 +66,7 @@ class SdkMissingError(FinalError):
             self.remedy = f"make clean all PYTHON=python{newest}"
         else:
             self.reason = f"{package} is not installed"
-            self.remedy = command or f".venv/bin/pip install -e '.[{extra}]'"
+            self.remedy = pip_install(f"{options} {package}") if options else install_extra(extra)
         super().__init__(f"{self.reason}:  {self.remedy}")
 
 

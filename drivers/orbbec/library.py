@@ -18,7 +18,7 @@ from drivers.contract.errors import translated_sdk_errors
 _BEGINS_S = 0.1
 
 #: The wheel's requirements are those of its examples: 2 GB, and an older NumPy than ours.
-_INSTALL = ".venv/bin/pip install --no-deps pyorbbecsdk2"
+_OPTIONS = "--no-deps"
 
 
 def load() -> Any:
@@ -31,7 +31,7 @@ def load() -> Any:
         with _silent():
             import pyorbbecsdk  # noqa: PLC0415  no requirement of ours
     except ImportError as error:
-        raise SdkMissingError("pyorbbecsdk2", command=_INSTALL, newest_python=(3, 13), error=error) from error
+        raise SdkMissingError("pyorbbecsdk2", options=_OPTIONS, newest_python=(3, 13), error=error) from error
     return pyorbbecsdk
 
 

@@ -14,6 +14,8 @@ from abs_service.bus.security import roles
 
 #: Time in which a router has to refuse a client [s].
 ANSWER_S = 2.0
+#: X509_V_ERR_INVALID_PURPOSE of OpenSSL: here, a certificate of a client at a process that listens.
+INVALID_PURPOSE = 26
 
 
 class TlsError(Exception):
@@ -101,7 +103,9 @@ class MutualTls:
         try:
             found = _handshake(client, server, host)
         except ssl.SSLCertVerificationError as error:
-            raise self._error("certificate", f"others refuse it, by {self.authority}: {error.verify_message}") from None
+            problem = f"others refuse it, by {self.authority}: {error.verify_message}"
+            remedy = f"; a process that listens needs {roles.RIG}.pem" * (error.verify_code == INVALID_PURPOSE)
+            raise self._error("certificate", problem + remedy) from None
         allowed = (roles.RIG,) if listens else self.names
         if found.name not in allowed:
             raise self._error("certificate", f'its name is "{found.name}"; this process needs {" or ".join(allowed)}')

@@ -41,7 +41,7 @@ def cross_validation(agreement: Agreement) -> "Figure":
     du, dv = agreement.differences[..., 0], agreement.differences[..., 1]
     unit = max(agreement.difference_px, 1e-6)
     arrows = axes.quiver(u, v, du, dv, angles="xy", scale_units="xy", scale=unit / (0.04 * float(u.max())), width=0.003)
-    axes.quiverkey(arrows, 0.85, 1.04, unit, f"{unit:.2g} px", labelpos="E")
+    plots.key_of_arrows(figure, axes, arrows, unit)
     axes.set_title(
         f"{agreement.of}: {agreement.difference_px:.2g} px, predicted {agreement.predicted_px:.2g} px",
         loc="left", fontsize="medium",

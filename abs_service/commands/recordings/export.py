@@ -29,6 +29,7 @@ from abs_service.export import animation, arrays, series, table, viewers
 from abs_service.export.errors import ExportError
 from abs_service.supervision.exit_codes import Exit
 from abs_service.wire.estimate_messages import STATE
+from drivers.contract.errors import install_extra
 from drivers.replay.contents import scan
 
 #: Rate of the meshes and points for viewers [Hz].
@@ -75,7 +76,7 @@ def run(arguments: argparse.Namespace) -> int:
     path: Path = arguments.out or source.parent / f"{source.stem}_view.mcap"
     package, extra = _EXTRAS.get(path.suffix, ("", ""))
     if package and find_spec(package) is None:
-        raise ExportError(f"--out {path} needs {package}: .venv/bin/pip install -e '.[{extra}]' in the clone")
+        raise ExportError(f"--out {path} needs {package}: {install_extra(extra)} in the clone")
     if path.exists():
         raise ExportError(f"{path} is there already; name another file with --out")
     try:

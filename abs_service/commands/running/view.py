@@ -16,6 +16,7 @@ from pathlib import Path
 from abs_service.commands.parts import rig_process
 from abs_service.commands.parts.options import OptionError, port
 from abs_service.supervision.exit_codes import Exit
+from drivers.contract.errors import install_extra
 
 PORT = 8080
 
@@ -40,7 +41,7 @@ def check() -> None:
         OptionError: it is not installed.
     """
     if find_spec("viser") is None:
-        raise OptionError("the page needs viser: .venv/bin/pip install -e '.[view]' in the clone")
+        raise OptionError(f"the page needs viser: {install_extra('view')} in the clone")
 
 
 def run(arguments: argparse.Namespace) -> int:

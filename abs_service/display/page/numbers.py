@@ -1,6 +1,6 @@
 """Figures of each estimate that the page keeps for a minute, and what was lost until then."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,9 +51,12 @@ def of_state(state: DeformationState, t_s: float, lost: Mapping[str, int]) -> Nu
     return Numbers(t_s, *effort, likelihoods, deviation_mm, state.model_id, theta, lost)
 
 
-def rate_hz(numbers: Iterable[Numbers], now_s: float, seconds: float = 3.0) -> float:
-    """Estimates per second in the last seconds."""
-    return sum(one.t_s > now_s - seconds for one in numbers) / seconds
+def rate_hz(numbers: Sequence[Numbers], now_s: float, seconds: float = 3.0) -> float:
+    """Estimates per second in the last seconds, or after the first one if that came later."""
+    times_s = [one.t_s for one in numbers if one.t_s > now_s - seconds]
+    if len(times_s) < len(numbers):
+        return len(times_s) / seconds
+    return (len(times_s) - 1) / (now_s - times_s[0]) if times_s and times_s[0] < now_s else 0.0
 
 
 def losses(health: Health) -> int:

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 WINDOW_NS = 60_000_000_000
 #: Said of a disk that is full before the limits of the recordings delete any.
 TOO_SMALL = ", too small for what record.retain_* and record.rotate_* keep"
+#: Said of a disk on which recording does not begin.
+NO_ROOM = "less than record.minimum_free_bytes is free on this disk"
 
 
 class RateMeter:
@@ -80,6 +82,8 @@ def text(recordings: Growth, estimates: Growth, room: float) -> str:
     if recordings.rate <= 0:
         return ""
     seconds = room_s((recordings, estimates), room)
+    if seconds <= 0:
+        return NO_ROOM
     if seconds < float("inf"):
         unmet = seconds * recordings.rate < recordings.more < float("inf")
         return f"{duration(seconds)} on this disk" + TOO_SMALL * unmet

@@ -48,4 +48,5 @@ class Space:
         self._is_short = left < (resumes - self._minimum if self._is_short else 0)
         if self._is_short:
             free = f"only {max(left + self._minimum, 0) / 1e6:.0f} MB free in {self._directory}"
-            raise OSError(f"{free}; recording resumes with {resumes / 1e6:.0f} MB")
+            limit = f"record.minimum_free_bytes is {self._minimum / 1e6:.0f} MB"
+            raise OSError(f"{free}, {limit}; recording resumes with {resumes / 1e6:.0f} MB")

@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from abs_service.supervision.health.rig_view import RigView
+from drivers.contract.errors import install_extra
 
 if TYPE_CHECKING:
     from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily
@@ -36,9 +37,7 @@ def served(port: int) -> Iterator[Callable[[RigView], None]]:
     try:
         from prometheus_client import CollectorRegistry, start_http_server  # noqa: PLC0415 - an extra
     except ImportError as error:
-        missing = (
-            f"run.metrics_port = {port}: needs prometheus-client: .venv/bin/pip install -e '.[metrics]' in the clone"
-        )
+        missing = f"run.metrics_port = {port}: needs prometheus-client: {install_extra('metrics')} in the clone"
         raise MetricsError(missing) from error
     snapshot, registry = _Snapshot(), CollectorRegistry()
     registry.register(snapshot)

@@ -58,6 +58,7 @@ class RigView:
         host_clock: which host's clock that is, see `drivers.contract.host_clock`; ages on others are not shown.
         refused: messages that this process did not take, in words.
         rivals: topics that another process publishes, too, in words.
+        captured_at: endpoint of the host that captures; "" if this one does.
         silent: for how long there has been no estimate, in words, by each tracker of which that is too long.
     """
 
@@ -71,6 +72,7 @@ class RigView:
     host_clock: str
     refused: str = ""
     rivals: str = ""
+    captured_at: str = ""
     silent: Mapping[str, str] = field(default_factory=dict)
 
     @property
@@ -110,7 +112,7 @@ class RigView:
             files=counters["files"],
             recorded=counters["recorded"],
             dropped=dropped(counters),
-            forecast=health.labels.get("forecast", ""),
+            forecast=health.labels.get("forecast", "") if self.streams else "",  # configurations alone last for years
         )
 
     @property
@@ -129,6 +131,7 @@ class RigView:
         ]
         found += [("run", Health.LEVEL_WARNING, self.refused)] if self.refused else []
         found += [("run", Health.LEVEL_ERROR, self.rivals)] if self.rivals else []
+        found += [("run", Health.LEVEL_ERROR, self.capture_silence)] if self.capture_silence else []
         for child in self.children:
             given_up = child.state is ChildState.FAILED
             if given_up or child.lacks:
@@ -137,14 +140,23 @@ class RigView:
         return found
 
     @property
+    def capture_silence(self) -> str:
+        """For how long nothing has come from the host that captures, in words; "" if it speaks, or is this one."""
+        last_ns = self.live.received.get("capture", Received()).t_ns
+        silent_s = min((self.now_ns - last_ns) * 1e-9, self.elapsed_s)
+        if not self.captured_at or silent_s * 1e9 < SILENT_NS:
+            return ""
+        return f"nothing comes from capture --listen at {self.captured_at}, for {silent_s:.0f} s"
+
+    @property
     def activity(self) -> str:
         """Current stage of the start; "" once there are estimates, or if nothing is tracked."""
         if self.live.preparing():
             compiled = self.live.compiled()
             return f"Compiling kernels for this rig: {compiled} …" if compiled else "Loading kernels …"
         if "capture" not in self.live.received:
-            starts = any(child.component == "capture" for child in self.children)
-            return "Starting the processes …" if starts else f"Waiting for a host that captures {self.rig} …"
+            elsewhere = f"Waiting for capture --listen of {self.rig} at {self.captured_at} …"
+            return elsewhere if self.captured_at else "Starting the processes …"
         if any(tracker.last is None for tracker in self.live.trackers.values()):
             return "Waiting for the first estimate …"
         return ""

@@ -135,11 +135,6 @@ def test_before_the_first_message_the_table_shows_the_stage_of_the_start():
     assert view(live).recording is None
 
 
-def test_a_rig_that_opens_no_device_waits_for_the_host_that_does():
-    elsewhere = view(RigState(["sheet"], Clock()), children=[Child("track/sheet", (), 1)])
-    assert "Waiting for a host that captures demo" in drawn(elsewhere)
-
-
 def test_markup_in_what_others_say_is_only_text(live):
     take_health(live, Health(component="capture", level=Health.LEVEL_ERROR, message="[red]odd[/blue]"))
     live.trackers["sheet"].last = report(reasons=("[/] [bold",))
@@ -175,3 +170,11 @@ def test_a_file_name_from_the_network_stays_in_the_folder_and_the_forecast_is_sh
     assert (shown := view(live).recording)
     assert shown.file == Path("/takes/passwd")
     assert "2.6 days on this disk" in drawn(view(live), width=120)
+
+
+def test_how_long_the_disk_lasts_is_not_told_before_there_are_images():
+    live, waiting = RigState(["sheet"], Clock()), recorder(50_000)
+    waiting.labels["forecast"] = "211.6 days on this disk"
+    take_health(live, waiting)
+    assert (shown := view(live).recording)
+    assert shown.forecast == ""

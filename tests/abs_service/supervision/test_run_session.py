@@ -16,6 +16,7 @@ from abs_service.display.terminal.lines import PlainDisplay
 from abs_service.display.terminal.output import Output
 from abs_service.supervision.children.child import Child
 from abs_service.supervision.exit_codes import Exit
+from abs_service.supervision.health import rig_view
 from abs_service.supervision.limits import Limits
 from abs_service.supervision.run_session import Renewal, RunSession
 from abs_service.supervision.supervisor import Supervisor
@@ -48,12 +49,12 @@ def rig_file(tmp_path, endpoint):
 class Bench:
     """A session around processes that do nothing, one of which may end; none is started while the host has a lack."""
 
-    def __init__(self, display, trackers=()):
+    def __init__(self, display, trackers=(), captured_at=""):
         self.bus = LoopbackBus()
         self.killed = []
         self.lack: OSError | None = None
         limits = Limits(startup_ns=10**12, stall_ns=0, restarts=0)
-        children = [Child("capture", (), 0), Child("record", (), 1)]
+        children = [*([] if captured_at else [Child("capture", (), 0)]), Child("record", (), 1)]
         self.supervisor = Supervisor(children, self._spawn, time.monotonic_ns, limits)
         self.session = RunSession(
             CheckedBus(self.bus, time.monotonic_ns),
@@ -64,6 +65,7 @@ class Bench:
             self.supervisor,
             display,
             WallClock(),
+            captured_at=captured_at,
         )
 
     def _spawn(self, component, _):
@@ -127,6 +129,27 @@ def test_a_tracker_that_falls_silent_is_an_error_whatever_the_cause(monkeypatch)
     bench.session.run_until(lambda: last().level == Health.LEVEL_OK or bench.session.elapsed_s > 60)
     assert last().level == Health.LEVEL_OK
     assert bench.session.view().silent == {}
+
+
+def test_a_host_that_captures_and_is_silent_is_an_error_with_its_address(monkeypatch):
+    monkeypatch.setattr(rig_view, "SILENT_NS", 1_500_000_000)
+    shown = []
+    display = PlainDisplay(Output(shown.append), Output(io.StringIO().write))
+    bench = Bench(display, ["sheet"], captured_at="tcp/far:7447")
+
+    def last():
+        reported = [Health.FromString(sample.payload) for sample in bench.bus.sent if sample.topic == "health/run"]
+        return reported[-1] if reported else Health()
+
+    bench.session.run_until(lambda: bool(shown))
+    assert "Waiting for capture --listen of bench at tcp/far:7447" in shown[0]
+    bench.session.run_until(lambda: last().level == Health.LEVEL_ERROR or bench.session.elapsed_s > 30)
+    assert "nothing comes from capture --listen at tcp/far:7447, for " in last().message
+    speaks = bench.bus.publisher(keys.health("capture"), Health.DESCRIPTOR.full_name, EVENTS)
+    speaks.put(Health(component="capture").SerializeToString())
+    bench.session.run_until(lambda: last().level == Health.LEVEL_OK or bench.session.elapsed_s > 60)
+    assert bench.session.view().capture_silence == ""
+    assert last().level == Health.LEVEL_OK
 
 
 def test_what_a_new_configuration_concerns_starts_again_and_capture_is_told():

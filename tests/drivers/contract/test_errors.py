@@ -21,6 +21,12 @@ def test_what_stands_in_the_way_of_a_library_is_said(error, message):
     assert str(SdkMissingError("sdk", "extra", error=error)).startswith(message)
 
 
+def test_what_installs_a_library_names_the_environment_that_runs(monkeypatch):
+    monkeypatch.setattr("sys.prefix", "/opt/abs-service")
+    assert errors.install_extra("view") == "/opt/abs-service/bin/pip install '.[view]'"
+    assert SdkMissingError("sdk", options="--no-deps").remedy == "/opt/abs-service/bin/pip install --no-deps sdk"
+
+
 @pytest.mark.parametrize(("running", "is_reported"), [((3, 13), False), ((3, 14), True)])
 def test_a_library_without_a_wheel_for_this_python_asks_for_another(running, is_reported, monkeypatch):
     monkeypatch.setattr(errors, "PYTHON", running)

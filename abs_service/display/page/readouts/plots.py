@@ -44,7 +44,14 @@ def plots(numbers: Sequence[Numbers], sigmas: Mapping[str, NDArray[np.float64]],
     }
     chosen = {name: binned(column[:, 0] - now_s, column[:, 1]) for name, column in sigmas.items()}
     found = {"latency [ms]": means.pop("latency [ms]")} | rates | means
-    return found | {"σ of the followed vertices [mm]": chosen} if chosen else found
+    if chosen:
+        found["σ of the followed vertices [mm]"] = chosen
+    return {title: _known(curves) for title, curves in found.items()}
+
+
+def _known(curves: Curves) -> Curves:
+    """Curves with a value, all if none has one: one without would hide the others, as the ages of a replay do."""
+    return {name: curve for name, curve in curves.items() if np.isfinite(curve).any()} or curves
 
 
 def lost(numbers: Sequence[Numbers]) -> dict[str, NDArray[np.floating]]:

@@ -12,6 +12,8 @@ from abs_service.display.page.numbers import rate_hz
 from abs_service.display.page.readouts import words
 from abs_service.display.page.readouts.words import STALE_S, STATUS, StatusLine
 
+#: Time after a tracker's first estimate from which its rate is judged [s].
+JUDGED_AFTER_S = 1.0
 #: Begin of the message of a tracker's health where that is its status.
 _STATUSES = tuple(f"{name}: " for name in STATUS)
 
@@ -57,6 +59,8 @@ def _tracker(feed: Feed, tracker: str) -> StatusLine:
 
 def _slow(feed: Feed, tracker: str) -> str:
     numbers = feed.numbers(tracker)
+    if not numbers or feed.now_s - numbers[0].t_s < JUDGED_AFTER_S:
+        return ""
     depth = [topic for topic in feed.streams() if topic.endswith("/depth/image")]
     camera_hz = max((feed.image_rate_hz(topic) for topic in depth), default=0.0)
     return words.slow(rate_hz(numbers, feed.now_s), camera_hz, sum(one.skipped for one in numbers))

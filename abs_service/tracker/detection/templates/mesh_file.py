@@ -17,6 +17,7 @@ from abs_service.tracker.detection.shapes.resampling import evenly_spread, trian
 from abs_service.tracker.detection.shapes.samples import Samples
 from abs_service.tracker.detection.templates.known_object import KnownObject
 from abs_service.tracker.mesh import Mesh, edge_lengths, sides_of
+from drivers.contract.errors import install_extra
 
 #: Formats that are read, by the ending of the name.
 FORMATS = (".obj", ".ply", ".stl")
@@ -80,9 +81,8 @@ def _read(path: Path) -> _Content:
     try:
         trimesh = import_module("trimesh")
     except ImportError:
-        raise DetectionError(
-            "template type \"mesh\" needs a library: .venv/bin/pip install -e '.[mesh]' in the clone"
-        ) from None
+        needed = f'template type "mesh" needs a library: {install_extra("mesh")} in the clone'
+        raise DetectionError(needed) from None
     try:
         found = trimesh.load_mesh(path, process=False)
     except Exception as error:  # each of its readers has errors of its own

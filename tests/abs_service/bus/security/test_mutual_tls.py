@@ -84,7 +84,7 @@ def test_a_certificate_of_another_authority_is_not_used(keys, tmp_path):
     [
         ("rig", "tls/rig.lab:1", "Hostname mismatch, certificate is not valid for 'rig.lab'"),
         ("rig", "tls/127.0.0.1:1", "IP address mismatch, certificate is not valid for '127.0.0.1'"),
-        ("viewer", "tls/localhost:1", "unsuitable certificate purpose"),
+        ("viewer", "tls/localhost:1", "unsuitable certificate purpose; a process that listens needs rig.pem"),
     ],
 )
 def test_who_listens_has_a_certificate_for_its_host(name, endpoint, message, keys):

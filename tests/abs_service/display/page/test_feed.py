@@ -1,6 +1,7 @@
 """The page's copy of a rig's state, fed from the bus."""
 
 import numpy as np
+import pytest
 from absmsg.v1.deformation_state_pb2 import DeformationState
 from absmsg.v1.deformed_mesh_pb2 import DeformedMesh, MeshTopology
 from absmsg.v1.health_pb2 import Health
@@ -51,6 +52,16 @@ def test_numbers_are_kept_for_a_minute_and_give_the_rate():
     numbers = rig.feed.numbers("sheet")
     assert [one.solve_ms for one in numbers] == list(range(29, 90))
     assert rate_hz(numbers, rig.feed.now_s) == 1.0
+
+
+def test_a_rate_is_not_taken_for_lower_in_the_first_seconds():
+    rig = Rig()
+    for frame in range(31):
+        rig.now_ns = frame * 33_000_000
+        rig.send("sheet/state", DeformationState(tracker="sheet"))
+        if not frame:
+            assert rate_hz(rig.feed.numbers("sheet"), rig.feed.now_s) == 0.0
+    assert rate_hz(rig.feed.numbers("sheet"), rig.feed.now_s) == pytest.approx(1 / 0.033)
 
 
 def test_every_estimate_has_what_each_component_had_lost_until_then():

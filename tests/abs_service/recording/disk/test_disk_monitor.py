@@ -26,7 +26,7 @@ MB = 1_000_000
     [
         (45 * MB, 10_108_800 * MB, 0, math.inf, math.inf, "2.6 days on this disk"),
         (45 * MB, 500_000 * MB, 0, math.inf, math.inf, "3.1 hours on this disk"),
-        (45 * MB, -1, 0, math.inf, math.inf, "0 s on this disk"),
+        (45 * MB, -1, 0, math.inf, math.inf, forecast.NO_ROOM),
         (45 * MB, 500_000 * MB, 0, 7200.0, math.inf, "the last 2.0 hours are kept"),
         (50 * MB, 500_000 * MB, 0, math.inf, 360_000 * MB, "the last 2.0 hours are kept"),
         (50 * MB, 300_000 * MB, 60_000 * MB, math.inf, 360_000 * MB, "the last 2.0 hours are kept"),

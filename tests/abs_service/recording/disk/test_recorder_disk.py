@@ -68,7 +68,9 @@ def test_it_stops_before_the_disk_is_full_with_a_complete_file_and_resumes_when_
     assert eventually(lambda: rig.written(1))
     free[0] = 999
     assert eventually(lambda: rig.recorder.failed)
-    assert rig.recorder.failed == f"only 0 MB free in {tmp_path}; recording resumes with 0 MB"
+    assert rig.recorder.failed == (
+        f"only 0 MB free in {tmp_path}, record.minimum_free_bytes is 0 MB; recording resumes with 0 MB"
+    )
     assert rig.said.message.startswith("RECORD_FAILED only 0 MB free")
     (path,) = recordings(tmp_path)
     assert metadata(path)["ended"] == "low space"

@@ -1,5 +1,7 @@
 """Curves of the last minute."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from abs_service.display.page.numbers import Numbers
@@ -32,6 +34,13 @@ def test_sigma_is_plotted_and_an_unknown_one_left_out():
     assert drawn["σ of a vertex, median [mm]"]["σ"][-1] == 0.7
     assert drawn["latency [ms]"]["search"][-1] == 10.0
     assert drawn["log-likelihood of a vertex"]["tof"][-1] == -1.0
+
+
+def test_ages_that_nobody_knows_as_those_of_a_replay_do_not_hide_the_search():
+    replayed = replace(numbers(9.7, [0.0]), age_ms=float("nan"))
+    drawn = plots([replayed], {}, 10.0)["latency [ms]"]
+    assert [len(column) for column in complete(list(drawn.values()))] == [1, 1]
+    assert drawn["search"][-1] == 10.0
 
 
 def test_losses_are_plotted_by_component_as_what_came_between_two_estimates():

@@ -111,9 +111,13 @@ def test_a_slow_tracker_is_told_while_it_has_estimates(rig):
     rig.health("capture", "", Health.LEVEL_OK, gauges={"rate_hz.tof/depth/image": 30.0})
     rig.state("left", "TRACKING")
     assert rig.titles() == ["Tracking"]
+    rig.now_ns = 500_000_000
+    rig.state("left", "TRACKING", skipped=2)
+    assert [line.text for line in status.lines(rig.feed, "left", "Start it.")] == [""], "too early to tell"
+    rig.now_ns = 1_500_000_000
     rig.state("left", "TRACKING", skipped=2)
     (line,) = status.lines(rig.feed, "left", "Start it.")
     assert line.title == "Tracking"
     assert line.text.startswith("Only 1 estimates a second of 30 images")
-    rig.now_ns = 2_000_000_000
+    rig.now_ns = 3_500_000_000
     assert rig.titles() == ["No estimate for 2.0 s"]
