@@ -23,7 +23,7 @@ from evaluation.scenes.boards.bent import bent
 #: Ratios of scatter to ±, smallest and largest, and the known reasons for others.
 _LOW, _HIGH = 0.8, 1.3
 _FLOOR = "Of a dozen poses, ± has a floor by the noise of single corners, and is stated rather too large."
-_FEW = "Poses that are too few for the parameters (the Azure Kinect's; not trusted), or errors that views have in common."
+_FEW = "Too few distinct poses for the parameters (Azure Kinect, not trusted), or errors that views have in common."
 
 
 def cases(draws: int, rigs: int) -> tuple[Case, ...]:
