@@ -11,7 +11,7 @@ from calib.calibration_check.stored import Stored, Views
 from calib.solve.bundle import robust
 from calib.solve.bundle.adjustment import NotSolvedError
 from calib.solve.start.board_poses import pose_candidates
-from calib.solve.validation.distance_errors import DistanceShift, Misread, distance_errors
+from calib.solve.validation.unlike_shots.foreign_distances import DistanceError, wrong_distances
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ def distance_bias(stored: Stored, views: Views, sensor: str) -> DistanceBias | N
     )
 
 
-def distance_error(stored: Stored, views: Views, sensor: str, needed_px: float) -> Misread | DistanceShift | None:
+def distance_error(stored: Stored, views: Views, sensor: str, needed_px: float) -> DistanceError | None:
     """Mistake in the distances of a sensor, by its own corners, or by those of all others if it makes no image.
 
     None without any, and if the other sensors contradict each other.
@@ -96,6 +96,6 @@ def distance_error(stored: Stored, views: Views, sensor: str, needed_px: float) 
     if not used.planes:
         return None
     try:
-        return next(iter(distance_errors(solve(stored, used, ()), needed_px)), None)
+        return next(iter(wrong_distances(solve(stored, used, ()), needed_px)), None)
     except NotSolvedError:
         return None

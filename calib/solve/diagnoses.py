@@ -227,11 +227,11 @@ def _scale(name: str, task: Task, state: State) -> float | None:
         board = camera.T_sr @ state.boards[view.shot]
         said[index] = board[:3, 2] @ board[:3, 3]
         measured[index] = fit_plane(camera, view)[1]
-    return _factor(said, measured)
+    return robust_line(said, measured)[0]
 
 
-def _factor(said: NDArray[np.float64], measured: NDArray[np.float64]) -> float | None:
-    """Robust slope of measured over described distances, with an offset if their range suffices."""
+def robust_line(said: NDArray[np.float64], measured: NDArray[np.float64]) -> tuple[float, float]:
+    """Slope of measured over described distances (n,), and offset if their range suffices, otherwise 0."""
     spread = float(np.ptp(said) / np.median(said))
     terms = np.stack([said, np.ones_like(said)], axis=1)
     if spread < 0.3:
@@ -242,4 +242,4 @@ def _factor(said: NDArray[np.float64], measured: NDArray[np.float64]) -> float |
         found = np.linalg.lstsq(terms * weights[:, None], measured * weights, rcond=None)[0]
         misses = np.abs(measured - terms @ found)
         weights = 1 / np.sqrt(1 + (misses / (2 * np.median(misses) + 1e-9)) ** 2)
-    return float(found[0])
+    return float(found[0]), float(found[1:].sum())

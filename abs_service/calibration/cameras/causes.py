@@ -12,8 +12,8 @@ from calib.calibration_check.hypotheses import TERMS, Kind
 from calib.calibration_check.mistakes import Mistake
 from calib.calibration_check.stored import Views
 from calib.solve.validation.board_shape import ShapeError
-from calib.solve.validation.distance_errors import DistanceShift, Misread
 from calib.solve.validation.unlike_shots.contradictions import Contradiction
+from calib.solve.validation.unlike_shots.foreign_distances import DistanceError
 
 #: Distance bias that is as good as any depth camera's, and that is unacceptable [m].
 UNNOTICED_M, WRONG_M = 0.002, 0.01
@@ -116,8 +116,8 @@ def of_misprint(found: ShapeError) -> Verdict:
     return Verdict(Level.BAD, text, f"{found.shape.value[0].upper()}{found.shape.value[1:]}.")
 
 
-def of_distance_error(found: Misread | DistanceShift) -> Verdict:
-    """Verdict on distances of another geometry, or on a displaced depth image."""
+def of_distance_error(found: DistanceError) -> Verdict:
+    """Verdict on distances of another geometry or unit, or on a depth image that is displaced, mirrored or turned."""
     return Verdict(Level.BAD, f"{found.finding}.", f"{found.remedy[0].upper()}{found.remedy[1:]}.", found.sensor)
 
 

@@ -22,7 +22,7 @@ from calib.calibration_check.hypotheses import TERMS, Kind
 from calib.calibration_check.misprint import misprint
 from calib.calibration_check.optics import OpticsChange, optics_change
 from calib.calibration_check.stored import Stored, Views, usable
-from calib.solve.validation.distance_errors import DistanceShift, Misread
+from calib.solve.validation.unlike_shots.foreign_distances import DistanceError
 
 #: Expected reprojection error if the calibration does not contain its own [px].
 BASELINE_PX = 0.5
@@ -58,7 +58,7 @@ class Verification:
     focal_px: Mapping[str, float]
     expected_px: Mapping[str, float]
     biases: Mapping[str, DistanceBias]
-    errors: Mapping[str, Misread | DistanceShift]
+    errors: Mapping[str, DistanceError]
     changes: tuple[PairChange, ...]
     comparison: Comparison
     reaches: Mapping[str, DistanceRange]

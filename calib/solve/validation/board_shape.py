@@ -6,7 +6,7 @@ equations, its deviation from the scatter of the distinct poses (a sandwich esti
 `calib.solve.bundle.uncertainty`).
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import Enum
 
@@ -19,8 +19,9 @@ from calib.solve.solution import Solution
 from calib.solve.validation import projection_uncertainty
 from calib.solve.validation.support import supported
 
-#: Errors are named from this many deviations on, …
-CERTAIN = 5.0
+#: Errors are named from this many deviations on, and an uneven print, for which there are six of them and which other
+#: mistakes reach with 5.8, from more, …
+CERTAIN, CERTAIN_UNEVEN = 5.0, 8.0
 
 #: … and if they change projections by this share of what is needed; a bend or skew, which a lens that fits nearly and a
 #: motion imitate, by more.
@@ -29,6 +30,9 @@ NOTICED, NOTICED_BEND = 0.15, 0.25
 #: Sizes of the errors that columns of the equations stand for: 1 %, 1 mm.
 _SHARE, _BEND_M = 0.01, 1e-3
 
+
+#: Powers of x and y of points that are displaced within the plane of the board, along each of its axes.
+_UNEVEN = ((2, 0), (1, 1), (0, 2))
 
 #: Powers of x and y of the bends, even and odd ones; the latter leave fewer traces in the image of a narrow lens.
 _POWERS = ((2, 0), (0, 2), (1, 1), (3, 0), (2, 1), (1, 2), (0, 3))
@@ -43,6 +47,7 @@ class Shape(Enum):
         "while a rolling shutter read the rows: hold it still"
     )
     TAGS = "measure a tag and a gap with a ruler, and correct the description"
+    UNEVEN = "measure the outermost squares of all four sides with a ruler, and print anew"
     BEND = "glue it onto a flat plate"
 
 
@@ -52,7 +57,8 @@ class ShapeError:
 
     Attributes:
         shape: length along x relative to y [%], the angle between rows and columns beyond a right one [% of a radian],
-            size of the tags relative to the distances of their centres [%], or a bend from the middle to the edge [mm].
+            size of the tags relative to the distances of their centres [%], or how far points of the edge are displaced
+            from the middle on, by squares of x and y, within the board or out of it (a bend, also by cubes) [mm].
         size, sigma: its estimate and standard deviation.
         effect_px: how much projections change if it is taken into account, root mean square, at the distance of the
             scene or those of the boards where that is most [px].
@@ -95,6 +101,9 @@ class ShapeError:
             change = effect.replace("change", "changes")
             return f"tags are {size} {than} than described, compared with their distances, which {change}"
         bend = f"{abs(self.size):.2g} ± {self.sigma:.1g} mm"
+        if self.shape == Shape.UNEVEN:
+            change = effect.replace("change", "changes")
+            return f"the print is uneven: from its middle to its edges points are displaced by {bend}, which {change}"
         return f"a board that is bent by {bend} would explain what the corners miss by, and {effect}"
 
     def __str__(self) -> str:
@@ -113,7 +122,7 @@ def shape_errors(solution: Solution, distance: float, needed_px: float) -> list[
     found = [
         one
         for one in _estimates(solution, distance)
-        if abs(one.size) > CERTAIN * one.sigma
+        if abs(one.size) > (CERTAIN_UNEVEN if one.shape == Shape.UNEVEN else CERTAIN) * one.sigma
         and one.effect_px > (NOTICED if one.shape in (Shape.STRETCH, Shape.TAGS) else NOTICED_BEND) * needed_px
     ]
     misprints = sorted((one for one in found if one.is_misprint), key=lambda one: -one.certainty)
@@ -123,30 +132,39 @@ def shape_errors(solution: Solution, distance: float, needed_px: float) -> list[
 
 def _estimates(solution: Solution, distance: float) -> Iterator[ShapeError]:
     equations = solution.adjustment.equations
-    columns = shape_columns(equations, equations.jacobian(np.zeros(equations.layout.size)), _displacements)
-    shapes = (Shape.STRETCH, Shape.SKEW, Shape.TAGS, *(Shape.BEND,) * len(_POWERS))
-    every = further(equations, solution.adjustment.residuals, [column[:, None] for column in columns.T])
-    for shape, one in zip(shapes, every, strict=False):  # of too few poses there are none
-        yield ShapeError(shape, one.sizes.item(), one.sigmas.item(), effect_px(solution, one.changes, distance))
+    jacobian = equations.jacobian(np.zeros(equations.layout.size))
+    columns, bent = shape_columns(equations, jacobian, _displacements), shape_columns(equations, jacobian, bends)
+    shapes = (Shape.STRETCH, Shape.SKEW, Shape.TAGS, *(Shape.UNEVEN,) * 2 * len(_UNEVEN), *(Shape.BEND,) * len(_POWERS))
+    # A bend looks uneven where boards are tilted alike.
+    beside = [bent if shape == Shape.UNEVEN else bent[:, :0] for shape in shapes]
+    given = [np.column_stack(each) for each in zip([*columns.T, *bent.T], beside, strict=True)]
+    for shape, one in zip(shapes, further(equations, solution.adjustment.residuals, given), strict=False):
+        # Of too few poses there are none.
+        yield ShapeError(shape, float(one.sizes[0]), float(one.sigmas[0]), effect_px(solution, one.changes, distance))
 
 
 def _displacements(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Displacements of points of the board (n, 3) in its frame, for each error (n, 10, 3) [m]."""
+    """Displacements of points of the board (n, 3) within its plane, for each error of the print (n, 9, 3) [m]."""
     low, high = points.min(axis=0), points.max(axis=0)
     x, y, _ = (points - (low + high) / 2).T
     none = np.zeros_like(x)
     stretch = np.stack([x, -y, none], axis=1) * _SHARE / 2
     skew = np.stack([y, x, none], axis=1) * _SHARE / 2
     tags = np.stack([_from_tag(points[:, 0]), _from_tag(points[:, 1]), none], axis=1) * _SHARE
-    return np.concatenate([np.stack([stretch, skew, tags], axis=1), bends(points)], axis=1)
+    along = _curves(points, _UNEVEN)[:, :, None]
+    return np.concatenate([np.stack([stretch, skew, tags], axis=1), along * np.eye(3)[0], along * np.eye(3)[1]], axis=1)
 
 
 def bends(points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Displacements of points of the board (n, 3) in its frame, for each bend (n, 7, 3) [m]."""
+    return _curves(points, _POWERS)[:, :, None] * np.eye(3)[2]
+
+
+def _curves(points: NDArray[np.float64], powers: Sequence[tuple[int, int]]) -> NDArray[np.float64]:
+    """Displacements of points of the board (n, 3) by powers of x and y, 1 mm at its edge (n, m) [m]."""
     low, high = points.min(axis=0), points.max(axis=0)
     x, y, _ = ((points - (low + high) / 2) / max((high - low).max() / 2, 1e-12)).T
-    out = _BEND_M * np.stack([x**a * y**b for a, b in _POWERS], axis=1)
-    return np.stack([np.zeros_like(out), np.zeros_like(out), out], axis=2)
+    return _BEND_M * np.stack([x**a * y**b for a, b in powers], axis=1)
 
 
 def _from_tag(places: NDArray[np.float64]) -> NDArray[np.float64]:

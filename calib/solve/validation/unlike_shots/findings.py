@@ -8,11 +8,11 @@ from calib.solve.regrouping.guesses import by_residuals
 from calib.solve.regrouping.two_groups import TwoGroups, numbered, two_groups
 from calib.solve.solution import Solution
 from calib.solve.validation.board_shape import ShapeError
-from calib.solve.validation.distance_errors import distance_errors
 from calib.solve.validation.free_shape import FreeShape
 from calib.solve.validation.rolling_shutter import Motion
 from calib.solve.validation.unlike_shots import changes
 from calib.solve.validation.unlike_shots.contradictions import Contradiction, completed, contradictions
+from calib.solve.validation.unlike_shots.foreign_distances import wrong_distances
 from calib.solve.validation.unlike_shots.groups import groups
 from calib.solve.validation.unlike_shots.scatter import SCATTERS_PX, Scatter, scatter, typical_alone
 from calib.solve.validation.unlike_shots.steadiness import changes_of_optics, changes_of_place, focal_scatter
@@ -32,7 +32,7 @@ class ShotDoubts(NamedTuple):
 def unlike_shots(free: FreeShape, shared: Sequence[ShapeError | Motion], needed_px: float) -> ShotDoubts:
     """Looks whether all shots show one board and one rig, beside the errors that they share."""
     solution = free.solution
-    if wrong := distance_errors(solution, needed_px):
+    if wrong := wrong_distances(solution, needed_px):
         return ShotDoubts([*map(str, wrong)], [], [])  # they pull everything else along
     moved = changes_of_place(free, needed_px)
     # What happened to a sensor looks as if its image changed, and a wrong board as if every shot had another lens.

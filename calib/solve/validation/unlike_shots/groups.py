@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 
 from calib.solve.regrouping.two_groups import numbered, two_groups
 from calib.solve.solution import Solution
+from calib.solve.validation.board_shape import NOTICED, effect_px
 from calib.solve.validation.free_shape import AlongDirections, FreeShape, Members, along, disagreement, once, without
+from calib.solve.validation.projection_uncertainty import reach
 from calib.solve.validation.unlike_shots.steadiness import HARMLESS, from_middle_px, of_focal, optics
 
 #: Minimum number of distinct poses, as any few fall into two groups, and of those in the smaller group.
@@ -71,16 +73,16 @@ class Groups:
 
 
 def groups(free: FreeShape, needed_px: float) -> list[Groups]:
-    """Sensors with two groups of shots, whose optics shift corners by at least half of `needed_px` [px]."""
+    """Sensors with two groups of shots, whose optics differ by what matters if `needed_px` [px] are needed."""
     found, of_shots = [], free.solution.adjustment.equations.poses
     sigmas = {each.name: each.sigma / each.value for each in free.solution.parameters if each.name.endswith(".fx")}
     for name, directions in optics(free):
         if sigmas[f"{name}.fx"] > KNOWN:
             continue
         # Focal lengths, or principal points: what explains more.
-        split = max((_split(free, part) for part in (directions[:, :1], directions[:, 1:])), key=lambda each: each.gain)
-        scale = 1.0 if len(split.change) == 2 else from_middle_px(free.solution, name)
-        if split.gain < GAIN or split.is_uneven or np.linalg.norm(split.change) * scale < HARMLESS * needed_px:
+        parts = directions[:, :1], directions[:, 1:]
+        split, part = max(((_split(free, part), part) for part in parts), key=lambda each: each[0].gain)
+        if split.gain < GAIN or split.is_uneven or _is_harmless(free.solution, name, part, split.change, needed_px):
             continue
         chosen = np.isin(of_shots, np.unique(of_shots)[split.members])
         shots = [
@@ -89,6 +91,18 @@ def groups(free: FreeShape, needed_px: float) -> list[Groups]:
         # Scores are derivatives of what is predicted minus what is measured.
         found.append(_settled(free.solution, name, tuple(sorted(shots)), -split.change))
     return found
+
+
+def _is_harmless(solution: Solution, name: str, directions: Array, change: Array, needed_px: float) -> bool:
+    """True if projections need not be known so well that a change (m,) along directions (k, m) of the optics matters.
+
+    Boards that are placed anew undo most of another principal point; only other sensors see that.
+    """
+    if len(change) == 1:
+        return abs(change[0]) * from_middle_px(solution, name) < HARMLESS * needed_px
+    if len(solution.task.sensors) > 1:
+        return float(np.linalg.norm(change)) < HARMLESS * needed_px
+    return effect_px(solution, directions @ change, float(np.mean(reach(solution, name)))) < NOTICED * needed_px
 
 
 def _settled(solution: Solution, name: str, shots: tuple[int, ...], shift: Array) -> Groups:

@@ -1,6 +1,6 @@
 """Causes named by `calibrate verify`: distances instead of a motion, and causes that these shots cannot separate."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +12,7 @@ from abs_service.calibration.shots.corner_extraction import BoardObservations
 from abs_service.report.content import Level, Report
 from abs_service.report.provenance import Provenance
 from calib import pose
+from calib.board.views import PlaneView
 from calib.calibration_check.comparison import Comparison, Explanation
 from calib.calibration_check.hypotheses import Hypothesis, Kind
 from calib.pose import Pose
@@ -49,22 +50,26 @@ def test_a_print_that_is_longer_along_one_axis_is_named_and_no_other_size_of_its
     assert "% longer than described, compared with its columns" in only.text
 
 
-@pytest.mark.parametrize("mistake", ["geometry", "displaced"])
+@pytest.mark.parametrize("mistake", ["geometry", "displaced", "mirrored"])
 def test_mistakes_in_the_distances_are_named_and_no_other_scale_of_them(mistake: str) -> None:
     random = np.random.default_rng(4)
     heads = {name: head for name, head in three_heads().items() if name != "light"}
     seen = look(heads, random_boards(10, random), random)
-    cosines = [heads[view.sensor].camera.directions(view.pixels)[:, 2] for view in seen.planes]
-    planes = [
-        replace(view, distances=view.distances * cosine)
-        if mistake == "geometry"
-        else replace(view, pixels=view.pixels + np.array([6, 0]))
-        for view, cosine in zip(seen.planes, cosines, strict=True)
-    ]
+    tof = heads["tof"].camera
+    spoil: Callable[[PlaneView], PlaneView] = {
+        "geometry": lambda view: replace(view, distances=view.distances * tof.directions(view.pixels)[:, 2]),
+        "displaced": lambda view: replace(view, pixels=view.pixels + np.array([6, 0])),
+        "mirrored": lambda view: replace(view, pixels=np.abs(view.pixels - (tof.width - 1, 0))),
+    }[mistake]
+    planes = [spoil(view) for view in seen.planes]
     sensors = {name: rig_file.SensorCalibration(head.camera) for name, head in heads.items()}
     known = rig_file.RigCalibration("lab", sensors, ORIGIN, "good")
     worst, *others = verification.verify(known, BoardObservations(tuple(seen.corners), tuple(planes)), ORIGIN).verdicts
-    said = {"geometry": "its distances look like z", "displaced": "its depth image is displaced by (+"}[mistake]
+    said = {
+        "geometry": "its distances look like z",
+        "displaced": "its depth image is displaced by (+",
+        "mirrored": "its distances miss the boards by ",
+    }[mistake]
     assert (worst.level, worst.about) == (Level.BAD, "tof")
     assert worst.text.startswith(said)
     assert all(other.level == Level.GOOD for other in others)

@@ -1,5 +1,6 @@
-"""A print that is longer along one axis, and a bent board, are named with their size."""
+"""Prints that are not as described, and bent boards, are named with their size."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 
@@ -58,6 +59,32 @@ def test_a_print_without_right_angles_is_named_with_its_angle() -> None:
     assert found.shape == Shape.SKEW
     assert abs(found.size) == pytest.approx(1, rel=0.2)
     assert "rows and columns are 0.5" in assess(solution, 1.0, 1.0).verdict
+
+
+def keystone(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A page that was photographed or scanned askew: its lower rows are longer."""
+    return np.stack([x * y, np.zeros_like(x)], axis=1)
+
+
+def uneven_feed(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A page that slipped in the printer: squares become larger from one side to the other."""
+    return np.stack([x**2, np.zeros_like(y)], axis=1)
+
+
+@pytest.mark.parametrize("displaced", [keystone, uneven_feed])
+def test_an_uneven_print_is_named_with_its_size(
+    displaced: Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]],
+) -> None:
+    """A keystone of 2 % was trusted: projections were 2.9 px off where 0.5 px were promised."""
+    points_b = board_views.board_points()
+    half = np.ptp(points_b[:, 0]) / 2
+    made = points_b.copy()
+    made[:, :2] += 0.0008 * displaced(points_b[:, 0] / half - 1, (points_b[:, 1] - np.ptp(points_b[:, 1]) / 2) / half)
+    solution = photographed(points_b, made)
+    named = shape_errors(solution, 1.0, 1.0)
+    assert named[0].shape == Shape.UNEVEN
+    assert abs(named[0].size) == pytest.approx(0.8, rel=0.2)
+    assert "Do not trust it yet: the print is uneven: from its middle " in assess(solution, 1.0, 1.0).verdict
 
 
 @pytest.mark.parametrize(("gap", "than"), [(0.0095, "smaller"), (0.0115, "larger")])

@@ -15,7 +15,7 @@ from calib.solve.validation.free_shape import free_shape
 from calib.solve.validation.unlike_shots.groups import groups
 from calib.solve.validation.verdict import assess
 from evaluation.scenes.boards import board_views
-from tests.calib.solve.validation.test_steadiness import SIZE, views
+from tests.calib.solve.validation.test_steadiness import HEADS, SIZE, views
 
 ODD = (2, 3, 7, 11, 12, 16, 20, 21)
 
@@ -61,6 +61,18 @@ def test_images_that_are_unlike_the_others_are_named(change: Callable[[CornerVie
 def test_the_shift_of_a_second_camera_has_its_sign() -> None:
     (found,) = groups(free_shape(solved(of_another_camera)), 1.0)
     assert found.shift == pytest.approx([7, -5], abs=1.5)
+
+
+def test_a_second_principal_point_counts_by_what_boards_that_are_placed_anew_leave_of_it() -> None:
+    """Images that a camera sharpens give sure corners, so that shifts of less than a pixel are sure as well."""
+    generator = np.random.default_rng(1)
+    head = board_views.Head(replace(HEADS["color"].camera, T_rs=np.eye(4)), 0.01)
+    seen = board_views.look({"color": head}, board_views.random_boards(24, generator), generator).corners
+    moved = [replace(view, pixels=view.pixels - (-0.7, 0.5)) if view.shot in ODD else view for view in seen]
+    free = free_shape(calibrate(Task({"color": SensorTask(*SIZE)}, moved, (), "color")))
+    assert not groups(free, 1.0)
+    (found,) = groups(free, 0.1)
+    assert len(set(found.shots) ^ set(ODD)) <= 2
 
 
 def test_zoomed_images_are_named_with_their_focal_length() -> None:
