@@ -1,6 +1,7 @@
 """One frame of a sensor with one value per pixel: cost, residuals and agreement of deformed meshes."""
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,7 @@ from abs_service.tracker.synthesis.perspective import project_with_jacobian
 from abs_service.tracker.terms.base import NO_OCCLUDERS, Bounds, facing
 from abs_service.tracker.terms.gradients import channel_gradients, shortened
 from abs_service.tracker.terms.image_noise import NORMAL_MEDIAN, noise_deviation
-from abs_service.tracker.terms.linearization import Part, PointLinearization
+from abs_service.tracker.terms.linearization import Part, PointLinearization, as_measured
 from abs_service.tracker.terms.patches import Patches
 from abs_service.tracker.terms.photometric.channel_cost import CHANNEL, INVERSE, NORMALIZER, VALUE, channel_cost
 from abs_service.tracker.terms.photometric.illumination import Illumination
@@ -100,8 +101,29 @@ class ObservedChannel:
         noise = deviation**2 @ np.einsum("mi,mij->m", gains[use], projection[use] ** 2)
         rows = shortened(rows, float(noise))
         samples, points = seen.interpolation.follow(sparse_jacobian), np.flatnonzero(use)
-        bias = self.bias.derivatives(vertices, rows, points)
-        return [PointLinearization(residual[use], rows, points, samples, vertices, bias, self.view.camera.center)]
+        bias, center = self.bias.derivatives(vertices, rows, points), self.view.camera.center
+        # A mosaic's pixels of a channel are too far apart to tell whether the image has the gradients of the surface.
+        shown = as_measured if self.is_mosaic else partial(self._of_image, vertices[use], projection[use], inverse[use])
+        return [PointLinearization(residual[use], rows, points, samples, vertices, bias, center, shown)]
+
+    def _of_image(
+        self,
+        vertices: NDArray[np.floating],
+        projection: NDArray[np.float64],
+        inverse: NDArray[np.float64],
+        rows: NDArray[np.float64],
+    ) -> NDArray[np.float64]:
+        """Derivatives (m, 3) of residuals by gradients of the image, not longer than those of the appearance in all.
+
+        Args:
+            vertices: positions of the samples (m, 3) [m].
+            projection: derivatives (m, 2, 3) of their places in the image [px/m].
+            inverse: inverse deviations (m,).
+            rows: derivatives (m, 3) by gradients of the appearance.
+        """
+        seen = channel_gradients(self.image[..., VALUE], self.image[..., CHANNEL], self.view.camera, vertices)[0]
+        of_image = np.einsum("mi,mij->mj", seen * inverse[:, None], projection)
+        return of_image * np.sqrt(min(np.vdot(rows, rows) / max(np.vdot(of_image, of_image), 1e-300), 1.0))
 
     def fit(self, surface: Surface) -> SensorFit:
         """Agreement of the sensor with a population of one."""
