@@ -89,7 +89,8 @@ class PointLinearization:
         positions: of all points (n, 3) [m].
         shared: derivatives (m, s) with respect to errors that the residuals share, times those errors' deviations.
         center: of the camera (3,) [m] that tells of motion across its lines of sight only; empty (0,) for distances.
-        of_surface: what of the derivatives the surface itself has; only this tells which part of it is where.
+        of_surface: what of the derivatives the surface itself has; only this tells which part of it is where. Of
+            derivatives by the surface itself, what the measurement has.
     """
 
     residual: NDArray[np.float64]
