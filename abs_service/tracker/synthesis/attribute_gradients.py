@@ -61,10 +61,6 @@ class ImageGradients(Protocol):
         """Derivatives to the right and down [1/px] (n, channels, 2), for values (channels, n); NaN where unknown."""
         ...
 
-    def noise_gains(self, vertices: int) -> NDArray[np.float64]:
-        """Variances of these derivatives (n, 2) [1/px²] by independent noise of variance 1 of the pixels."""
-        ...
-
     def at_centers(self, values: NDArray[np.float32], steps: NDArray[np.float32]) -> NDArray[np.float32]:
         """Attributes (population or 1, channels, n) at the centres of the pixels into which the vertices project.
 
@@ -106,10 +102,6 @@ class Constant:
         """NaN (n, channels, 2): an unknown gradient is not a gradient of zero."""
         return np.full((*values.T.shape, 2), np.nan, np.float32)
 
-    def noise_gains(self, vertices: int) -> NDArray[np.float64]:
-        """Zeros: what is unknown has no noise."""
-        return np.zeros((vertices, 2))
-
     def at_centers(self, values: NDArray[np.float32], steps: NDArray[np.float32]) -> NDArray[np.float32]:
         """The values themselves (1, channels, n)."""
         return values[None]
@@ -130,7 +122,6 @@ class FirstOrder:
         steps = beside.reshape(4, len(mesh.vertices), -1).astype(np.float64)
         change = np.stack([steps[0] - steps[1], steps[2] - steps[3]], axis=-1)
         self._per_metre = np.nan_to_num(change / (2 * step_m))
-        self._noise = _noise_per_metre(camera, mesh, step_m)
         self._camera = camera
         self._edges = mesh.edges
         self._lengths = _along(mesh, self._edges)
@@ -146,8 +137,7 @@ class FirstOrder:
         """
         flat = metres_per_pixel(self._camera, predicted.vertices[0].T, self._edges, self._lengths)
         gradients = np.ascontiguousarray(self._per_metre @ flat, np.float32)
-        gains = self._noise * (flat[:, 0] ** 2 + flat[:, 1] ** 2)  # faster than a sum over so short an axis
-        return FirstOrderInImage(gradients, gains, np.ascontiguousarray(gradients.transpose(1, 2, 0)))
+        return FirstOrderInImage(gradients, np.ascontiguousarray(gradients.transpose(1, 2, 0)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -156,12 +146,10 @@ class FirstOrderInImage:
 
     Attributes:
         gradients: of the attributes (n, channels, 2) [1/px]; 0 at vertices whose surroundings were not visible.
-        gains: variances of the gradients (n, 2) [1/px²] by noise of variance 1.
         planes: the gradients as the kernel reads them (channels, 2, n).
     """
 
     gradients: NDArray[np.float32]
-    gains: NDArray[np.float64]
     planes: NDArray[np.float32]
 
     def steps(self, population: int, vertices: int) -> NDArray[np.float32]:
@@ -172,25 +160,11 @@ class FirstOrderInImage:
         """The gradients."""
         return self.gradients
 
-    def noise_gains(self, vertices: int) -> NDArray[np.float64]:
-        """The gains."""
-        return self.gains
-
     def at_centers(self, values: NDArray[np.float32], steps: NDArray[np.float32]) -> NDArray[np.float32]:
         """Value + gradient · (centre of the pixel − projection of the vertex) (population, channels, n)."""
         result = np.empty((steps.shape[1], *values.shape), np.float32)
         at_centers(steps, values, self.planes, result)
         return result
-
-
-def _noise_per_metre(camera: Camera, mesh: Mesh, step_m: float) -> float:
-    """Variance of a difference quotient over two steps in the first image [1/m²], by noise of variance 1 of its pixels.
-
-    Values are interpolated between pixels, at all phases alike: along the difference of points d ≤ 1 pixels apart the
-    variance is 2 − d per pixel, and across it two thirds of that remain.
-    """
-    pixel_m = float(np.median(np.linalg.norm(mesh.vertices - camera.center, axis=1))) / camera.fx
-    return 2 / 3 * (2 - min(2 * step_m / pixel_m, 1.0)) / pixel_m**2
 
 
 def _tangents(mesh: Mesh) -> NDArray[np.float64]:

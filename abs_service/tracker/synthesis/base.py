@@ -93,10 +93,6 @@ class ObservedView(Protocol):
         """
         ...
 
-    def gradient_noise_gains(self, seen: Synthesis) -> NDArray[np.float64]:
-        """Variances of these gradients (m, 2) [1/px²] by noise of variance 1 of the pixels, see `noise_deviation`."""
-        ...
-
 
 class View(Protocol):
     """Projection of a mesh into one camera.

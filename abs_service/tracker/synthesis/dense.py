@@ -140,10 +140,6 @@ class ObservedDenseView:
         """NaN: gradients of the image are more accurate than those of the lattice."""
         return np.full((*seen.attributes[0].T.shape, 2), np.nan, np.float32)
 
-    def gradient_noise_gains(self, seen: Synthesis) -> NDArray[np.float64]:
-        """Zeros: no gradients are known."""
-        return np.zeros((seen.pixel.shape[1], 2))
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class InFaces:

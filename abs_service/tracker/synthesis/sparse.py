@@ -165,10 +165,6 @@ class ObservedSparseView:
         """Gradients for the predicted surface."""
         return self.gradients.per_pixel(self.attributes)
 
-    def gradient_noise_gains(self, seen: Synthesis) -> NDArray[np.float64]:
-        """Their noise gains for the predicted surface."""
-        return self.gradients.noise_gains(len(self.hidden))
-
 
 class AtVertices:
     """The samples are the vertices: every value is its own."""

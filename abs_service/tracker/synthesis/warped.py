@@ -162,7 +162,6 @@ class _ObservedCommonView:
 
     def __init__(self, view: ObservedView):
         self.synthesize = lru_cache(maxsize=1)(view.synthesize)
-        self.gradient_noise_gains = view.gradient_noise_gains
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -180,7 +179,3 @@ class _ObservedSharedView:
     def attribute_gradients(self, seen: Synthesis) -> NDArray[np.float32]:
         """NaN: only the vertices' own attributes are known."""
         return np.full((*self.attributes[0].T.shape, 2), np.nan, np.float32)
-
-    def gradient_noise_gains(self, seen: Synthesis) -> NDArray[np.float64]:
-        """Zeros: no gradients are known."""
-        return self.common.gradient_noise_gains(seen)

@@ -83,10 +83,10 @@ def noiseless_color_rows(
     rows = _image_rows(image, places, projection, weight)
     weighted = np.square(noise_deviation(image, places) * weight).sum(axis=1)
     entries = projection.reshape(len(projection), 6)
-    return shortened(rows, _NOISE_GAIN * float(weighted @ np.vecdot(entries, entries)))
+    return _shortened(rows, _NOISE_GAIN * float(weighted @ np.vecdot(entries, entries)))
 
 
-def shortened(rows: NDArray[np.float64], noise: float) -> NDArray[np.float64]:
+def _shortened(rows: NDArray[np.float64], noise: float) -> NDArray[np.float64]:
     """Rows without the share that noise has in the sum of their squares, taken away from all alike.
 
     Args:
@@ -114,10 +114,8 @@ def channel_gradients(
     channels: NDArray[np.float32],
     camera: Camera,
     vertices: NDArray[np.floating],
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+) -> NDArray[np.float64]:
     """Image gradient at a vertex's pixel, to the right and down (n, 2) [image unit / px].
-
-    And its variance by independent noise of the pixels of variance 1 (n, 2) [1/px²].
 
     In a Bayer mosaic the gradient is that of the pixels with the same channel; differences between channels are no
     gradient of the surface.
@@ -133,21 +131,19 @@ def channel_gradients(
     same = channels[row, column] == channels[row[:, RADIUS_PX], column[:, :, RADIUS_PX]][..., None]
     weights = _BELL * (same & np.isfinite(patches))
     patches = np.where(weights > 0, patches, 0.0)
-    slopes = [_slope(patches, weights, steps) for steps in (_STEPS, _STEPS[:, None])]
-    gradients, gains = (np.stack(parts, axis=-1) for parts in zip(*slopes, strict=True))
-    return gradients, gains
+    return np.stack([_slope(patches, weights, steps) for steps in (_STEPS, _STEPS[:, None])], axis=-1)
 
 
 def _slope(
     patches: NDArray[np.float64], weights: NDArray[np.float64], steps: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Weighted regression slope (n,) of patches (n, rows, columns) along one axis, and its gain; 0 without data."""
+) -> NDArray[np.float64]:
+    """Weighted regression slope (n,) of patches (n, rows, columns) along one axis; 0 without data."""
     total = np.maximum(weights.sum(axis=(1, 2)), 1e-12)
     mean = (weights * steps).sum(axis=(1, 2)) / total
     centered = weights * (steps - mean[:, None, None])
     spread = (centered * (steps - mean[:, None, None])).sum(axis=(1, 2))
     regression = np.where(spread > 1e-6, 1 / np.maximum(spread, 1e-6), 0.0)[:, None, None] * centered
-    return (regression * patches).sum(axis=(1, 2)), np.square(regression).sum(axis=(1, 2))
+    return np.asarray((regression * patches).sum(axis=(1, 2)))
 
 
 def _pixels(camera: Camera, vertices: NDArray[np.floating]) -> NDArray[np.intp]:

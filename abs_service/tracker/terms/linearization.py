@@ -27,6 +27,15 @@ def of_anything(rows: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.zeros_like(rows)
 
 
+def not_longer(of_surface: Callable[[], NDArray[np.float64]], rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Derivatives (m, 3) by the surface itself, not longer in all than those by the measurements (m, 3).
+
+    In the first image, the noise of the two is the same; it has been taken away from the measurements' only.
+    """
+    own = of_surface()
+    return own * np.sqrt(min(np.vdot(rows, rows) / max(np.vdot(own, own), 1e-300), 1.0))
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Linearization:
     """Normalised residuals and their Jacobian with respect to theta: cost ≈ ½‖residual + jacobian δΘ‖².

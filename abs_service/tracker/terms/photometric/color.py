@@ -12,7 +12,7 @@ from abs_service.tracker.synthesis.base import ObservedView, Resampling, Synthes
 from abs_service.tracker.synthesis.perspective import project_with_jacobian
 from abs_service.tracker.terms.base import NO_OCCLUDERS, Bounds, Prediction, facing
 from abs_service.tracker.terms.gradients import noiseless_color_rows
-from abs_service.tracker.terms.linearization import Part, PointLinearization
+from abs_service.tracker.terms.linearization import Part, PointLinearization, not_longer
 from abs_service.tracker.terms.patches import Patches
 from abs_service.tracker.terms.photometric.color_cost import color_cost, color_residuals
 from abs_service.tracker.terms.photometric.copied_pixels import CopiedPixels
@@ -185,9 +185,7 @@ class ObservedColor:
         """
         gradients = self.view.attribute_gradients(seen)[use] * inverse[..., None]
         own = (gradients @ project_with_jacobian(self.view.camera, vertices)[1]).reshape(rows.shape)
-        own = np.where(np.isnan(own), rows, own)
-        # In the first image, the noise of the two is the same; it has been taken away from the image's only.
-        return own * np.sqrt(min(np.vdot(rows, rows) / max(np.vdot(own, own), 1e-300), 1.0))
+        return not_longer(lambda: np.where(np.isnan(own), rows, own), rows)
 
     def fit(self, surface: Surface) -> SensorFit:
         """Agreement of the sensor with a population of one."""

@@ -1,6 +1,7 @@
 """One frame of a sensor with one value per pixel: cost, residuals and agreement of deformed meshes."""
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,9 +10,8 @@ from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import ObservedView, Synthesis
 from abs_service.tracker.synthesis.perspective import project_with_jacobian
 from abs_service.tracker.terms.base import NO_OCCLUDERS, Bounds, facing
-from abs_service.tracker.terms.gradients import channel_gradients, shortened
-from abs_service.tracker.terms.image_noise import NORMAL_MEDIAN, noise_deviation
-from abs_service.tracker.terms.linearization import Part, PointLinearization
+from abs_service.tracker.terms.gradients import channel_gradients, noiseless_color_rows
+from abs_service.tracker.terms.linearization import Part, PointLinearization, as_measured, not_longer
 from abs_service.tracker.terms.patches import Patches
 from abs_service.tracker.terms.photometric.channel_cost import CHANNEL, INVERSE, NORMALIZER, VALUE, channel_cost
 from abs_service.tracker.terms.photometric.illumination import Illumination
@@ -89,19 +89,31 @@ class ObservedChannel:
         residual, inverse, normalizer = self._residuals(seen, surface)
         use = 0.5 * residual**2 + normalizer < self.bounds.outlier
         vertices = seen.interpolation.spread(surface.vertices[0].T)
-        gradients, gains = self._gradients(seen, surface)
-        places, projection = project_with_jacobian(self.view.camera, vertices)
-        rows = np.einsum("mi,mij->mj", gradients[use] * inverse[use, None], projection[use])
-        # Noise has gradients as a print has, and the more of it there is, the better it would seem to hold a surface.
-        # Its deviation is that at all samples: where the value agrees, there is less of it by chance. A fine print
-        # looks like noise, but it is no residual where it agrees.
-        deviation = self._noise_deviation(places) * inverse[use]
-        deviation = np.minimum(deviation, np.median(np.abs(residual)) / NORMAL_MEDIAN)
-        noise = deviation**2 @ np.einsum("mi,mij->m", gains[use], projection[use] ** 2)
-        rows = shortened(rows, float(noise))
+        weight, of_appearance = inverse[use, None], partial(self._of_appearance, seen, surface, use)
+        if self.is_mosaic:
+            rows, own = of_appearance(weight), as_measured
+        else:
+            values = self.image[..., VALUE, None]
+            rows = noiseless_color_rows(values, self.view.camera, vertices[use], weight)[:, 0]
+            own = partial(not_longer, partial(of_appearance, weight))
         samples, points = seen.interpolation.follow(sparse_jacobian), np.flatnonzero(use)
-        bias = self.bias.derivatives(vertices, rows, points)
-        return [PointLinearization(residual[use], rows, points, samples, vertices, bias, self.view.camera.center)]
+        bias, center = self.bias.derivatives(vertices, rows, points), self.view.camera.center
+        return [PointLinearization(residual[use], rows, points, samples, vertices, bias, center, own)]
+
+    def _of_appearance(
+        self, seen: Synthesis, surface: Surface, use: NDArray[np.bool_], weight: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Derivatives (m, 3) of residuals by gradients of the appearance, of the samples in a mask (n,).
+
+        Args:
+            seen: the synthesis of a population of one.
+            surface: that population.
+            use: the samples.
+            weight: their inverse deviations (m, 1).
+        """
+        vertices = seen.interpolation.spread(surface.vertices[0].T)[use]
+        projection = project_with_jacobian(self.view.camera, vertices)[1]
+        return np.einsum("mi,mij->mj", self._gradients(seen, surface)[use] * weight, projection)
 
     def fit(self, surface: Surface) -> SensorFit:
         """Agreement of the sensor with a population of one."""
@@ -134,20 +146,11 @@ class ObservedChannel:
         values[np.arange(len(texels)), texels[:, CHANNEL].astype(int)] = texels[:, VALUE]
         return values
 
-    def _noise_deviation(self, places: NDArray[np.float64]) -> float:
-        """Standard deviation of the image's noise around places (n, 2).
+    def _gradients(self, seen: Synthesis, surface: Surface) -> NDArray[np.float64]:
+        """Gradient of each sample of the appearance in its pixel's channel, to the right and down (m, 2) [1/px].
 
-        Taken for zero in a mosaic: pixels of a channel are too far apart to tell a fine print from noise.
-        """
-        return 0.0 if self.is_mosaic else float(noise_deviation(self.image[..., VALUE, None], places)[0])
-
-    def _gradients(self, seen: Synthesis, surface: Surface) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Image gradient of each sample in its pixel's channel, to the right and down (m, 2) [1/px].
-
-        And its variance by independent noise of the pixels of variance 1 (m, 2) [1/px²].
-
-        A mosaic shows each channel in every other pixel, too far apart to measure the slope of a fine texture. So it is
-        the surface's own where that is known, which is also exactly how a residual changes within a pixel.
+        That of the image where it is unknown. A mosaic shows each channel in every other pixel, too far apart to
+        measure the slope of a fine texture.
         """
         channel = self.texture[seen.pixel[0], CHANNEL].astype(int)
         own = replace(seen, attributes=self.view.attribute_gradients(seen).T)  # along both axes, as two members
@@ -155,11 +158,9 @@ class ObservedChannel:
         gradients = shining[:, channel, np.arange(len(channel))].T.astype(np.float64)
         unknown = np.isnan(gradients).any(axis=1)
         samples = seen.interpolation.spread(surface.vertices[0].T.astype(np.float64))[unknown]
-        gains = self.view.gradient_noise_gains(seen).copy()
-        gradients[unknown], gains[unknown] = channel_gradients(
-            self.image[..., VALUE], self.image[..., CHANNEL], self.view.camera, samples
-        )
-        return gradients, gains
+        image = self.image[..., VALUE], self.image[..., CHANNEL]
+        gradients[unknown] = channel_gradients(*image, self.view.camera, samples)
+        return gradients
 
     def _residuals(
         self, seen: Synthesis, surface: Surface

@@ -19,10 +19,9 @@ MIN_AREA = 0.5
 MIN_RETURNS, MIN_OTHERS = 0.5, 0.25
 #: Its edge is a stripe of this share of the image's width; returns may be missing in it.
 EDGE_SHARE = 0.01
-#: Returns within so many pixels of the predicted mesh may be the object's.
-NEAR_PX = 5
 #: A sensor measures nothing in the outermost rows or columns, up to this share of them, whatever ends along the other
-#: sides: where two views are matched, or distances are registered to another camera.
+#: sides: where two views are matched, or distances are registered to another camera. Returns as near to the predicted
+#: mesh may be the object's, since that ends up to a cell inside: 24 px if it fills most of 640 × 480.
 BLIND_SHARE = 0.08
 #: Returns that are fewer in the square of three pixels a side around them are strays.
 MIN_NEIGHBOURS = 3
@@ -71,8 +70,8 @@ def beyond(missing: NDArray[np.bool_], expected: NDArray[np.bool_]) -> NDArray[n
     stripe = max(round(EDGE_SHARE * missing.shape[1]), 1)
     inner = cv2.erode(hull, square(stripe), borderValue=1) > 0
     edge = (hull > 0) & ~inner
-    there, ours = edge & returns, grown(expected, NEAR_PX)
-    length, measured, of_others = (np.count_nonzero(mask) for mask in (edge, there, there & ~ours))
+    there = edge & returns
+    length, measured, of_others = (np.count_nonzero(mask) for mask in (edge, there, there & others))
     ends = measured >= MIN_RETURNS * length and of_others >= MIN_OTHERS * length
     return ~inner | blind if ends and np.count_nonzero(hull) >= MIN_AREA * hull.size else blind
 

@@ -66,6 +66,23 @@ def test_an_end_that_comes_into_sight_does_not_hold_a_plain_board_that_has_slid(
     assert "TRACKING" not in found
 
 
+@pytest.mark.parametrize("is_grey", [False, True])
+def test_a_faint_print_holds_a_board_in_images_that_show_it(is_grey: bool):
+    """Its ends are out of sight. It holds the board in noise, but not when that is all that is left of it."""
+    generator, rays = np.random.default_rng(5), CAMERA.unproject(np.ones((CAMERA.height, CAMERA.width)))
+    x, y = 0.7 * rays[..., 0] / rays[..., 2], 0.7 * rays[..., 1] / rays[..., 2]
+    noise_model = a.noise.Grey() if is_grey else a.noise.Color()
+    tracker, found = a.Tracker(CAMERA, a.Nurbs(), color=CAMERA, color_noise=noise_model), []
+    for k in range(8):
+        noise, frayed, *levels = generator.standard_normal((5, *x.shape))
+        on = np.abs(y) < 0.07 + 0.001 * frayed
+        distance = np.where(on, 0.7 + 0.1 * x**2, 1.2) + 0.0015 * noise
+        faint = 14 * np.sin(2 * np.pi * x / 0.05) if k < 4 else 0.0
+        image = np.clip((150 + faint + 8 * np.stack(levels)).transpose(1, 2, 0), 0, 255).astype(np.uint8)
+        found.append(tracker.track(distance, time_s=k / 30, mask=on, image=image[..., 0] if is_grey else image).status)
+    assert found == ["TRACKING"] * 4 + ["DEGRADED"] * 4
+
+
 def test_silhouettes_of_a_sheet_that_rolls_up_are_no_ends_that_hold_it():
     """30 cm long and plain, it moves before nothing and bends to 200°: its ends turn away, and the mesh slides."""
     generator, rays = np.random.default_rng(3), CAMERA.unproject(np.ones((CAMERA.height, CAMERA.width)))

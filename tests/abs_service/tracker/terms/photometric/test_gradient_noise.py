@@ -5,12 +5,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from abs_service.pairing.images import BAYER_ORDERS, ONE_CHANNEL, ChannelImage
+from abs_service.pairing.images import ONE_CHANNEL, ChannelImage
 from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.objectives import likelihood
 from abs_service.tracker.synthesis.sparse import Sparse
 from abs_service.tracker.terms.base import Prediction
-from abs_service.tracker.terms.gradients import channel_gradients, color_rows, noiseless_color_rows
+from abs_service.tracker.terms.gradients import color_rows, noiseless_color_rows
 from abs_service.tracker.terms.image_noise import NORMAL_MEDIAN, noise_deviation
 from abs_service.tracker.terms.linearization import PointLinearization
 from abs_service.tracker.terms.photometric.channel import ChannelTerm
@@ -116,11 +116,3 @@ def test_noise_in_one_channel_holds_nothing_on_a_blank_ground_and_a_print_keeps_
     assert held(40, 3) == pytest.approx(clean, rel=0.08)
     for noise in (1.0, 3.0, 5.0):
         assert held(0, noise) < 0.02 * clean
-
-
-def test_the_gain_of_noise_in_gradients_of_a_mosaic_is_their_variance():
-    places = np.stack(np.meshgrid(np.arange(20.0, 140, 6), np.arange(20.0, 100, 6)), axis=-1).reshape(-1, 2)
-    channel = BAYER_ORDERS["rggb"][np.arange(120)[:, None] % 2, np.arange(160) % 2].astype(np.float32)
-    gradients, gains = channel_gradients(picture(0, 3)[..., 0], channel, CAMERA, CAMERA.directions(places))
-    slope = gradients - (0.1, 0.05)
-    np.testing.assert_allclose(np.mean(slope**2), 9 * gains.mean(), rtol=0.15)

@@ -63,10 +63,11 @@ def test_an_image_that_is_full_ends_nowhere():
 
 @pytest.mark.parametrize(("returns", "silhouette"), [
     (box(10, 110, 10, 150), box(13, 107, 13, 147)),  # a sheet, from which its mesh ends a little inside
+    (box(10, 110, 10, 150), box(17, 103, 17, 143)),  # a coarser mesh ends farther inside
     (box(10, 110, 10, 150) | box(60, 70, 0, 160), box(13, 107, 13, 147)),  # held by two arms
     (box(20, 100, 30, 120), OBJECT),  # on a small table
     (disc(59), disc(57)),
-], ids=["sheet", "held", "small table", "body"])  # fmt: skip
+], ids=["sheet", "coarse mesh", "held", "small table", "body"])  # fmt: skip
 def test_what_lies_before_nothing_is_no_field_of_view(returns, silhouette):
     assert not beyond(~returns, silhouette).any()
 
