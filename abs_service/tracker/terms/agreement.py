@@ -149,3 +149,12 @@ def rims(fits: Sequence[SensorFit]) -> list[RimFit]:
 def hangs_over(fits: Sequence[SensorFit]) -> bool:
     """True if a mesh off its outline hangs over it: one that slides does so on the side that it slides to."""
     return any(4 * rim.outside >= rim.inside for rim in rims(fits))
+
+
+def shows_slide(fits: Sequence[SensorFit]) -> bool:
+    """True if what is off the outline shows that the mesh has slid or turned, whatever else holds it.
+
+    A slide lays edges beside the object, over a background, and others inside it. Nearly all end inside where something
+    lies against them. Nearly all lie over missing returns where the sensor has lost an area at the outline.
+    """
+    return hangs_over(fits) and any(4 * (rim.inside + rim.outside - rim.unreturned) >= rim.unreturned for rim in rims(fits))

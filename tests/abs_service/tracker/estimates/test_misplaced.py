@@ -62,3 +62,20 @@ def test_an_arm_against_the_edges_of_a_print_is_no_slide(agreeing, deviation_m, 
     distances = replace(on_the_rim(visible=60, inside=22, outside=outside, off_m=0.04), remainder=Remainder(0.1, 0.1))
     shape = replace(SHAPE, no_outline_deviation_m=deviation_m)
     assert judge([distances, colors], (), shape, 0.0, SETTINGS)[0] == status
+
+
+@pytest.mark.parametrize(
+    ("agreeing", "deviation_m", "rim", "status"),
+    [
+        (95, 0.9e-3, {"outside": 40, "unreturned": 40}, Status.TRACKING),
+        (95, 0.9e-3, {"outside": 40, "unreturned": 25}, Status.DEGRADED),  # others hang over a background
+        (95, 0.9e-3, {"outside": 30, "unreturned": 30, "inside": 10}, Status.DEGRADED),  # it has slid before nothing
+        (85, 0.9e-3, {"outside": 40, "unreturned": 40}, Status.DEGRADED),
+        (95, 1.1e-3, {"outside": 40, "unreturned": 40}, Status.DEGRADED),
+    ],
+)
+def test_returns_that_are_lost_at_the_edges_of_a_print_are_no_slide(agreeing, deviation_m, rim, status):
+    colors = replace(seen(agreeing=agreeing, disagreeing=100 - agreeing), sensor="color")
+    distances = replace(on_the_rim(visible=60, off_m=0.01, **rim), remainder=Remainder(0.1, 0.1))
+    shape = replace(SHAPE, no_outline_deviation_m=deviation_m)
+    assert judge([distances, colors], (), shape, 0.0, SETTINGS)[0] == status

@@ -5,6 +5,8 @@ between the pixels on the object and those beside it. Which stretches of the rim
 image (`rim_classes`).
 """
 
+from functools import partial
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -65,7 +67,7 @@ class RimOutline:
         self._first, self._was_cut = np.zeros((len(rim.outer), 2)), np.zeros(len(rim.outer), np.bool_)
         self._raggedness = Raggedness(deviation, ragged)
         self._min_off_px = max(OFF_PX, FARTHEST * deviation)
-        self._images, self._is_round = 0, False
+        self._images, self._is_round, self._size = 0, False, (camera.width, camera.height)
 
     def observe(
         self,
@@ -104,6 +106,7 @@ class RimOutline:
             is_round=self._is_round,
             deviation=deviation,
             off_px=off_px,
+            distance_at=partial(read, distance, np.array(corner(window)[::-1], np.float32), last=self._size),
             doubtful=doubtful,
             kernel=self._kernel,
             classes=self._of_vertices(predicted.vertices.shape[2], is_cut),
@@ -140,9 +143,9 @@ class RimOutline:
         """
         if not (beyond.any() or self._was_cut.any()):
             return self._was_cut
-        first, last = np.array(corner(window)[::-1], np.float32), (self._camera.width, self._camera.height)
+        first = np.array(corner(window)[::-1], np.float32)
         image = beyond.astype(np.float32)
-        at_first, now = (read(image, first, places, last) for places in (self._first, self._beside(surface)))
+        at_first, now = (read(image, first, places, self._size) for places in (self._first, self._beside(surface)))
         self._was_cut = np.where(np.isfinite(at_first), at_first > 0, self._was_cut)
         return self._was_cut | (now > 0)
 
@@ -163,9 +166,9 @@ class RimOutline:
         are_ends = ~turns_away(self._camera, predicted, edges.outer, edges.inner)
         if not unsettled.any():
             return are_ends
-        size = np.array([self._camera.width, self._camera.height])
+        size = np.array(self._size)
         near = np.concatenate([places > (1 - MARGIN) * size, places < MARGIN * size], axis=1).T
-        first, (width, height) = np.array(corner(window)[::-1], np.float32), size.tolist()
-        towards = [read(distance, first, places + BESIDE_PX * step, (width, height)) for step in _TO_SIDES]
-        is_open = read(unsettled.astype(np.float32), first, places, (width, height)) > 0
+        first = np.array(corner(window)[::-1], np.float32)
+        towards = [read(distance, first, places + BESIDE_PX * step, self._size) for step in _TO_SIDES]
+        is_open = read(unsettled.astype(np.float32), first, places, self._size) > 0
         return are_ends & ~(is_open & np.any(near & ~np.isfinite(towards), axis=0))
