@@ -152,9 +152,22 @@ def hangs_over(fits: Sequence[SensorFit]) -> bool:
 
 
 def shows_slide(fits: Sequence[SensorFit]) -> bool:
-    """True if what is off the outline shows that the mesh has slid or turned, whatever else holds it.
+    """True if what is off the outline shows that the mesh has slid or turned, although images hold it.
 
-    A slide lays edges beside the object, over a background, and others inside it. Nearly all end inside where something
-    lies against them. Nearly all lie over missing returns where the sensor has lost an area at the outline.
+    A slide lays some edges inside the object and others beside it, over what is no object in images either. Nearly all
+    end inside where something lies against them, and nearly all lie over missing returns where a sensor has lost an
+    area at the outline.
     """
-    return hangs_over(fits) and any(4 * (rim.inside + rim.outside - rim.unreturned) >= rim.unreturned for rim in rims(fits))
+    return hangs_over(fits) and not (_lies_over_loss(fits) and _is_seen_in_loss(fits))
+
+
+def _lies_over_loss(fits: Sequence[SensorFit]) -> bool:
+    """True if nearly all edges off the outline lie over missing returns."""
+    return all(4 * (rim.inside + rim.outside - rim.unreturned) < rim.unreturned for rim in rims(fits))
+
+
+def _is_seen_in_loss(fits: Sequence[SensorFit]) -> bool:
+    """True if most vertices whose distances disagree have the right colour: beside its object, a mesh lacks both."""
+    distances = of_distances(fits)
+    lost, other = ([fit.counts.disagreeing for fit in fits if (fit in distances) == is_one] for is_one in (True, False))
+    return 2 * max(other, default=0) < min(lost, default=0)
