@@ -155,15 +155,14 @@ def shows_slide(fits: Sequence[SensorFit]) -> bool:
     """True if what is off the outline shows that the mesh has slid or turned, although images hold it.
 
     A slide lays some edges inside the object and others beside it, over what is no object in images either. Nearly all
-    end inside where something lies against them, and nearly all lie over missing returns where a sensor has lost an
-    area at the outline.
+    end inside where something lies against them, and nearly all lie in areas that a sensor has lost.
     """
     return hangs_over(fits) and not (_lies_over_loss(fits) and _is_seen_in_loss(fits))
 
 
 def _lies_over_loss(fits: Sequence[SensorFit]) -> bool:
-    """True if nearly all edges off the outline lie over missing returns."""
-    return all(4 * (rim.inside + rim.outside - rim.unreturned) < rim.unreturned for rim in rims(fits))
+    """True if nearly all edges off the outline lie in areas that the sensor has lost."""
+    return all(4 * (rim.inside + rim.outside - rim.lost) < rim.lost for rim in rims(fits))
 
 
 def _is_seen_in_loss(fits: Sequence[SensorFit]) -> bool:

@@ -22,7 +22,7 @@ class RimFit:
     Attributes:
         visible: on free edges, not behind an occluder, in a hole or behind the mesh's own surface.
         outside: of these, beside the object: the mesh hangs over the outline.
-        unreturned: of those outside, where no return tells of a background either: the sensor may have lost an area.
+        lost: of those outside, without return in an area in which the background has had some.
         inside: of these, far inside the outline: measured surface of the object continues beyond the mesh.
         off_m: distance of the visible ones from the outline [m], see `displacement` and `motion` in `rim_motion`; ∞ if
             the mesh has slid by an unknown distance.
@@ -35,7 +35,7 @@ class RimFit:
 
     visible: int = 0
     outside: int = 0
-    unreturned: int = 0
+    lost: int = 0
     inside: int = 0
     off_m: float = 0.0
     occluded: int = 0

@@ -68,12 +68,12 @@ def test_an_arm_against_the_edges_of_a_print_is_no_slide(agreeing, deviation_m, 
 @pytest.mark.parametrize(
     ("agreeing", "deviation_m", "rim", "lost", "status"),
     [
-        (95, 0.9e-3, {"outside": 40, "unreturned": 40}, 11, Status.TRACKING),
-        (95, 0.9e-3, {"outside": 40, "unreturned": 40}, 10, Status.DEGRADED),  # as many have another colour: a slide
-        (95, 0.9e-3, {"outside": 40, "unreturned": 25}, 50, Status.DEGRADED),  # others hang over a background
-        (95, 0.9e-3, {"outside": 30, "unreturned": 30, "inside": 10}, 50, Status.DEGRADED),  # it has slid
-        (85, 0.9e-3, {"outside": 40, "unreturned": 40}, 50, Status.DEGRADED),
-        (95, 1.1e-3, {"outside": 40, "unreturned": 40}, 50, Status.DEGRADED),  # a plain surface
+        (95, 0.9e-3, {"outside": 40, "lost": 40}, 11, Status.TRACKING),
+        (95, 0.9e-3, {"outside": 40, "lost": 40}, 10, Status.DEGRADED),  # as many have another colour: a slide
+        (95, 0.9e-3, {"outside": 40, "lost": 25}, 50, Status.DEGRADED),  # others hang over a background
+        (95, 0.9e-3, {"outside": 30, "lost": 30, "inside": 10}, 50, Status.DEGRADED),  # it has slid
+        (85, 0.9e-3, {"outside": 40, "lost": 40}, 50, Status.DEGRADED),
+        (95, 1.1e-3, {"outside": 40, "lost": 40}, 50, Status.DEGRADED),  # a plain surface
     ],
 )
 def test_returns_that_are_lost_at_the_edges_of_a_print_are_no_slide(agreeing, deviation_m, rim, lost, status):

@@ -38,7 +38,7 @@ class ObservedRimOutline:
         is_round: the outline does not show a turn of the object in its plane.
         deviation: σ of the position of the outline [px].
         off_px: an edge that is farther from the outline is off it [px].
-        distance_at: measured distances (k,) at places (k, 2) in the image [m], NaN without return.
+        lost_at: positive values (k,) at places (k, 2) in the image in areas that the sensor has lost.
         doubtful: pixels of the window (rows, columns) near the outline that are held against no vertex.
         kernel: `rim_cost` of the camera's lens.
         classes: of every vertex, as in `RimFit`.
@@ -53,7 +53,7 @@ class ObservedRimOutline:
     is_round: bool
     deviation: float
     off_px: float
-    distance_at: Callable[[NDArray[np.float64]], NDArray[np.float64]]
+    lost_at: Callable[[NDArray[np.float64]], NDArray[np.float64]]
     doubtful: NDArray[np.bool_]
     kernel: Callable[..., None]
     classes: bytes = b""
@@ -100,7 +100,7 @@ class ObservedRimOutline:
         return RimFit(
             visible=int(np.count_nonzero(known)),
             outside=int(np.count_nonzero(outside)),
-            unreturned=int(np.count_nonzero(outside & np.isnan(self.distance_at(places)))),
+            lost=int(np.count_nonzero(outside & (self.lost_at(places) > 0))),
             inside=int(np.count_nonzero(away > self.off_px)),
             off_m=max(displaced, self._hanging(outer, inner)),
             occluded=self.hidden + int(np.count_nonzero(~known)),

@@ -80,7 +80,8 @@ class RimOutline:
         """See `Outline`."""
         deviation, off_px = self._raggedness.deviation, max(self._min_off_px, self._raggedness.off_px)
         part, away = inwards(distance, seen, int(np.ceil(FARTHEST * deviation)) + 1)
-        first = np.add(corner(window), corner(part))[::-1].astype(np.float32)
+        corner_at = np.array(corner(window)[::-1], np.float32)
+        first = corner_at + np.array(corner(part)[::-1], np.float32)
         image = OutlineImage(self._camera, self._projection, away, first)
         if not self._images:
             self._classify(image, predicted, distance)
@@ -106,7 +107,9 @@ class RimOutline:
             is_round=self._is_round,
             deviation=deviation,
             off_px=off_px,
-            distance_at=partial(read, distance, np.array(corner(window)[::-1], np.float32), last=self._size),
+            lost_at=partial(
+                read, seen.lost.astype(np.float32), np.array(corner(window)[::-1], np.float32), last=self._size
+            ),
             doubtful=doubtful,
             kernel=self._kernel,
             classes=self._of_vertices(predicted.vertices.shape[2], is_cut),
