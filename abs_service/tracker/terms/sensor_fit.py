@@ -22,7 +22,6 @@ class RimFit:
     Attributes:
         visible: on free edges, not behind an occluder, in a hole or behind the mesh's own surface.
         outside: of these, beside the object: the mesh hangs over the outline.
-        lost: of those outside, without return in an area in which the background has had some.
         inside: of these, far inside the outline: measured surface of the object continues beyond the mesh.
         off_m: distance of the visible ones from the outline [m], see `displacement` and `motion` in `rim_motion`; ∞ if
             the mesh has slid by an unknown distance.
@@ -31,17 +30,18 @@ class RimFit:
         uncovered: of these, measured surface of the object now continues beyond the mesh.
         classes: a byte for each vertex of the mesh (n,): 0 inside it or unknown, else 1 and its `RimClass`; none if no
             outline is known.
+        lost: number of those outside that are in an area that the sensor has lost, without return.
     """
 
     visible: int = 0
     outside: int = 0
-    lost: int = 0
     inside: int = 0
     off_m: float = 0.0
     occluded: int = 0
     covered: int = 0
     uncovered: int = 0
     classes: bytes = b""
+    lost: int = 0
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,8 +12,8 @@ from abs_service.pairing.images import Window
 from abs_service.tracker.terms.depth.classification.neighbourhood import grown
 from calib.jit import kernel
 
-#: A connected area of missing returns is background if it shares so many pixels with that of the first image. The sensor
-#: has lost it if as many of its pixels had a return of the background then.
+#: A connected area of missing returns is background if it shares so many pixels with that of the first image. The
+#: sensor has lost it if as many of its pixels had a return of the background then.
 MIN_PIXELS = 10
 
 #: Missing returns deeper inside the expected outline are a hole all the same: the object does not move as far between

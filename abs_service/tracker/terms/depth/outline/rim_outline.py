@@ -5,6 +5,7 @@ between the pixels on the object and those beside it. Which stretches of the rim
 image (`rim_classes`).
 """
 
+from collections.abc import Callable
 from functools import partial
 
 import numpy as np
@@ -80,8 +81,7 @@ class RimOutline:
         """See `Outline`."""
         deviation, off_px = self._raggedness.deviation, max(self._min_off_px, self._raggedness.off_px)
         part, away = inwards(distance, seen, int(np.ceil(FARTHEST * deviation)) + 1)
-        corner_at = np.array(corner(window)[::-1], np.float32)
-        first = corner_at + np.array(corner(part)[::-1], np.float32)
+        first = np.add(corner(window), corner(part))[::-1].astype(np.float32)
         image = OutlineImage(self._camera, self._projection, away, first)
         if not self._images:
             self._classify(image, predicted, distance)
@@ -96,24 +96,30 @@ class RimOutline:
         self._raggedness.update(of_edges, directions, places)  # counts from the next frame on
         doubtful = np.zeros(distance.shape, np.bool_)
         doubtful[part] = (seen.free_m[part] > 0) & (away > -UNJUDGED_DEVIATIONS * deviation)
-        covered = (self.classes == RimClass.OCCLUDED) | (self.classes == RimClass.BORDER) | is_cut
         return ObservedRimOutline(
             image=image,
             edges=edges,
             is_sure=self._are_ends(edges, predicted, places, distance, seen.unsettled, window),
             hidden=len(free) - len(edges.outer),
-            covered=self._edges.some(np.flatnonzero(covered)),
+            covered=self._covered(is_cut),
             along=rim_directions(places, directions),
             is_round=self._is_round,
             deviation=deviation,
             off_px=off_px,
-            lost_at=partial(
-                read, seen.lost.astype(np.float32), np.array(corner(window)[::-1], np.float32), last=self._size
-            ),
+            lost_at=self._at(seen.lost, window),
             doubtful=doubtful,
             kernel=self._kernel,
             classes=self._of_vertices(predicted.vertices.shape[2], is_cut),
         )
+
+    def _covered(self, is_cut: NDArray[np.bool_]) -> Edges:
+        """Edges beyond which something hid the object in the first image, or that its border cuts, or the view (k,)."""
+        hides = (self.classes == RimClass.OCCLUDED) | (self.classes == RimClass.BORDER)
+        return self._edges.some(np.flatnonzero(hides | is_cut))
+
+    def _at(self, mask: NDArray[np.bool_], window: Window) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
+        """Reads a mask (rows, columns) of a window at places (k, 2) in the image: 1 in it."""
+        return partial(read, mask.astype(np.float32), np.array(corner(window)[::-1], np.float32), last=self._size)
 
     def _of_vertices(self, count: int, is_cut: NDArray[np.bool_]) -> bytes:
         """Classes of all `count` vertices, as in `RimFit`; edges (k,) that are cut now end at a border."""
