@@ -22,6 +22,7 @@ from abs_service.tracker.terms.agreement import (
     outside_share,
     rim_distance,
     rim_share,
+    shows_slide,
     turned_away_share,
     unexplained_share,
 )
@@ -108,8 +109,7 @@ def judge(
     else:
         reasons += _seen(fits, lost, limits) if fits else [_UNMEASURED]
     reasons += _faced(fits, limits)
-    reasons += _placed(fits, shape, innovation, limits)
-    reasons += _shaped(shape, limits)
+    reasons += (*_placed(fits, shape, innovation, limits), *_shaped(shape, limits))
     if lost:
         return Status.LOST, tuple(reasons)
     return (Status.DEGRADED if reasons else Status.TRACKING), tuple(reasons)
@@ -242,9 +242,9 @@ def _shaped(shape: ShapeQuality, limits: Settings) -> Iterator[str]:
 def is_misplaced(fits: Sequence[SensorFit], shape: ShapeQuality, limits: Settings) -> bool:
     """True if the free edges lie off the outline: too many of them, or by more than the covariances claim.
 
-    Edges inside the outline do not count if distances and images hold the surface: something lies against them.
+    If distances and images hold the surface, they count only if they show that it has slid, see `shows_slide`.
     """
     claimed = np.fmax(limits.degraded_rim_m, shape.deviation_m)
     is_off = rim_share(fits) > limits.degraded_rim or bool(rim_distance(fits) > claimed)
     is_held = shape.no_outline_deviation_m < PRINT_SHARE * limits.degraded_rim_m and image_agrees(fits)
-    return is_off and (hangs_over(fits) or not is_held)
+    return is_off and (shows_slide(fits) or not is_held)

@@ -149,3 +149,24 @@ def rims(fits: Sequence[SensorFit]) -> list[RimFit]:
 def hangs_over(fits: Sequence[SensorFit]) -> bool:
     """True if a mesh off its outline hangs over it: one that slides does so on the side that it slides to."""
     return any(4 * rim.outside >= rim.inside for rim in rims(fits))
+
+
+def shows_slide(fits: Sequence[SensorFit]) -> bool:
+    """True if what is off the outline shows that the mesh has slid or turned, although images hold it.
+
+    A slide lays some edges inside the object and others beside it, over what is no object in images either. Nearly all
+    end inside where something lies against them, and nearly all lie in areas that a sensor has lost.
+    """
+    return hangs_over(fits) and not (_lies_over_loss(fits) and _is_seen_in_loss(fits))
+
+
+def _lies_over_loss(fits: Sequence[SensorFit]) -> bool:
+    """True if nearly all edges off the outline lie in areas that the sensor has lost."""
+    return all(4 * (rim.inside + rim.outside - rim.lost) < rim.lost for rim in rims(fits))
+
+
+def _is_seen_in_loss(fits: Sequence[SensorFit]) -> bool:
+    """True if most vertices whose distances disagree have the right colour: beside its object, a mesh lacks both."""
+    distances = of_distances(fits)
+    lost, other = ([fit.counts.disagreeing for fit in fits if (fit in distances) == is_one] for is_one in (True, False))
+    return 2 * max(other, default=0) < min(lost, default=0)

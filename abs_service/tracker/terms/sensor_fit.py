@@ -30,6 +30,7 @@ class RimFit:
         uncovered: of these, measured surface of the object now continues beyond the mesh.
         classes: a byte for each vertex of the mesh (n,): 0 inside it or unknown, else 1 and its `RimClass`; none if no
             outline is known.
+        lost: number of those outside that are in an area that the sensor has lost, without return.
     """
 
     visible: int = 0
@@ -40,6 +41,7 @@ class RimFit:
     covered: int = 0
     uncovered: int = 0
     classes: bytes = b""
+    lost: int = 0
 
 
 @dataclass(frozen=True, slots=True)

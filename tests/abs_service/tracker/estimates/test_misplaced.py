@@ -7,6 +7,7 @@ import pytest
 from abs_service.tracker.estimates.estimate import Status
 from abs_service.tracker.estimates.status import judge
 from abs_service.tracker.terms.sensor_fit import Remainder
+from abs_service.tracker.terms.vertex_counts import VertexCounts
 from tests.abs_service.tracker.estimates.test_status import SETTINGS, SHAPE, fit, on_the_rim, seen
 
 
@@ -60,5 +61,24 @@ def test_a_side_that_hangs_over_by_an_unknown_distance_degrades_an_estimate():
 def test_an_arm_against_the_edges_of_a_print_is_no_slide(agreeing, deviation_m, outside, status):
     colors = replace(seen(agreeing=agreeing, disagreeing=100 - agreeing), sensor="color")
     distances = replace(on_the_rim(visible=60, inside=22, outside=outside, off_m=0.04), remainder=Remainder(0.1, 0.1))
+    shape = replace(SHAPE, no_outline_deviation_m=deviation_m)
+    assert judge([distances, colors], (), shape, 0.0, SETTINGS)[0] == status
+
+
+@pytest.mark.parametrize(
+    ("agreeing", "deviation_m", "rim", "lost", "status"),
+    [
+        (95, 0.9e-3, {"outside": 40, "lost": 40}, 11, Status.TRACKING),
+        (95, 0.9e-3, {"outside": 40, "lost": 40}, 10, Status.DEGRADED),  # as many have another colour: a slide
+        (95, 0.9e-3, {"outside": 40, "lost": 25}, 50, Status.DEGRADED),  # others hang over a background
+        (95, 0.9e-3, {"outside": 30, "lost": 30, "inside": 10}, 50, Status.DEGRADED),  # it has slid
+        (85, 0.9e-3, {"outside": 40, "lost": 40}, 50, Status.DEGRADED),
+        (95, 1.1e-3, {"outside": 40, "lost": 40}, 50, Status.DEGRADED),  # a plain surface
+    ],
+)
+def test_returns_that_are_lost_at_the_edges_of_a_print_are_no_slide(agreeing, deviation_m, rim, lost, status):
+    colors = replace(seen(agreeing=agreeing, disagreeing=100 - agreeing), sensor="color")
+    counts = VertexCounts(facing=100, agreeing=100 - lost, disagreeing=lost)
+    distances = replace(on_the_rim(visible=60, off_m=0.01, **rim), counts=counts, remainder=Remainder(0.1, 0.1))
     shape = replace(SHAPE, no_outline_deviation_m=deviation_m)
     assert judge([distances, colors], (), shape, 0.0, SETTINGS)[0] == status

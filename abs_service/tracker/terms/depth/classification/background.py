@@ -12,7 +12,8 @@ from abs_service.pairing.images import Window
 from abs_service.tracker.terms.depth.classification.neighbourhood import grown
 from calib.jit import kernel
 
-#: A connected area of missing returns is background if it shares so many pixels with that of the first image.
+#: A connected area of missing returns is background if it shares so many pixels with that of the first image. The
+#: sensor has lost it if as many of its pixels had a return of the background then.
 MIN_PIXELS = 10
 
 #: Missing returns deeper inside the expected outline are a hole all the same: the object does not move as far between
@@ -22,12 +23,19 @@ DEEPEST_M = 0.03
 #: Returns are missing beside the object's edge in any case; so many pixels around it are no background.
 MARGIN_PX = 3
 
+#: Returns within so many pixels of the mesh may be the object's: a mesh ends up to a cell inside it.
+OWN_PX = 16
+
 
 class Background:
-    """Pixels at which the background gives no return, learnt from the first depth image."""
+    """Pixels at which the background gives no return, learnt from the first depth image.
+
+    Attributes:
+        lost: missing returns (rows, columns) of the last image in areas in which the background has had some.
+    """
 
     def __init__(self) -> None:
-        self._empty = np.zeros((0, 0), np.bool_)
+        self._empty = self._returned = self.lost = np.zeros((0, 0), np.bool_)
         self._begun = False
 
     def observe(
@@ -43,26 +51,30 @@ class Background:
         """
         if not self._begun:
             self._begun = True
-            self._empty = np.zeros(shape[:2], np.bool_)
+            self._empty, self._returned = np.zeros((2, *shape[:2]), np.bool_)
             self._empty[window] = missing & ~grown(expected, MARGIN_PX)
+            self._returned[window] = ~(missing | grown(expected, OWN_PX))
         if not missing.any():
+            self.lost = missing
             return missing
-        empty = self._empty[window]
         count, labels = cv2.connectedComponents(missing.view(np.uint8), connectivity=4)
-        shared, result = np.zeros(count, np.int64), np.empty(missing.shape, np.bool_)
-        _mark_shared(np.asarray(labels, np.int32), np.ascontiguousarray(empty), shared, result)
-        return result
+        results = np.empty((2, *missing.shape), np.bool_)
+        for at_first, result in zip((self._empty, self._returned), results, strict=True):
+            first = np.ascontiguousarray(at_first[window])
+            _mark_shared(np.asarray(labels, np.int32), first, np.zeros(count, np.int64), result)
+        empty, self.lost = results
+        return empty
 
 
 @kernel
 def _mark_shared(
     labels: NDArray[np.int32], empty: NDArray[np.bool_], shared: NDArray[np.int64], result: NDArray[np.bool_]
 ) -> None:
-    """Marks the areas that share enough pixels with the background.
+    """Marks the areas that share enough pixels with what the first image showed.
 
     Args:
         labels: of the areas (rows, columns), 0 for none.
-        empty: background (rows, columns) of the first image.
+        empty: pixels (rows, columns) of the first image.
         shared: number of pixels that every area shares with it (areas,), zeros at the start.
         result: see above (rows, columns).
     """

@@ -66,4 +66,5 @@ class Classifier:
         seen = classify(surfaces, *given, agreement=AGREEMENT_M * (step / LARGEST_STEP_M))
         if is_flat and not seen.object.any():  # it moved farther than a finer agreement allows for
             seen = classify(surfaces_of(distance), *given)
-        return replace(seen, hole=seen.hole | hole, unsettled=self._fixed_edges.unsettled[window])
+        unsettled, lost = self._fixed_edges.unsettled[window], self._background.lost
+        return replace(seen, hole=seen.hole | hole, unsettled=unsettled, lost=lost)

@@ -46,6 +46,7 @@ class Visibility:
         free_m: distance to the nearest pixel of the object, across the line of sight [m], where the sensor looks past
             the object to a background, measured or without return; 0 elsewhere.
         unsettled: where the object may end, or the field of view, see `FixedEdges`.
+        lost: no return in an area in which the background has had some, see `Background`.
     """
 
     object: NDArray[np.bool_]
@@ -55,6 +56,7 @@ class Visibility:
     beyond: NDArray[np.bool_]
     free_m: NDArray[np.float32]
     unsettled: NDArray[np.bool_]
+    lost: NDArray[np.bool_]
 
 
 class Compared(NamedTuple):
@@ -108,7 +110,7 @@ def classify(
     nothing = np.zeros(distance.shape, np.bool_)
     if not is_object.any():
         free_m = np.zeros(distance.shape, np.float32)
-        return Visibility(nothing, nothing, nothing, nothing, nothing | beyond, free_m, nothing)
+        return Visibility(nothing, nothing, nothing, nothing, nothing | beyond, free_m, nothing, nothing)
     near = _extended(predicted)
     pixels = Compared(*(np.empty(distance.shape, np.bool_) for _ in Compared._fields))
     _compare(distance, near, labels, is_object, agreement, pixels)
@@ -119,7 +121,7 @@ def classify(
         hole, past = _holes(missing & ~(single | beyond), np.isfinite(predicted), near / focal, empty)
         hole |= beyond
     away = _depth_inside(~shown) * near / np.float32(focal)
-    return Visibility(shown, foreground, hole, single, nothing | beyond, where(behind | past, away), nothing)
+    return Visibility(shown, foreground, hole, single, nothing | beyond, where(behind | past, away), nothing, nothing)
 
 
 @kernel

@@ -38,6 +38,7 @@ class ObservedRimOutline:
         is_round: the outline does not show a turn of the object in its plane.
         deviation: σ of the position of the outline [px].
         off_px: an edge that is farther from the outline is off it [px].
+        lost_at: positive values (k,) at places (k, 2) in the image in areas that the sensor has lost.
         doubtful: pixels of the window (rows, columns) near the outline that are held against no vertex.
         kernel: `rim_cost` of the camera's lens.
         classes: of every vertex, as in `RimFit`.
@@ -52,6 +53,7 @@ class ObservedRimOutline:
     is_round: bool
     deviation: float
     off_px: float
+    lost_at: Callable[[NDArray[np.float64]], NDArray[np.float64]]
     doubtful: NDArray[np.bool_]
     kernel: Callable[..., None]
     classes: bytes = b""
@@ -93,10 +95,12 @@ class ObservedRimOutline:
         points, places, away = self.image.locate(self.edges, surface)
         known, outer, inner = ~np.isnan(away), self.covered.ends(surface), self.covered.starts(surface)
         beyond = self.image.inside_at(outer + LARGEST_GAP_STEPS * (outer - inner))
+        outside = away < -self.off_px
         displaced = self._displacement(surface, places, away, self._pixel_m(points)) if known.any() else 0.0
         return RimFit(
             visible=int(np.count_nonzero(known)),
-            outside=int(np.count_nonzero(away < -self.off_px)),
+            outside=int(np.count_nonzero(outside)),
+            lost=int(np.count_nonzero(outside & (self.lost_at(places) > 0))),
             inside=int(np.count_nonzero(away > self.off_px)),
             off_m=max(displaced, self._hanging(outer, inner)),
             occluded=self.hidden + int(np.count_nonzero(~known)),

@@ -5,6 +5,9 @@ between the pixels on the object and those beside it. Which stretches of the rim
 image (`rim_classes`).
 """
 
+from collections.abc import Callable
+from functools import partial
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -65,7 +68,7 @@ class RimOutline:
         self._first, self._was_cut = np.zeros((len(rim.outer), 2)), np.zeros(len(rim.outer), np.bool_)
         self._raggedness = Raggedness(deviation, ragged)
         self._min_off_px = max(OFF_PX, FARTHEST * deviation)
-        self._images, self._is_round = 0, False
+        self._images, self._is_round, self._size = 0, False, (camera.width, camera.height)
 
     def observe(
         self,
@@ -93,21 +96,30 @@ class RimOutline:
         self._raggedness.update(of_edges, directions, places)  # counts from the next frame on
         doubtful = np.zeros(distance.shape, np.bool_)
         doubtful[part] = (seen.free_m[part] > 0) & (away > -UNJUDGED_DEVIATIONS * deviation)
-        covered = (self.classes == RimClass.OCCLUDED) | (self.classes == RimClass.BORDER) | is_cut
         return ObservedRimOutline(
             image=image,
             edges=edges,
             is_sure=self._are_ends(edges, predicted, places, distance, seen.unsettled, window),
             hidden=len(free) - len(edges.outer),
-            covered=self._edges.some(np.flatnonzero(covered)),
+            covered=self._covered(is_cut),
             along=rim_directions(places, directions),
             is_round=self._is_round,
             deviation=deviation,
             off_px=off_px,
+            lost_at=self._at(seen.lost, window),
             doubtful=doubtful,
             kernel=self._kernel,
             classes=self._of_vertices(predicted.vertices.shape[2], is_cut),
         )
+
+    def _covered(self, is_cut: NDArray[np.bool_]) -> Edges:
+        """Edges beyond which something hid the object in the first image, or that its border cuts, or the view (k,)."""
+        hides = (self.classes == RimClass.OCCLUDED) | (self.classes == RimClass.BORDER)
+        return self._edges.some(np.flatnonzero(hides | is_cut))
+
+    def _at(self, mask: NDArray[np.bool_], window: Window) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
+        """Reads a mask (rows, columns) of a window at places (k, 2) in the image: 1 in it."""
+        return partial(read, mask.astype(np.float32), np.array(corner(window)[::-1], np.float32), last=self._size)
 
     def _of_vertices(self, count: int, is_cut: NDArray[np.bool_]) -> bytes:
         """Classes of all `count` vertices, as in `RimFit`; edges (k,) that are cut now end at a border."""
@@ -140,9 +152,9 @@ class RimOutline:
         """
         if not (beyond.any() or self._was_cut.any()):
             return self._was_cut
-        first, last = np.array(corner(window)[::-1], np.float32), (self._camera.width, self._camera.height)
+        first = np.array(corner(window)[::-1], np.float32)
         image = beyond.astype(np.float32)
-        at_first, now = (read(image, first, places, last) for places in (self._first, self._beside(surface)))
+        at_first, now = (read(image, first, places, self._size) for places in (self._first, self._beside(surface)))
         self._was_cut = np.where(np.isfinite(at_first), at_first > 0, self._was_cut)
         return self._was_cut | (now > 0)
 
@@ -163,9 +175,9 @@ class RimOutline:
         are_ends = ~turns_away(self._camera, predicted, edges.outer, edges.inner)
         if not unsettled.any():
             return are_ends
-        size = np.array([self._camera.width, self._camera.height])
+        size = np.array(self._size)
         near = np.concatenate([places > (1 - MARGIN) * size, places < MARGIN * size], axis=1).T
-        first, (width, height) = np.array(corner(window)[::-1], np.float32), size.tolist()
-        towards = [read(distance, first, places + BESIDE_PX * step, (width, height)) for step in _TO_SIDES]
-        is_open = read(unsettled.astype(np.float32), first, places, (width, height)) > 0
+        first = np.array(corner(window)[::-1], np.float32)
+        towards = [read(distance, first, places + BESIDE_PX * step, self._size) for step in _TO_SIDES]
+        is_open = read(unsettled.astype(np.float32), first, places, self._size) > 0
         return are_ends & ~(is_open & np.any(near & ~np.isfinite(towards), axis=0))

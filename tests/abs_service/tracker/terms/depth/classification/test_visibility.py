@@ -206,3 +206,18 @@ def test_missing_returns_are_background_if_their_area_shares_enough_pixels_with_
     shared = np.bincount(labels[first & later], minlength=labels.max() + 1)
     areas = later & (shared >= MIN_PIXELS)[labels]
     np.testing.assert_array_equal(background.observe(later, expected, WHOLE, first.shape), areas)
+
+
+def test_an_area_is_lost_if_the_background_had_returns_in_it_far_from_the_object():
+    """The first image shows a wall, and a shadow around the sheet."""
+    first = np.zeros(EXPECTED.shape, np.bool_)
+    first[2:70, 24:115] = ~EXPECTED[2:70, 24:115]
+    background = Background()
+    background.observe(first, EXPECTED, WHOLE, first.shape)
+    assert not background.lost.any()
+    later = first.copy()
+    later[20:45, 2:45] = True  # of the wall, the shadow, and the sheet
+    assert background.observe(later, EXPECTED, WHOLE, first.shape)[20:45, 2:45].all()
+    assert np.array_equal(background.lost, later)
+    background.observe(np.zeros_like(first), EXPECTED, WHOLE, first.shape)
+    assert not background.lost.any()
