@@ -9,6 +9,8 @@ import numpy as np
 import scipy  # its parts are imported when they are first used
 from numpy.typing import NDArray
 
+from calib.jit import kernel
+
 Float = TypeVar("Float", bound=np.floating)
 
 
@@ -105,11 +107,34 @@ def mean_around(mesh: Mesh) -> "scipy.sparse.csr_array":
     return scipy.sparse.csr_array(scipy.sparse.diags_array(1 / ring.sum(axis=1)) @ ring)
 
 
+def ring_means(mean: "scipy.sparse.csr_array", values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Product (n,) of `mean_around` and values (n,); SciPy's takes several times as long for some hundred vertices."""
+    result = np.empty(len(values))
+    _sum_rings(mean.indptr, mean.indices, mean.data, values, result)
+    return result
+
+
 def area_vectors(vertices: NDArray[np.floating], faces: NDArray[np.int32]) -> NDArray[np.floating]:
     """Normals (m, 3) of the faces (m, 3) of vertices (n, 3) [m], as long as twice their area [m²]."""
     corner = vertices[faces[:, 0]]
     (a, b, c), (d, e, f) = (vertices[faces[:, 1]] - corner).T, (vertices[faces[:, 2]] - corner).T
     return np.stack([b * f - c * e, c * d - a * f, a * e - b * d], axis=1)
+
+
+@kernel
+def _sum_rings(
+    start: NDArray[np.int32],
+    around: NDArray[np.int32],
+    weights: NDArray[np.float64],
+    values: NDArray[np.float64],
+    result: NDArray[np.float64],
+) -> None:
+    """Product of a sparse matrix with values (n,): entries (k,) by rows, which begin at `start` (n + 1,)."""
+    for v in range(result.size):
+        total = 0.0
+        for k in range(start[v], start[v + 1]):
+            total += weights[k] * values[around[k]]
+        result[v] = total
 
 
 def unit(vectors: NDArray[Float]) -> NDArray[Float]:

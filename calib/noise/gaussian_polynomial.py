@@ -1,6 +1,7 @@
 """Mean and deviation as polynomials in distance and amplitude (eq. 18), one pair for the whole image."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Annotated
 
 import numpy as np
@@ -58,7 +59,7 @@ class GaussianPolynomial:
         """Standard deviation σ(x, a) [m], the same for every pixel."""
         return self._polynomials.deviation(x, a, EVERYWHERE)
 
-    @property
+    @cached_property
     def _polynomials(self) -> Polynomials:
         sigma, mu = np.array(self.sigma)[..., None], np.array(self.mu)[..., None]
         return Polynomials(sigma, mu, self.distances, self.amplitudes, self.minimum_sigma)

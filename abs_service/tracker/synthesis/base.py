@@ -117,6 +117,10 @@ class View(Protocol):
         """
         ...
 
+    def observe_rendered(self, predicted: Surface) -> tuple[ObservedView, NDArray[np.float32]]:
+        """`observe` and `render` of the predicted mesh, which is rasterised once."""
+        ...
+
 
 class Resampling(Protocol):
     """The images of one frame in the geometry of the views."""

@@ -103,6 +103,10 @@ class DenseView:
         """Radial distances (height, width) [m] of a population of one in the camera's image; infinite off the mesh."""
         return self._raster.render(surface.vertices[0])
 
+    def observe_rendered(self, predicted: Surface) -> tuple["ObservedDenseView", NDArray[np.float32]]:
+        """Both; what is rendered for a population has the faces as well."""
+        return self.observe(predicted), self.render(predicted)
+
     def _painted(self, samples: Samples, share: NDArray[np.float64], expected: float) -> Synthesis:
         """The synthesis of a rasterised population; `expected` is the number of pixels of the predicted mesh."""
         attributes = paint(self._attributes, self._detail, samples)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -96,11 +97,22 @@ class SparseView:
 
     def observe(self, predicted: Surface) -> "ObservedSparseView":
         """The view without the vertices that face away or are self-occluded in the predicted mesh."""
+        return self._observe(predicted, partial(self._raster.render_at, predicted.vertices[0]))
+
+    def observe_rendered(self, predicted: Surface) -> tuple["ObservedSparseView", NDArray[np.float32]]:
+        """`observe` and `render` of the predicted mesh."""
+        distance = self.render(predicted)
+        return self._observe(predicted, lambda rows, columns: distance[rows, columns]), distance
+
+    def _observe(
+        self, predicted: Surface, front_at: Callable[[NDArray[np.intp], NDArray[np.intp]], NDArray[np.float32]]
+    ) -> "ObservedSparseView":
+        """See `observe`; `front_at` tells the distances (k,) [m] of the predicted mesh at rows and columns (k,)."""
         view = self.unoccluded(predicted)
         seen = view.synthesize(predicted)
         pixel, distance, stride = seen.pixel[0], seen.distance[0], self.camera.width + 2
         rows, columns = np.divmod(np.maximum(pixel - (stride + 1), 0), stride)
-        front, hidden = self._raster.render_at(predicted.vertices[0], rows, columns), np.empty_like(view.hidden)
+        front, hidden = front_at(rows, columns), np.empty_like(view.hidden)
         hide(predicted.vertices[0], predicted.normals[0], self.camera.center, front, distance, pixel, hidden)
         return replace(view, hidden=hidden, single={})
 

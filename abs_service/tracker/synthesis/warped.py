@@ -147,6 +147,10 @@ class _SharedView:
         """The view in one frame."""
         return _ObservedSharedView(self.camera, self._common.observe(predicted), self._attributes)
 
+    def observe_rendered(self, predicted: Surface) -> tuple["_ObservedSharedView", NDArray[np.float32]]:
+        """Both; the view is that of all sensors."""
+        return self.observe(predicted), self.render(predicted)
+
 
 class _CommonView:
     """The vertices in the common camera, observed once in a frame for all sensors."""

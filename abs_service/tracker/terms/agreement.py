@@ -1,8 +1,7 @@
 """Shares of a mesh that agree with what all sensors together show of it."""
 
+import math
 from collections.abc import Sequence
-
-import numpy as np
 
 from abs_service.tracker.terms.sensor_fit import MIN_RIM, RimFit, SensorFit
 from abs_service.tracker.terms.vertex_counts import VertexCounts
@@ -118,7 +117,7 @@ def _judged(fit: SensorFit) -> int:
 
 def of_distances(fits: Sequence[SensorFit]) -> list[SensorFit]:
     """The sensors of distances among them."""
-    return [fit for fit in fits if fit.is_surprised or np.isfinite(fit.remainder.at_first)]
+    return [fit for fit in fits if fit.is_surprised or math.isfinite(fit.remainder.at_first)]
 
 
 def unexplained_share(fits: Sequence[SensorFit]) -> float:
@@ -126,7 +125,7 @@ def unexplained_share(fits: Sequence[SensorFit]) -> float:
 
     Where the object comes into sight beyond an edge that something hid at first, the mesh is right as far as it goes.
     """
-    shares = [fit.remainder.gained for fit in fits if np.isfinite(fit.remainder.share) and not fit.rim.uncovered]
+    shares = [fit.remainder.gained for fit in fits if math.isfinite(fit.remainder.share) and not fit.rim.uncovered]
     return min(shares, default=0.0)
 
 

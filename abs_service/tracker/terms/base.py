@@ -12,6 +12,7 @@ from abs_service.tracker.synthesis.base import AS_MEASURED, Resampling, Synthesi
 from abs_service.tracker.terms.linearization import Part, PointLinearization
 from abs_service.tracker.terms.patches import Patches
 from abs_service.tracker.terms.sensor_fit import SensorFit
+from calib.jit import kernel
 from calib.no_return import CAUTIOUS, NoReturn
 
 #: Occluders of a frame without any.
@@ -42,10 +43,25 @@ class Bounds:
 
 def facing(seen: Synthesis, surface: Surface, center: NDArray[np.float64]) -> NDArray[np.bool_]:
     """True for the samples (m,) of a population of one that are turned towards a camera with a center (3,) [m]."""
-    vertices, normals = (
-        seen.interpolation.spread(part[0].T.astype(np.float64)) for part in (surface.vertices, surface.normals)
-    )
-    return np.asarray(np.einsum("ni,ni->n", normals, vertices - center) < 0)
+    vertices, normals = (seen.interpolation.spread(part[0].T) for part in (surface.vertices, surface.normals))
+    result = np.empty(len(vertices), np.bool_)
+    _mark_facing(vertices, normals, center, result)
+    return result
+
+
+@kernel
+def _mark_facing(
+    vertices: NDArray[np.floating],
+    normals: NDArray[np.floating],
+    center: NDArray[np.float64],
+    result: NDArray[np.bool_],
+) -> None:
+    """Marks in `result` what `facing` returns."""
+    for v in range(result.size):
+        along = 0.0
+        for i in range(3):
+            along += normals[v, i] * (vertices[v, i] - center[i])
+        result[v] = along < 0
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -64,53 +64,51 @@ def sum_squares(
 
 
 @kernel
-def add_squares(
+def find_roots(
     squares: NDArray[np.float64],
     jacobian: JacobianBlocks,
-    total: NDArray[np.float64],
-) -> None:
-    """Adds DᵀMD of points with matrices M (n, 3, 3), symmetric and not negative, to a matrix (dim, dim); uses M up.
+    rows: NDArray[np.float64],
+    start: NDArray[np.int64],
+    groups: NDArray[np.int64],
+) -> int:
+    """Rows whose square is DᵀMD of points with matrices M (n, 3, 3), symmetric and not negative; uses M up.
 
     M is CᵀC with as many rows C as its rank, by a Cholesky decomposition with pivots, and DᵀMD the square of CD.
+
+    Args:
+        squares: M.
+        jacobian: D.
+        rows: result (3 n, k) at most, by the parameters of their points' group.
+        start: result, first row of points of a group that follow each other, and the number of rows, (n + 1,) at most.
+        groups: result, their group (n,) at most.
+
+    Returns:
+        Number of times that points of a group follow each other.
     """
-    group, parameters, local = jacobian
-    n, k, first = group.size, local.shape[2], 0
-    row = np.empty(3)
-    while first < n:
-        last = first + 1
-        while last < n and group[last] == group[first]:
-            last += 1
-        rows, count = np.empty((3 * (last - first), k)), 0
-        for v in range(first, last):
-            rest = squares[v]
-            least = _ROUNDING * (rest[0, 0] + rest[1, 1] + rest[2, 2])
-            for _ in range(3):
-                p = 0 if rest[0, 0] >= max(rest[1, 1], rest[2, 2]) else (1 if rest[1, 1] >= rest[2, 2] else 2)
-                if not rest[p, p] > least:
-                    break
-                inverse = 1 / np.sqrt(rest[p, p])
-                for i in range(3):
-                    row[i] = rest[p, i] * inverse
-                for i in range(3):
-                    for j in range(3):
-                        rest[i, j] -= row[i] * row[j]
-                x, y, z = row
-                for d in range(k):
-                    rows[count, d] = x * local[v, 0, d] + y * local[v, 1, d] + z * local[v, 2, d]
-                count += 1
-        add_square(rows[:count], parameters[group[first]], total)
-        first = last
-
-
-@kernel
-def add_square(rows: NDArray[np.float64], own: NDArray[np.int64], total: NDArray[np.float64]) -> None:
-    """Adds rowᵀ row, of rows (m, k), to the rows and columns `own` (k,) of a matrix."""
-    square = np.empty((own.size, own.size))
-    np.dot(rows.T, rows, square)
-    for i in range(own.size):
-        line = total[own[i]]
-        for j in range(own.size):
-            line[own[j]] += square[i, j]
+    group, _, local = jacobian
+    row, count, runs = np.empty(3), 0, 0
+    for v in range(group.size):
+        if v == 0 or group[v] != group[v - 1]:
+            start[runs], groups[runs] = count, group[v]
+            runs += 1
+        rest = squares[v]
+        least = _ROUNDING * (rest[0, 0] + rest[1, 1] + rest[2, 2])
+        for _ in range(3):
+            p = 0 if rest[0, 0] >= max(rest[1, 1], rest[2, 2]) else (1 if rest[1, 1] >= rest[2, 2] else 2)
+            if not rest[p, p] > least:
+                break
+            inverse = 1 / np.sqrt(rest[p, p])
+            for i in range(3):
+                row[i] = rest[p, i] * inverse
+            for i in range(3):
+                for j in range(3):
+                    rest[i, j] -= row[i] * row[j]
+            x, y, z = row
+            for d in range(local.shape[2]):
+                rows[count, d] = x * local[v, 0, d] + y * local[v, 1, d] + z * local[v, 2, d]
+            count += 1
+    start[runs] = count
+    return runs
 
 
 @kernel
@@ -140,16 +138,40 @@ def extrapolate(
 
 
 @kernel
-def quadratic_forms(
-    rows: NDArray[np.float64], points: NDArray[np.int64], matrices: NDArray[np.float64], result: NDArray[np.float64]
+def find_leverages(
+    rows: NDArray[np.float64],
+    points: NDArray[np.int64],
+    jacobian: JacobianBlocks,
+    covariance: NDArray[np.float64],
+    result: NDArray[np.float64],
 ) -> None:
-    """Products row matrix rowᵀ (m,) of rows (m, 3) with the matrices of their points (n, 3, 3)."""
-    for m in range(points.size):
-        matrix, total = matrices[points[m]], 0.0
-        for i in range(3):
-            for j in range(3):
-                total += rows[m, i] * matrix[i, j] * rows[m, j]
-        result[m] = total
+    """diag(J Σ Jᵀ) (m,) of residuals with rows (m, 3) at points (m,), from Σ (dim, dim).
+
+    Residuals of a group that follow each other share one product of matrices.
+    """
+    (group, parameters, local), first = jacobian, 0
+    part = np.empty((local.shape[2], local.shape[2]))
+    while first < points.size:
+        own, last = parameters[group[points[first]]], first + 1
+        while last < points.size and group[points[last]] == group[points[first]]:
+            last += 1
+        for i in range(own.size):
+            line = covariance[own[i]]
+            for j in range(own.size):
+                part[i, j] = line[own[j]]
+        by_theta, products = np.empty((last - first, own.size)), np.empty((last - first, own.size))
+        for m in range(first, last):
+            v = points[m]
+            for d in range(own.size):
+                by_theta[m - first, d] = rows[m, 0] * local[v, 0, d] + rows[m, 1] * local[v, 1, d]
+                by_theta[m - first, d] += rows[m, 2] * local[v, 2, d]
+        np.dot(by_theta, part, products)
+        for m in range(first, last):
+            total = 0.0
+            for d in range(own.size):
+                total += products[m - first, d] * by_theta[m - first, d]
+            result[m] = total
+        first = last
 
 
 @kernel

@@ -193,15 +193,18 @@ def _color_rows(
     """Image gradients at places (n, 2) by regression, times the Jacobians of the projection (n, 2, 3) and scales."""
     height, width, channels = image.shape
     side, reach = weights.shape[0], weights.shape[0] // 2
+    x, y = np.empty(side, np.int64), np.empty(side, np.int64)
     for v in range(places.shape[0]):
         column, row = int(np.floor(places[v, 0] + 0.5)), int(np.floor(places[v, 1] + 0.5))
-        own = image[min(max(row, 0), height - 1), min(max(column, 0), width - 1)]
+        for i in range(side):  # once for all channels
+            x[i] = min(max(column + i - reach, 0), width - 1)
+            y[i] = min(max(row + i - reach, 0), height - 1)
+        own = image[y[reach], x[reach]]
         for c in range(channels):
             right, down = 0.0, 0.0
             for i in range(side):
-                y = min(max(row + i - reach, 0), height - 1)
                 for j in range(side):
-                    color = image[y, min(max(column + j - reach, 0), width - 1), c]
+                    color = image[y[i], x[j], c]
                     value = weights[i, j] * (own[c] if np.isnan(color) else color)
                     right += (j - reach) * value
                     down += (i - reach) * value

@@ -1,11 +1,11 @@
 """Linearised residuals, each of which depends on the parameters of one group of points, such as a knot span."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.terms.chain_rule import add_square
 from calib.jit import kernel
 
 
@@ -39,7 +39,21 @@ class GroupedLinearization:
 
     def add_curvature(self, total: NDArray[np.float64]) -> None:
         """Adds JᵀJ to a matrix (dim, dim)."""
-        _add_curvature(self.jacobian, self.parameters, self.start, total)
+        add_group_squares(self.jacobian, self.parameters, self.start, total)
+
+
+def add_group_squares(
+    rows: NDArray[np.float64], parameters: NDArray[np.int64], start: NDArray[np.int64], total: NDArray[np.float64]
+) -> None:
+    """Adds rowᵀ row, of the rows (m, k) of every group, to its parameters' part of a matrix (dim, dim).
+
+    NumPy computes half of a product of a matrix with itself, Numba all of it. Arguments as in `GroupedLinearization`.
+    """
+    squares = np.empty((len(parameters), rows.shape[1], rows.shape[1]))
+    for square, (first, last) in zip(squares, pairwise(start.tolist()), strict=True):
+        own = rows[first:last]
+        np.matmul(own.T, own, out=square)
+    _add_at(squares, parameters, total)
 
 
 @kernel
@@ -62,10 +76,11 @@ def _add_gradient(
 
 
 @kernel
-def _add_curvature(
-    rows: NDArray[np.float64], parameters: NDArray[np.int64], start: NDArray[np.int64], total: NDArray[np.float64]
-) -> None:
-    """Adds rowᵀ row, of rows (m, k), to a matrix (dim, dim)."""
+def _add_at(squares: NDArray[np.float64], parameters: NDArray[np.int64], total: NDArray[np.float64]) -> None:
+    """Adds the squares of all groups (groups, k, k) to the rows and columns of their parameters in a matrix."""
     for g in range(parameters.shape[0]):
-        if start[g] < start[g + 1]:
-            add_square(rows[start[g] : start[g + 1]], parameters[g], total)
+        own = parameters[g]
+        for i in range(own.size):
+            line = total[own[i]]
+            for j in range(own.size):
+                line[own[j]] += squares[g, i, j]

@@ -8,10 +8,7 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.models.base import SparseJacobian
 from abs_service.tracker.terms import chain_rule
-from abs_service.tracker.terms.grouped import GroupedLinearization
-
-#: Covariance (n, 3, 3) of the points of a sparse Jacobian, from that of theta.
-AtPoints = Callable[[SparseJacobian], NDArray[np.float64]]
+from abs_service.tracker.terms.grouped import GroupedLinearization, add_group_squares
 
 #: Derivatives (m, 3) of residuals by what is known of the surface itself, from those by the measurements (m, 3).
 OfSurface = Callable[[NDArray[np.float64]], NDArray[np.float64]]
@@ -76,8 +73,8 @@ class Linearization:
         """Adds JᵀJ to a matrix (dim, dim)."""
         total += self.jacobian.T @ self.jacobian  # of one matrix: half the products
 
-    def leverage(self, covariance: NDArray[np.float64], at_points: AtPoints) -> NDArray[np.float64]:
-        """diag(J Σ Jᵀ) (m,) of a covariance Σ (dim, dim) of theta, or of what that is at the points."""
+    def leverage(self, covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+        """diag(J Σ Jᵀ) (m,) of a covariance Σ (dim, dim) of theta, contiguous."""
         return np.vecdot(self.jacobian @ covariance, self.jacobian)
 
     def add_scores(self, clusters: NDArray[np.int64], scores: NDArray[np.float64]) -> None:
@@ -127,6 +124,8 @@ class PointLinearization:
 
     def moved(self, by: NDArray[np.float64]) -> "PointLinearization":
         """Linearisation with its residuals extrapolated to first order by a step (dim,) of theta."""
+        if not len(self.residual):
+            return self
         residual = np.empty_like(self.residual)
         chain_rule.extrapolate(self.residual, self.rows, self.points, self.sparse_jacobian.blocks, by, residual)
         return replace(self, residual=residual)
@@ -143,10 +142,10 @@ class PointLinearization:
         """Sum of the derivatives (s, dim) of the residuals that share an error, times that error's deviation."""
         return self.transposed_times(self.shared, self.sparse_jacobian.dimension).T
 
-    def leverage(self, covariance: NDArray[np.float64], at_points: AtPoints) -> NDArray[np.float64]:
-        """diag(J Σ Jᵀ) (m,) of a covariance Σ (dim, dim) of theta, or of what that is at the points."""
+    def leverage(self, covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+        """diag(J Σ Jᵀ) (m,) of a covariance Σ (dim, dim) of theta, contiguous."""
         result = np.empty(len(self.residual))
-        chain_rule.quadratic_forms(self.rows, self.points, at_points(self.sparse_jacobian), result)
+        chain_rule.find_leverages(self.rows, self.points, self.sparse_jacobian.blocks, covariance, result)
         return result
 
     def add_scores(self, clusters: NDArray[np.int64], scores: NDArray[np.float64]) -> None:
@@ -179,6 +178,8 @@ def add_squares(parts: Sequence[Part], weights: Sequence[NDArray[np.float64]], t
     """
     at_points: dict[SparseJacobian, NDArray[np.float64]] = {}
     for part, own in zip(parts, weights, strict=True):
+        if not len(own):
+            continue
         if isinstance(part, PointLinearization):
             samples = part.sparse_jacobian
             squares = at_points.setdefault(samples, np.zeros((len(samples.local), 3, 3)))
@@ -187,7 +188,10 @@ def add_squares(parts: Sequence[Part], weights: Sequence[NDArray[np.float64]], t
             weighted = part.jacobian * np.sqrt(own)[:, None]
             total += weighted.T @ weighted  # of one matrix: half the products
     for samples, squares in at_points.items():
-        chain_rule.add_squares(squares, samples.blocks, total)
+        n, _, k = samples.local.shape
+        rows, start, groups = np.empty((3 * n, k)), np.empty(n + 1, np.int64), np.empty(n, np.int64)
+        runs = chain_rule.find_roots(squares, samples.blocks, rows, start, groups)
+        add_group_squares(rows, samples.parameters[groups[:runs]], start[: runs + 1], total)
 
 
 def stack(parts: Sequence[Part | GroupedLinearization], dimension: int) -> Linearization:

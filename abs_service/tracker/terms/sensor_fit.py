@@ -115,7 +115,7 @@ def summarize(
 
     Args:
         sensor: its name.
-        masks: the vertices by whether the sensor sees them.
+        masks: what the sensor's image shows of the vertices.
         measured: mask of the vertices with a measurement.
         residual: absolute normalised residual, root mean square over the channels.
         mean_log_likelihood: see `SensorFit`.
@@ -123,14 +123,14 @@ def summarize(
     """
     inlier = measured & (residual < INLIER_DEVIATIONS)
     square = float(np.mean(residual[inlier] ** 2)) if inlier.any() else float("nan")
-    spread = deviation_within(square, INLIER_DEVIATIONS, channels)
+    spread, tally = deviation_within(square, INLIER_DEVIATIONS, channels), masks.tally(measured, inlier)
     return SensorFit(
         sensor,
-        visible=int(np.count_nonzero(masks.visible)),
-        occluded=masks.occluded,
+        visible=tally.visible,
+        occluded=tally.occluded,
         samples=int(np.count_nonzero(measured)),
         inliers=int(np.count_nonzero(inlier)),
         mean_log_likelihood=mean_log_likelihood,
         normalized_residual=spread,
-        counts=masks.count(measured, inlier),
+        counts=tally.of(len(measured)),
     )

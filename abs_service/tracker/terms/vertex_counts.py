@@ -1,9 +1,12 @@
 """Vertices of a mesh by what one sensor's image shows of them."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from calib.jit import kernel
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,63 +45,85 @@ class VertexCounts:
         return float(getattr(self, name)) / self.facing if self.facing else 0.0
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class VertexMasks:
-    """Masks (n,) of samples, without those that are turned away; no sample is in two.
+class VertexMasks(NamedTuple):
+    """Masks (n,) of samples by what one sensor's image shows of them.
+
+    Attributes:
+        pixel: see `Synthesis`.
+        facing: turned towards the sensor.
+        missing: over an area without return, or a lost return.
+        behind_occluder: something in front of the object hides them; comes before a missing return.
+        unjudged: without a class if neither holds.
+    """
+
+    pixel: NDArray[np.int32]
+    facing: NDArray[np.bool_]
+    missing: NDArray[np.bool_]
+    behind_occluder: NDArray[np.bool_]
+    unjudged: NDArray[np.bool_]
+
+    def tally(self, measured: NDArray[np.bool_], agreeing: NDArray[np.bool_]) -> "Tally":
+        """Numbers of samples, by masks (n,) of those that are measured and those that agree."""
+        counts = np.zeros(len(Tally._fields), np.int64)
+        count_samples(self, measured, agreeing, counts)
+        return Tally(*counts.tolist())
+
+
+class Tally(NamedTuple):
+    """Numbers of samples, each in one of the first six.
 
     Attributes:
         visible: in the image, and nothing hides them; their measurement may be missing.
-        missing: over an area without return, or a lost return.
-        behind_occluder, behind_itself, outside, unjudged: see `VertexCounts`.
+        missing, behind_occluder, behind_itself, outside, unjudged: see `VertexCounts`.
+        measured, agreeing: of the visible ones.
     """
 
-    visible: NDArray[np.bool_]
-    missing: NDArray[np.bool_]
-    behind_occluder: NDArray[np.bool_]
-    behind_itself: NDArray[np.bool_]
-    outside: NDArray[np.bool_]
-    unjudged: NDArray[np.bool_]
-
-    @classmethod
-    def of(
-        cls,
-        pixel: NDArray[np.int32],
-        facing: NDArray[np.bool_],
-        missing: NDArray[np.bool_],
-        behind_occluder: NDArray[np.bool_],
-        unjudged: NDArray[np.bool_],
-    ) -> "VertexMasks":
-        """Masks of samples at pixels (n,), see `Synthesis`; an occluder comes before a missing return."""
-        inside = pixel > 0
-        covered, lost = inside & behind_occluder, inside & missing & ~behind_occluder
-        unknown = inside & unjudged & ~(covered | lost)
-        visible = inside & ~(covered | lost | unknown)
-        return cls(visible, lost, covered, (pixel < 0) & facing, (pixel == 0) & facing, unknown)
+    visible: int
+    missing: int
+    behind_occluder: int
+    behind_itself: int
+    outside: int
+    unjudged: int
+    measured: int
+    agreeing: int
 
     @property
     def occluded(self) -> int:
         """Number of samples that something hides, a missing return included."""
-        return sum(map(_count, (self.missing, self.behind_occluder, self.behind_itself)))
+        return self.missing + self.behind_occluder + self.behind_itself
 
-    def count(self, measured: NDArray[np.bool_], agreeing: NDArray[np.bool_]) -> VertexCounts:
-        """Numbers of samples, by masks (n,) of those that are measured and those that agree."""
-        visible, missing, outside, unjudged, covered, behind = map(
-            _count,
-            (self.visible, self.missing, self.outside, self.unjudged, self.behind_occluder, self.behind_itself),
-        )
-        known, good = _count(self.visible & measured), _count(self.visible & agreeing)
-        facing = visible + missing + covered + behind + outside + unjudged
+    def of(self, samples: int) -> VertexCounts:
+        """The counts of so many samples."""
+        facing = sum(self[:6])
         return VertexCounts(
             facing=facing,
-            agreeing=good,
-            disagreeing=known - good,
-            missing=missing + visible - known,
-            behind_occluder=covered,
-            behind_itself=behind,
-            outside=outside,
-            turned_away=len(self.visible) - facing,
+            agreeing=self.agreeing,
+            disagreeing=self.measured - self.agreeing,
+            missing=self.missing + self.visible - self.measured,
+            behind_occluder=self.behind_occluder,
+            behind_itself=self.behind_itself,
+            outside=self.outside,
+            turned_away=samples - facing,
         )
 
 
-def _count(mask: NDArray[np.bool_]) -> int:
-    return int(np.count_nonzero(mask))
+@kernel
+def count_samples(
+    masks: VertexMasks, measured: NDArray[np.bool_], agreeing: NDArray[np.bool_], counts: NDArray[np.int64]
+) -> None:
+    """Adds the numbers of a `Tally` to zeros."""
+    for v in range(masks.pixel.size):
+        pixel = masks.pixel[v]
+        if pixel <= 0:
+            if masks.facing[v]:
+                counts[3 if pixel < 0 else 4] += 1
+        elif masks.behind_occluder[v]:
+            counts[2] += 1
+        elif masks.missing[v]:
+            counts[1] += 1
+        elif masks.unjudged[v]:
+            counts[5] += 1
+        else:
+            counts[0] += 1
+            counts[6] += 1 if measured[v] else 0
+            counts[7] += 1 if agreeing[v] else 0

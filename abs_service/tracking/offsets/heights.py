@@ -55,6 +55,24 @@ class VertexPixels(NamedTuple):
     steps: NDArray[np.int64]
 
 
+class Sighted(NamedTuple):
+    """The vertices as a camera sees them.
+
+    Attributes:
+        sight: relative to the camera (n, 3) [m].
+        distance, cosine: from it (n,) [m], and of the angle between line of sight and normal.
+        rows, columns: of every vertex's pixel (n,), or of any pixel near the rest of the mesh.
+        seen: all of whose pixels are in the image (n,).
+    """
+
+    sight: NDArray[np.float64]
+    distance: NDArray[np.float64]
+    cosine: NDArray[np.float64]
+    rows: NDArray[np.int64]
+    columns: NDArray[np.int64]
+    seen: NDArray[np.bool_]
+
+
 class Planes(NamedTuple):
     """The tangential plane of every vertex, and what measurements of it are expected to be.
 
@@ -98,10 +116,7 @@ class HeightSensor:
             vertices, normals: see above.
             variance: of what is known of the heights (n,) [m²], which decides what is an outlier.
         """
-        sight = vertices - self._camera.center
-        distance = np.sqrt(np.vecdot(sight, sight))
-        cosine = np.abs(np.vecdot(sight, normals)) / distance
-        row, column, seen = self._pixel(vertices)
+        sight, distance, cosine, row, column, seen = self._look(vertices, normals)
         top, left = int(row.min()) - self._reach, int(column.min()) - self._reach
         window = slice(top, int(row.max()) + self._reach + 1), slice(left, int(column.max()) + self._reach + 1)
         measured, amplitude = image.within(window)
@@ -116,17 +131,14 @@ class HeightSensor:
         _mean_heights(cutout, self._rays, VertexPixels(row, column, self._steps), planes, height, pixels)
         return Heights(height, pixels / np.where(pixels, sigma, 1) ** 2)
 
-    def _pixel(self, vertices: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
-        """Row and column (n,) of every vertex's pixel, and whether all of its pixels are in the image, (n,).
-
-        Of others, they are those of any pixel near the rest of the mesh.
-        """
-        camera, reach = self._camera, self._reach
-        column, row = np.floor(project_with_jacobian(camera, vertices)[0].T + 0.5)
-        seen = (column >= reach) & (column < camera.width - reach) & (row >= reach) & (row < camera.height - reach)
-        any_row, any_column = (row[seen][0], column[seen][0]) if seen.any() else (reach, reach)
-        row, column = np.where(seen, row, any_row), np.where(seen, column, any_column)
-        return row.astype(np.int64), column.astype(np.int64), seen
+    def _look(self, vertices: NDArray[np.float64], normals: NDArray[np.float64]) -> Sighted:
+        """Vertices (n, 3) [m] with unit normals (n, 3) as the camera sees them."""
+        camera, n = self._camera, len(vertices)
+        (distance, cosine), (rows, columns) = np.empty((2, n)), np.empty((2, n), np.int64)
+        found = Sighted(np.empty((n, 3)), distance, cosine, rows, columns, np.empty(n, np.bool_))
+        places = project_with_jacobian(camera, vertices)[0]
+        _look(vertices, normals, camera.center, places, (camera.height, camera.width), self._reach, found)
+        return found
 
     def _noise_of(
         self,
@@ -141,6 +153,40 @@ class HeightSensor:
         deviation, mean = np.full((2, len(distance)), np.nan)
         deviation[known], mean[known] = self._noise.deviation(*arguments), self._noise.mean(*arguments)
         return deviation, mean
+
+
+@kernel
+def _look(
+    vertices: NDArray[np.float64],
+    normals: NDArray[np.float64],
+    center: NDArray[np.float64],
+    places: NDArray[np.float64],
+    shape: tuple[int, int],
+    reach: int,
+    found: Sighted,
+) -> None:
+    """Writes what a camera with a centre (3,) [m] and images of a shape sees of vertices at places (n, 2) [px].
+
+    Their pixels are up to so many rows and columns away from their own.
+    """
+    (height, width), any_row, any_column = shape, reach, reach
+    for v in range(vertices.shape[0] - 1, -1, -1):
+        square, along = 0.0, 0.0
+        for i in range(3):
+            away = vertices[v, i] - center[i]
+            found.sight[v, i] = away
+            square += away * away
+            along += away * normals[v, i]
+        found.distance[v] = np.sqrt(square)
+        found.cosine[v] = abs(along) / found.distance[v]
+        column, row = np.floor(places[v, 0] + 0.5), np.floor(places[v, 1] + 0.5)
+        found.seen[v] = column >= reach and column < width - reach and row >= reach and row < height - reach
+        if found.seen[v]:  # of the first of them in the end
+            any_row, any_column = int(row), int(column)
+            found.rows[v], found.columns[v] = any_row, any_column
+    for v in range(vertices.shape[0]):
+        if not found.seen[v]:
+            found.rows[v], found.columns[v] = any_row, any_column
 
 
 @kernel

@@ -101,7 +101,7 @@ def evaluate(
     Raises:
         IndexError: index out of range; the compiled loop does not check it.
     """
-    if place.size and not 0 <= place.min() <= place.max() < coefficients.shape[2]:
+    if not _all_within(place, coefficients.shape[2]):
         raise IndexError(f"places {place.min()} to {place.max()} of {coefficients.shape[2]}")
     if coefficients.size == 1:  # such as no mean offset: the same everywhere
         return np.full(np.shape(x), coefficients.item(), np.float64)
@@ -111,13 +111,20 @@ def evaluate(
     out = np.empty((math.prod(x.shape[:outer]), math.prod(one)))
     _evaluate(
         np.ascontiguousarray(coefficients, np.float64),
-        np.broadcast_to(place, one).astype(np.int64).ravel(),
+        (place if place.size == 1 else np.broadcast_to(place, one)).astype(np.int64).ravel(),
         x.reshape(out.shape),
-        np.broadcast_to(a, one).astype(np.float64).ravel(),
+        (np.broadcast_to(a, one) if coefficients.shape[1] > 1 else a).astype(np.float64).ravel(),
         np.array([*distances, *amplitudes], np.float64),
         out,
     )
     return out.reshape(x.shape)
+
+
+def _all_within(place: NDArray[np.integer], count: int) -> bool:
+    """True if all places are below a count; most often there is one, for all samples."""
+    if place.size == 1:
+        return 0 <= place.item() < count
+    return not place.size or bool(place.min() >= 0 and place.max() < count)
 
 
 @kernel
@@ -129,19 +136,23 @@ def _evaluate(
     domain: NDArray[np.float64],
     out: NDArray[np.float64],
 ) -> None:
-    """Horner's scheme, first in the amplitude and then in the distance, in blocks so that the loops vectorise."""
+    """Horner's scheme, first in the amplitude and then in the distance, in blocks so that the loops vectorise.
+
+    The place may be one for all samples, and the amplitude is not read if only its zeroth power occurs.
+    """
     nearest, farthest, faintest, brightest = domain
     rows, columns, _ = coefficients.shape
     sums, inside, coefficient = np.empty((rows, _BLOCK)), np.empty(_BLOCK), np.empty(_BLOCK)
     for first in range(0, x.shape[1], _BLOCK):
         last = min(first + _BLOCK, x.shape[1])
-        at, n = place[first:last], last - first
-        _clip(a[first:last], faintest, brightest, inside)
+        at, n = place[first:last] if place.size > 1 else place, last - first
+        if columns > 1:
+            _clip(a[first:last], faintest, brightest, inside)
         for i in range(rows):
-            partial = sums[i]
+            partial = sums[i, :n]
             _look_up(coefficients[i, columns - 1], at, partial)
             for j in range(columns - 2, -1, -1):
-                _look_up(coefficients[i, j], at, coefficient)
+                _look_up(coefficients[i, j], at, coefficient[:n])
                 for k in range(n):
                     partial[k] = partial[k] * inside[k] + coefficient[k]
         for node in range(x.shape[0]):
@@ -166,10 +177,10 @@ def _clip(values: NDArray[np.float64], low: float, high: float, out: NDArray[np.
 @kernel
 def _look_up(plane: NDArray[np.float64], at: NDArray[np.int64], out: NDArray[np.float64]) -> None:
     """Coefficient of every place; a single coefficient for all is read once, so that the loop vectorises."""
-    if plane.size == 1:
-        single = plane[0]
-        for k in range(at.size):
+    if at.size == 1:
+        single = plane[at[0]]
+        for k in range(out.size):
             out[k] = single
     else:
-        for k in range(at.size):
+        for k in range(out.size):
             out[k] = plane[at[k]]

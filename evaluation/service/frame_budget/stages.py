@@ -35,7 +35,7 @@ SEAMS = (
     Seam("noise rendering", texels, "corrected_distances"),
     Seam("noise rendering", texels, "write_pixels"),
     Seam("rendered prediction", SparseView, "render"),
-    Seam("visible vertices", SparseView, "observe"),
+    Seam("visible vertices", SparseView, "_observe"),
     Seam("classify", Classifier, "classify"),
     Seam("outline", RimOutline, "observe"),
     Seam("colour", ColorTerm, "observe"),

@@ -19,7 +19,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.mesh import Mesh, mean_around
+from abs_service.tracker.mesh import Mesh, mean_around, ring_means
 from abs_service.tracker.posterior.optimum import Optimum
 from abs_service.tracker.terms import chain_rule
 from abs_service.tracker.terms.linearization import PointLinearization
@@ -65,7 +65,7 @@ class AppearanceMisfit:
         excess, around = np.empty(n), (self._around.indptr, self._around.indices)
         beyond_noise(*around, squares, gradient, optimum.surface.normals[0], self._minimum_precision, excess)
         np.maximum(excess, 0.0, out=excess)
-        return np.maximum(self._mean @ excess, excess.mean())
+        return np.maximum(ring_means(self._mean, excess), excess.mean())
 
 
 @kernel

@@ -64,29 +64,20 @@ class DesignEffects:
         places = part.places
         if not len(places):
             return np.zeros(2)
-        numbers, clusters = np.full(CLUSTERS, -1, np.int64), np.empty(len(places), np.int64)
-        _find_clusters(places, 1 / self._side_m, numbers, clusters)
-        scores = np.zeros((numbers.max() + 1, len(inverse)))
+        clusters = np.empty(len(places), np.int64)
+        scores = np.zeros((_find_clusters(places, 1 / self._side_m, clusters), len(inverse)))
         part.add_scores(clusters, scores)
         # The squared length of a single score is r² h.
         return np.array([np.vdot(scores @ inverse, scores), np.vdot(part.residual**2, leverage)], np.float64)
 
 
 @kernel
-def _find_clusters(
-    positions: NDArray[np.floating], per_metre: float, numbers: NDArray[np.int64], clusters: NDArray[np.int64]
-) -> None:
-    """Clusters of positions, numbered in the order in which they are found.
+def _find_clusters(positions: NDArray[np.floating], per_metre: float, clusters: NDArray[np.int64]) -> int:
+    """Number of clusters of positions (m, 3) [m], by the inverse side of a cell [1/m].
 
-    Args:
-        positions: of the points (m, 3) [m].
-        per_metre: inverse side of a cell [1/m].
-        numbers: number of a cluster by the hash of its cell (clusters,); −1 if it has none yet.
-        clusters: number of every point's cluster (m,).
+    Each point's cluster is written into `clusters` (m,), numbered in the order in which they are found.
     """
-    count = 0
-    for number in numbers:
-        count = max(count, number + 1)
+    numbers, count = np.full(CLUSTERS, -1, np.int64), 0  # of clusters by the hash of their cells; −1 for none yet
     for m in range(clusters.size):
         x = np.int64(np.floor(positions[m, 0] * per_metre))
         y = np.int64(np.floor(positions[m, 1] * per_metre))
@@ -97,3 +88,4 @@ def _find_clusters(
             numbers[cell] = count
             count += 1
         clusters[m] = numbers[cell]
+    return count

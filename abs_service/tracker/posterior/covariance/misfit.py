@@ -16,7 +16,7 @@ variance is at least a running mean, over mesh and frames, until hardly any vert
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.mesh import Mesh, mean_around
+from abs_service.tracker.mesh import Mesh, mean_around, ring_means
 from abs_service.tracker.terms.sensor_fit import INLIER_DEVIATIONS
 
 #: Share of the vertices that miss the measurements above which the mesh may slide, and below which it fits again.
@@ -45,7 +45,7 @@ class Misfit:
         """
         excess, unnoticed, is_certain = self._common.excess_and_unnoticed(distance, deviation**2)
         self._unnoticed += RISE * (unnoticed - self._unnoticed)
-        across = self._common.mean @ excess + max(self._unnoticed, unnoticed if is_certain else 0.0)
+        across = ring_means(self._common.mean, excess) + max(self._unnoticed, unnoticed if is_certain else 0.0)
         missing = np.count_nonzero(excess) / len(excess)
         of_most = float(across.mean()) if missing > MAJORITY else 0.0
         kept = self._along if missing > HARDLY_ANY else 0.0
@@ -92,7 +92,7 @@ class CommonDistance:
         self, distance: NDArray[np.float64], variance: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Squares of the mean distances, and their means by noise alone, each (n,) [m²]."""
-        return (self.mean @ distance) ** 2, self._squared @ variance
+        return ring_means(self.mean, distance) ** 2, ring_means(self._squared, variance)
 
 
 def _beyond(squares: NDArray[np.float64], noise: NDArray[np.float64]) -> NDArray[np.float64]:

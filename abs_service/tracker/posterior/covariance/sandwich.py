@@ -9,13 +9,11 @@ that each residual loses to the fit (HC2 of MacKinnon and White, J. Econometrics
 exact, r² / (1 − h) is 1 on average and the sandwich equals Σ.
 """
 
-import functools
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.posterior.covariance.vertex_covariance import propagated
 from abs_service.tracker.posterior.linearized_cost import Sensed
 from abs_service.tracker.terms.linearization import add_squares
 
@@ -28,8 +26,8 @@ PerResidual = Sequence[NDArray[np.float64]]
 
 def leverages(inverse: NDArray[np.float64], sensed: Sensed) -> PerResidual:
     """Leverage h = diag(J Σ Jᵀ) of every residual, from Σ (dim, dim)."""
-    at_points = functools.cache(lambda samples: propagated(samples, inverse))  # sensors that measure the same points
-    return [source.leverage(inverse, at_points) for source in sensed]
+    inverse = np.ascontiguousarray(inverse)
+    return [source.leverage(inverse) for source in sensed]
 
 
 def gradient_covariance(

@@ -99,8 +99,9 @@ def _held(
     known: NDArray[np.float64], feigned: NDArray[np.float64], moved: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Slides (6, 6), columns, and what holds them (6,), by information of parts, known and feigned (parts, 6, 6)."""
-    slides = _slides(known.sum(axis=0), moved)
-    return slides, np.maximum(_along(slides, known - feigned), 0.0).sum(axis=0)
+    slides, held = _slides(known.sum(axis=0), moved), np.zeros(6)
+    add_held(slides, known, feigned, held)
+    return slides, held
 
 
 def _deviation(held: NDArray[np.float64]) -> float:
@@ -182,10 +183,13 @@ def add_information(
         for i in range(6):
             unseen[i] = sight[m, 0] * along[0, i] + sight[m, 1] * along[1, i] + sight[m, 2] * along[2, i]
         for i in range(6):
-            for j in range(6):
+            for j in range(i, 6):
                 known[i, j] += 0.5 * (seen[i] * shown[j] + shown[i] * seen[j])
                 moved = along[0, i] * along[0, j] + along[1, i] * along[1, j] + along[2, i] * along[2, j]
                 most[i, j] += square * (moved - unseen[i] * unseen[j])
+    for i in range(6):
+        for j in range(i):
+            known[i, j], most[i, j] = known[j, i], most[j, i]
 
 
 def _moved(vertices: NDArray[np.float64], center: NDArray[np.float64], size: float) -> NDArray[np.float64]:
@@ -205,9 +209,18 @@ def _slides(known: NDArray[np.float64], moved: NDArray[np.float64]) -> NDArray[n
     return np.asarray(scipy.linalg.lapack.dsygv(known, moved)[1], np.float64)
 
 
-def _along(slides: NDArray[np.float64], information: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Information (parts, 6, 6) along each of the slides (6, 6), columns: (parts, 6)."""
-    return np.asarray(np.sum(slides * (information @ slides), axis=1), np.float64)
+@kernel
+def add_held(
+    slides: NDArray[np.float64], known: NDArray[np.float64], feigned: NDArray[np.float64], held: NDArray[np.float64]
+) -> None:
+    """Adds up what is known and not feigned (parts, 6, 6), where positive, along each of the slides (6, 6), columns."""
+    for part in range(known.shape[0]):
+        for s in range(held.size):
+            along = 0.0
+            for i in range(held.size):
+                for j in range(held.size):
+                    along += slides[i, s] * (known[part, i, j] - feigned[part, i, j]) * slides[j, s]
+            held[s] += max(along, 0.0)
 
 
 def _motions(points: NDArray[np.floating], center: NDArray[np.float64], size: float) -> NDArray[np.float64]:

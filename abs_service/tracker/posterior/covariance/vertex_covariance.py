@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.models.base import DeformationModel, JacobianBlocks, SparseJacobian, Surface
+from abs_service.tracker.models.base import DeformationModel, JacobianBlocks, SparseJacobian
 from abs_service.tracker.posterior.covariance.appearance_misfit import AppearanceMisfit, Displacement, NoDisplacement
 from abs_service.tracker.posterior.covariance.first_frame_slide import FirstFrameSlide, NoSlide, Slide
 from abs_service.tracker.posterior.covariance.mesh_noise import MeshNoise
@@ -53,13 +53,12 @@ class VertexCovariance:
         if self._began and near.sensed:  # nothing has moved in the first frame, nothing is known in one without images
             self._mesh_noise.update(frame, optimum.theta)
         self._began = True
-        by_noise = propagated(near.sparse_jacobian, theta_covariance)
-        by_noise += along_normals(optimum.surface, self._mesh_noise.variance)
-        by_noise += self._parallax.covariance(optimum, frame)
+        along_surface = propagated(near.sparse_jacobian, theta_covariance) + self._parallax.covariance(optimum, frame)
+        covariance = along_surface + self._slide.beyond(optimum.surface, along_surface)
         across, along = self._misfit.update(*frame.misfit(optimum.surface))
         along = along + self._displacement.variance(optimum)
-        by_misfit = isotropic(along) + along_normals(optimum.surface, across - along)
-        return by_noise + self._slide.beyond(optimum.surface, by_noise) + by_misfit
+        add_errors(optimum.surface.normals[0], across + self._mesh_noise.variance, along, covariance)
+        return covariance
 
 
 def propagated(sparse_jacobian: SparseJacobian, covariance: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -97,12 +96,23 @@ def _propagate(jacobian: JacobianBlocks, covariance: NDArray[np.float64], result
         first = last
 
 
-def along_normals(surface: Surface, variance: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Covariance (n, 3, 3) [m²] of errors along the normals of a population of one with a variance (n,) [m²]."""
-    normals = surface.normals[0].T.astype(np.float64)
-    return variance[:, None, None] * normals[:, :, None] * normals[:, None, :]
+@kernel
+def add_errors(
+    normals: NDArray[np.float32],
+    across: NDArray[np.float64],
+    along: NDArray[np.float64],
+    covariance: NDArray[np.float64],
+) -> None:
+    """Adds those of errors with variances along the normals (3, n), and in all directions along the surface.
 
-
-def isotropic(variance: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Covariance (n, 3, 3) [m²] of errors with a variance (n,) [m²] in every direction."""
-    return variance[:, None, None] * np.eye(3)
+    Args:
+        normals: of the vertices.
+        across, along: variances (n,) [m²].
+        covariance: of the vertices (n, 3, 3) [m²].
+    """
+    for v in range(across.size):
+        for i in range(3):
+            share = (across[v] - along[v]) * normals[i, v]
+            covariance[v, i, i] += along[v]
+            for j in range(3):
+                covariance[v, i, j] += share * normals[j, v]

@@ -64,14 +64,15 @@ class DepthTerm:
         self._begun = True
         scale = self._fluctuation.scale
         distance = self._texels.observe(image, window, scale, prediction.resampling)
-        expected = np.ascontiguousarray(self._view.render(predicted)[window])
+        view, rendered = self._view.observe_rendered(predicted)
+        expected = np.ascontiguousarray(rendered[window])
         seen = self._classifier.classify(distance, expected, window, self._texels.shape)
         outline = self._outline.observe(distance, seen, expected, predicted, window)
         free_m = where(~outline.doubtful, seen.free_m)
         masked = seen.foreground | seen.hole | outline.doubtful
         return ObservedDepth(
             sensor=self.sensor,
-            view=self._view.observe(predicted),
+            view=view,
             bounds=self._bounds,
             texels=self._texels,
             missing=self._explain(Unusable(masked, free_m, seen.object), predicted),

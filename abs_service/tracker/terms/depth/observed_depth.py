@@ -116,7 +116,7 @@ class ObservedDepth:
         measured, pixel = cost < np.inf, np.where(self.classes.beyond.ravel()[seen.pixel[0]], 0, seen.pixel[0])
         classes = self.classes.at(pixel)
         free = (classes.free_m > 0) & (pixel > 0)
-        masks = VertexMasks.of(
+        masks = VertexMasks(
             pixel, facing(seen, surface, self.view.camera.center), classes.lost, classes.covered, classes.doubtful
         )
         mean = -float(self._measured_cost(seen)[0]) / residual.size

@@ -194,7 +194,7 @@ class ObservedColor:
         pixel, known = seen.pixel[0], np.isfinite(seen.attributes[0]).all(axis=0)
         hidden = np.isinf(self.pixels.at(seen.pixel)[pixel, 0])
         front = facing(seen, surface, self.view.camera.center)
-        masks = VertexMasks.of(pixel, front, np.zeros_like(hidden), hidden, ~known)
+        masks = VertexMasks(pixel, front, np.zeros_like(hidden), hidden, ~known)
         mean = -float(self._cost_of(seen)[0]) / len(square)
         return summarize(self.sensor, masks, square < np.inf, np.sqrt(square / 3), mean, channels=3)
 

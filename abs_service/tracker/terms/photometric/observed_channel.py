@@ -121,7 +121,7 @@ class ObservedChannel:
         residual = self._residuals(seen, surface)[0]
         pixel, known = seen.pixel[0], np.isfinite(seen.attributes[0]).all(axis=0)
         hidden = np.isinf(self.texture[pixel, VALUE])
-        masks = VertexMasks.of(
+        masks = VertexMasks(
             pixel, facing(seen, surface, self.view.camera.center), np.zeros_like(hidden), hidden, ~known
         )
         mean = -float(self.cost(surface)[0]) / len(residual)

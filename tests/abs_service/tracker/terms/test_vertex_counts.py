@@ -5,6 +5,8 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from abs_service.pairing.images import ColorImage
 from abs_service.tracker.mesh import Mesh
@@ -14,7 +16,7 @@ from abs_service.tracker.terms.depth.continuation import CoarseContinuation
 from abs_service.tracker.terms.depth.depth import DepthTerm
 from abs_service.tracker.terms.photometric.color import ColorTerm
 from abs_service.tracker.terms.sensor_fit import Remainder, SensorFit
-from abs_service.tracker.terms.vertex_counts import VertexCounts
+from abs_service.tracker.terms.vertex_counts import Tally, VertexCounts, VertexMasks
 from calib.camera import Camera
 from calib.noise.constant import Constant
 from calib.noise.images.color import GaussianColor
@@ -115,6 +117,29 @@ def test_a_colour_camera_has_the_same_classes():
     found = term.fit(moved()).counts
     unknown = len(MESH.vertices) - 60
     assert found == VertexCounts(facing=len(MESH.vertices), agreeing=unknown, disagreeing=40)
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(0, 50))
+def test_each_sample_is_counted_once(seed: int, n: int):
+    """An occluder comes before a missing return, and both before what is not judged."""
+    generator = np.random.default_rng(seed)
+    pixel = generator.integers(-1, 3, n).astype(np.int32)
+    facing, missing, covered, unjudged, measured, agreeing = generator.random((6, n)) < 0.5
+    inside, hidden = pixel > 0, covered | missing
+    visible = inside & ~(hidden | unjudged)
+    masks = (
+        visible,
+        inside & missing & ~covered,
+        inside & covered,
+        (pixel < 0) & facing,
+        (pixel == 0) & facing,
+        inside & unjudged & ~hidden,
+        visible & measured,
+        visible & agreeing,
+    )
+    found = VertexMasks(pixel, facing, missing, covered, unjudged).tally(measured, agreeing)
+    assert found == Tally(*(int(np.count_nonzero(mask)) for mask in masks))
+    assert found.of(n).facing + found.of(n).turned_away == n
 
 
 @pytest.mark.parametrize("name", CLASSES)

@@ -1,7 +1,7 @@
 """One frame of an outline: the free edges of a mesh compared with the end of the object in one depth image."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.perspective import project_with_jacobian
-from abs_service.tracker.terms.depth.outline.rim import Edges, OutlineImage, by_side, chain
+from abs_service.tracker.terms.depth.outline.rim import Edges, LocatedEdges, OutlineImage, by_side, chain
 from abs_service.tracker.terms.depth.outline.rim_classes import LARGEST_GAP_STEPS
 from abs_service.tracker.terms.depth.outline.rim_cost import FARTHEST
 from abs_service.tracker.terms.depth.outline.rim_match import shift_to_outline
@@ -42,6 +42,7 @@ class ObservedRimOutline:
         doubtful: pixels of the window (rows, columns) near the outline that are held against no vertex.
         kernel: `rim_cost` of the camera's lens.
         classes: of every vertex, as in `RimFit`.
+        located: the free edges of those surfaces that were asked for, the predicted one among them.
     """
 
     image: OutlineImage
@@ -57,6 +58,7 @@ class ObservedRimOutline:
     doubtful: NDArray[np.bool_]
     kernel: Callable[..., None]
     classes: bytes = b""
+    located: dict[Surface, LocatedEdges] = field(default_factory=dict)
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
         """Cost (population,) of every deformed mesh."""
@@ -84,51 +86,59 @@ class ObservedRimOutline:
 
     def match(self, surface: Surface, sparse_jacobian: SparseJacobian) -> PointLinearization:
         """Residuals of the places of outermost vertices, if a slide and a turn lay the edges on the outline."""
-        camera, (_, places, _) = self.image.camera, self.image.locate(self.edges, surface)
-        shift = shift_to_outline(self.image.look, places, self.edges.directions(camera, surface, places))
+        edges = self._locate(surface)
+        shift = shift_to_outline(self.image.look, edges.places, edges.directions)
         if not shift.any():
             return PointLinearization.empty(sparse_jacobian)
-        return found_at(camera, surface.vertices[0].T, self.edges.outer, shift, sparse_jacobian)
+        return found_at(self.image.camera, surface.vertices[0].T, self.edges.outer, shift, sparse_jacobian)
 
     def fit(self, surface: Surface) -> RimFit:
         """Agreement of the edges of a population of one with the outline."""
-        points, places, away = self.image.locate(self.edges, surface)
-        known, outer, inner = ~np.isnan(away), self.covered.ends(surface), self.covered.starts(surface)
-        beyond = self.image.inside_at(outer + LARGEST_GAP_STEPS * (outer - inner))
-        outside = away < -self.off_px
-        displaced = self._displacement(surface, places, away, self._pixel_m(points)) if known.any() else 0.0
+        edges = self._locate(surface)
+        known = ~np.isnan(edges.away)
+        visible = int(np.count_nonzero(known))
+        outside = edges.away < -self.off_px
+        uncovered, hanging_m = self._of_covered(surface) if len(self.covered.outer) else (0, 0.0)
         return RimFit(
-            visible=int(np.count_nonzero(known)),
+            visible=visible,
             outside=int(np.count_nonzero(outside)),
-            lost=int(np.count_nonzero(outside & (self.lost_at(places) > 0))),
-            inside=int(np.count_nonzero(away > self.off_px)),
-            off_m=max(displaced, self._hanging(outer, inner)),
-            occluded=self.hidden + int(np.count_nonzero(~known)),
-            covered=len(outer),
-            uncovered=int(np.count_nonzero(beyond > 0)),
+            lost=int(np.count_nonzero(outside & (self.lost_at(edges.places) > 0))),
+            inside=int(np.count_nonzero(edges.away > self.off_px)),
+            off_m=max(self._displacement(edges, known) if visible else 0.0, hanging_m),
+            occluded=self.hidden + len(known) - visible,
+            covered=len(self.covered.outer),
+            uncovered=uncovered,
             classes=self.classes,
         )
 
-    def _displacement(
-        self, surface: Surface, places: NDArray[np.float64], away: NDArray[np.float64], pixel_m: NDArray[np.float64]
-    ) -> float:
-        """The larger of `displacement` and `motion` [m], of free edges at places (k, 2) and distances (k,) [px]."""
-        known, bound = ~np.isnan(away), FARTHEST * self.deviation
-        directions = self.edges.directions(self.image.camera, surface, places)[known]
+    def _locate(self, surface: Surface) -> LocatedEdges:
+        """The free edges of a population of one."""
+        if surface not in self.located:
+            self.located[surface] = self.image.locate(self.edges, surface)
+        return self.located[surface]
+
+    def _displacement(self, edges: LocatedEdges, known: NDArray[np.bool_]) -> float:
+        """The larger of `displacement` and `motion` [m] of free edges, of which some (k,) are known."""
+        away, bound, directions = edges.away[known], FARTHEST * self.deviation, edges.directions[known]
         # Outside, distances are known up to there; how much farther, nothing tells.
         off_px = np.where(away < -self.off_px, -np.inf, np.where(away > self.off_px, away, 0.0))
-        moved = motion(np.clip(away[known], -bound, bound), directions, places[known])
+        moved = motion(np.clip(away, -bound, bound), directions, edges.places[known])
+        pixel_m = self._pixel_m(edges.points)
         typical_m = float(np.mean(pixel_m))
-        off_m = displacement(off_px[known] * pixel_m[known], directions, self.off_px * typical_m)
+        off_m = displacement(off_px * pixel_m[known], directions, self.off_px * typical_m)
         return max(off_m, moved * typical_m)
+
+    def _of_covered(self, surface: Surface) -> tuple[int, float]:
+        """Number of covered edges of a population of one beyond which the object goes on, and `_hanging`."""
+        outer, inner = self.covered.ends(surface), self.covered.starts(surface)
+        beyond = self.image.inside_at(outer + LARGEST_GAP_STEPS * (outer - inner))
+        return int(np.count_nonzero(beyond > 0)), self._hanging(outer, inner)
 
     def _hanging(self, outer: NDArray[np.float64], inner: NDArray[np.float64]) -> float:
         """∞ if covered edges, with vertices (m, 3) [m], hang over the outline on most of a side of the image, else 0.
 
         Then the mesh has slid, and nothing tells how far: how long the object is beyond them is not known.
         """
-        if not len(outer):
-            return 0.0
         places, before = (project_with_jacobian(self.image.camera, points)[0] for points in (outer, inner))
         away, sides = self.image.inside(places), by_side(places - before)
         over, known = (np.count_nonzero(sides & part, axis=1) for part in (away < -self.off_px, ~np.isnan(away)))

@@ -7,17 +7,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.pairing.images import Window
 from abs_service.tracker.mesh import Mesh, edges_of, unit
 from abs_service.tracker.models.base import JacobianBlocks, Surface
 from abs_service.tracker.synthesis.perspective import project_with_jacobian
 from abs_service.tracker.synthesis.projection import Projection
-from abs_service.tracker.synthesis.window import corner
 from calib.camera import Camera
 from calib.jit import kernel
-
-#: A vertex of the rim is hidden if the mesh's own surface lies so far in front of it [m].
-HIDDEN_BEHIND_M = 0.01
 
 #: Distances (k,) of places (k, 2) in an image inside an outline [px], huge where unknown, and their gradients (k, 2).
 Look = Callable[[NDArray[np.float64]], tuple[NDArray[np.float64], NDArray[np.float64]]]
@@ -87,6 +82,22 @@ class Edges(NamedTuple):
         return unit(places - project_with_jacobian(camera, self.starts(surface))[0])
 
 
+class LocatedEdges(NamedTuple):
+    """Edges of a population of one in the image.
+
+    Attributes:
+        points: where the object ends (k, 3) [m].
+        places: the same in the image (k, 2) [px].
+        away: their distances inside the outline (k,) [px], see `OutlineImage.inside`.
+        directions: unit ones out of the mesh (k, 2).
+    """
+
+    points: NDArray[np.float64]
+    places: NDArray[np.float64]
+    away: NDArray[np.float64]
+    directions: NDArray[np.float64]
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class OutlineImage:
     """Distances from the outline of the object in one depth image.
@@ -111,13 +122,11 @@ class OutlineImage:
         """`inside` of points (k, 3) [m]."""
         return self.inside(project_with_jacobian(self.camera, points)[0])
 
-    def locate(
-        self, edges: Edges, surface: Surface
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Edges of a population of one (k, 3) [m], their places in the image (k, 2) [px], and `inside` there (k,)."""
+    def locate(self, edges: Edges, surface: Surface) -> LocatedEdges:
+        """Edges of a population of one in the image."""
         points = edges.points(surface)[0].T.astype(np.float64)
         places = project_with_jacobian(self.camera, points)[0]
-        return points, places, self.inside(places)
+        return LocatedEdges(points, places, self.inside(places), edges.directions(self.camera, surface, places))
 
     def look(self, places: NDArray[np.floating]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Distances (k,) of places (k, 2) inside the outline [px], interpolated, and their image gradients (k, 2)."""
@@ -190,16 +199,6 @@ def _read(
         column, row = int(np.floor(u - corner[0] + 0.5)), int(np.floor(v - corner[1] + 0.5))
         inside = row >= 0 and row < image.shape[0] and column >= 0 and column < image.shape[1]
         values[k] = image[row, column] if inside else -np.inf
-
-
-def is_behind(
-    camera: Camera, points: NDArray[np.float64], surface: NDArray[np.float32], window: Window
-) -> NDArray[np.bool_]:
-    """True for points (k, 3) [m] that a surface hides, whose distances in a window are known (rows, columns) [m]."""
-    first = np.array(corner(window)[::-1], np.float32)
-    in_front = read(surface, first, project_with_jacobian(camera, points)[0], (camera.width, camera.height))
-    behind = in_front < np.linalg.norm(points - camera.center, axis=1) - HIDDEN_BEHIND_M
-    return behind & (in_front > -np.inf)
 
 
 @kernel

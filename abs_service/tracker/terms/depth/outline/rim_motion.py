@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.terms.depth.outline.rim import by_side
 from abs_service.tracker.terms.median import median
+from calib.jit import kernel
 
 #: Edges that face one side of the image are judged together if there are so many of them.
 MIN_OF_A_SIDE = 8
@@ -22,6 +23,9 @@ MIN_PX = 2.0
 #: outline is known to half a pixel, which would be a motion of `MIN_PX`. A slide along a straight side, and a turn of
 #: an arc about its centre, show nothing of themselves; a turn of a hexagon shows 0.3.
 MIN_SHOWN = 0.25
+
+#: In squares, what is less is rounding.
+_SHOWN = 1e-12
 
 #: Turns directions in the image by an eighth, from its corners to its sides.
 _EIGHTH = np.sqrt(0.5) * np.array([[1.0, -1.0], [1.0, 1.0]])
@@ -68,16 +72,12 @@ def motion(away: NDArray[np.float64], directions: NDArray[np.float64], places: N
     """
     if len(away) < MIN_OF_A_SIDE or not away.any():
         return 0.0
-    arms = places - places.mean(axis=0)
-    reach = max(float(np.sqrt(np.mean(arms**2) * 2)), np.finfo(float).tiny)
-    rows = shown_by(directions, arms / reach)
-    shown_as, sizes, motions = np.linalg.svd(rows, full_matrices=False)
-    parts = (away @ shown_as)[sizes >= MIN_SHOWN * np.sqrt(len(away))]
-    along, across, turn = (parts / sizes[: len(parts)]) @ motions[: len(parts)]
-    x, y = arms.T / reach
+    arms, (along, across, turn), explained = _fitted(away, directions, places, MIN_SHOWN**2 * len(away))
+    if explained <= MIN_EXPLAINED * (away @ away):
+        return 0.0
+    x, y = arms.T
     length = median(np.hypot(along - turn * y, across + turn * x))
-    explained = parts @ parts > MIN_EXPLAINED * (away @ away)
-    return length if explained and length > MIN_PX else 0.0
+    return length if length > MIN_PX else 0.0
 
 
 def without_motion(
@@ -88,8 +88,51 @@ def without_motion(
     Args:
         away, directions, places: as in `motion`; at least `MIN_OF_A_SIDE`.
     """
-    rows = shown_by(directions, places - places.mean(axis=0))
-    return away - rows @ np.linalg.lstsq(rows, away)[0]
+    arms, (along, across, turn), _ = _fitted(away, directions, places, _SHOWN * len(away))
+    right, down = directions.T
+    return away - right * (along - turn * arms[:, 1]) - down * (across + turn * arms[:, 0])
+
+
+def _fitted(
+    away: NDArray[np.float64], directions: NDArray[np.float64], places: NDArray[np.float64], least: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    """The motion (3,) of `shown_by` that explains the distances of edges (k,) best, by least squares.
+
+    Of the motions that displace the edges across the outline by at least so much, the sum of their squares. With it go
+    the arms (k, 2) of the edges about their centre, 1 on average, and the sum of the squares that it explains.
+    """
+    equations, arms = np.zeros((4, 4)), np.empty_like(places)
+    add_equations(away, directions, places, equations, arms)
+    squares, motions = np.linalg.eigh(equations[:3, :3])
+    shown = squares >= least
+    squares, motions = squares[shown], motions[:, shown]
+    parts = equations[3, :3] @ motions
+    return arms, motions @ (parts / squares), float(parts @ (parts / squares))
+
+
+@kernel
+def add_equations(
+    away: NDArray[np.float64],
+    directions: NDArray[np.float64],
+    places: NDArray[np.float64],
+    equations: NDArray[np.float64],
+    arms: NDArray[np.float64],
+) -> None:
+    """Adds up the squares (4, 4) of the rows of `shown_by` and the distances, side by side; writes the arms (k, 2)."""
+    count, x, y, square, row = places.shape[0], 0.0, 0.0, 0.0, np.empty(4)
+    for k in range(count):
+        x, y = x + places[k, 0] / count, y + places[k, 1] / count
+    for k in range(count):
+        arms[k, 0], arms[k, 1] = places[k, 0] - x, places[k, 1] - y
+        square += (arms[k, 0] * arms[k, 0] + arms[k, 1] * arms[k, 1]) / count
+    scale = 1 / np.sqrt(max(square, 1e-300))
+    for k in range(count):
+        arms[k, 0], arms[k, 1] = arms[k, 0] * scale, arms[k, 1] * scale
+        right, down = directions[k, 0], directions[k, 1]
+        row[0], row[1], row[2], row[3] = right, down, down * arms[k, 0] - right * arms[k, 1], away[k]
+        for i in range(4):
+            for j in range(4):
+                equations[i, j] += row[i] * row[j]
 
 
 def shown_by(directions: NDArray[np.float64], arms: NDArray[np.float64]) -> NDArray[np.float64]:

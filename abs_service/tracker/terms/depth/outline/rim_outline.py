@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from abs_service.pairing.images import Window
 from abs_service.tracker.models.base import Surface
+from abs_service.tracker.synthesis.perspective import project_with_jacobian
 from abs_service.tracker.synthesis.projection import Projection
 from abs_service.tracker.synthesis.window import WHOLE, corner
 from abs_service.tracker.terms.depth.classification.fixed_edges import MARGIN
@@ -20,7 +21,7 @@ from abs_service.tracker.terms.depth.classification.outline_distance import inwa
 from abs_service.tracker.terms.depth.classification.visibility import Visibility
 from abs_service.tracker.terms.depth.outline.observed_outline import ObservedRimOutline
 from abs_service.tracker.terms.depth.outline.raggedness import Raggedness
-from abs_service.tracker.terms.depth.outline.rim import Edges, OutlineImage, Rim, is_behind, read
+from abs_service.tracker.terms.depth.outline.rim import Edges, OutlineImage, Rim, read
 from abs_service.tracker.terms.depth.outline.rim_classes import RimClass, classify_rim, turns_away
 from abs_service.tracker.terms.depth.outline.rim_cost import FARTHEST, rim_cost
 from abs_service.tracker.terms.depth.outline.rim_gap import exact_gap
@@ -33,6 +34,9 @@ UNJUDGED_DEVIATIONS = 3.0
 
 #: A free edge is off the outline if it is farther from it than so many pixels, and than the bound of its cost.
 OFF_PX = 3.0
+
+#: A vertex of the rim is hidden if the mesh's own surface lies so far in front of it [m].
+HIDDEN_BEHIND_M = 0.01
 
 #: Where the field of view turns out to end so many pixels beside a free edge, it cuts the object there [px].
 BESIDE_PX = 2.0
@@ -86,23 +90,20 @@ class RimOutline:
         if not self._images:
             self._classify(image, predicted, distance)
         is_cut = self._find_cut(predicted, seen.beyond, window)
-        free = np.flatnonzero((self.classes == RimClass.FREE) & ~is_cut)
-        ends = self._edges.some(free).ends(predicted)
-        edges = self._edges.some(free[~is_behind(self._camera, ends, expected, window)])
-        points, places, of_edges = image.locate(edges, predicted)
-        self._is_round = self._is_round if self._images else is_round(self._camera, points, away, first)
+        edges, hidden = self._in_sight(predicted, is_cut, expected, window)
+        located = image.locate(edges, predicted)
+        self._is_round = self._is_round if self._images else is_round(self._camera, located.points, away, first)
         self._images += 1
-        directions = edges.directions(self._camera, predicted, places)
-        self._raggedness.update(of_edges, directions, places)  # counts from the next frame on
+        self._raggedness.update(located.away, located.directions, located.places)  # counts from the next frame on
         doubtful = np.zeros(distance.shape, np.bool_)
         doubtful[part] = (seen.free_m[part] > 0) & (away > -UNJUDGED_DEVIATIONS * deviation)
         return ObservedRimOutline(
             image=image,
             edges=edges,
-            is_sure=self._are_ends(edges, predicted, places, distance, seen.unsettled, window),
-            hidden=len(free) - len(edges.outer),
+            is_sure=self._are_ends(edges, predicted, located.places, distance, seen.unsettled, window),
+            hidden=hidden,
             covered=self._covered(is_cut),
-            along=rim_directions(places, directions),
+            along=rim_directions(located.places, located.directions),
             is_round=self._is_round,
             deviation=deviation,
             off_px=off_px,
@@ -110,6 +111,7 @@ class RimOutline:
             doubtful=doubtful,
             kernel=self._kernel,
             classes=self._of_vertices(predicted.vertices.shape[2], is_cut),
+            located={predicted: located},
         )
 
     def _covered(self, is_cut: NDArray[np.bool_]) -> Edges:
@@ -120,6 +122,14 @@ class RimOutline:
     def _at(self, mask: NDArray[np.bool_], window: Window) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
         """Reads a mask (rows, columns) of a window at places (k, 2) in the image: 1 in it."""
         return partial(read, mask.astype(np.float32), np.array(corner(window)[::-1], np.float32), last=self._size)
+
+    def _in_sight(
+        self, predicted: Surface, is_cut: NDArray[np.bool_], expected: NDArray[np.float32], window: Window
+    ) -> tuple[Edges, int]:
+        """Free edges that the predicted mesh does not hide, and the number of those that it hides; see `observe`."""
+        free = self._edges.some(np.flatnonzero((self.classes == RimClass.FREE) & ~is_cut))
+        hidden = is_behind(self._camera, free.ends(predicted), expected, window)
+        return free.some(np.flatnonzero(~hidden)), int(np.count_nonzero(hidden))
 
     def _of_vertices(self, count: int, is_cut: NDArray[np.bool_]) -> bytes:
         """Classes of all `count` vertices, as in `RimFit`; edges (k,) that are cut now end at a border."""
@@ -181,3 +191,13 @@ class RimOutline:
         towards = [read(distance, first, places + BESIDE_PX * step, self._size) for step in _TO_SIDES]
         is_open = read(unsettled.astype(np.float32), first, places, self._size) > 0
         return are_ends & ~(is_open & np.any(near & ~np.isfinite(towards), axis=0))
+
+
+def is_behind(
+    camera: Camera, points: NDArray[np.float64], surface: NDArray[np.float32], window: Window
+) -> NDArray[np.bool_]:
+    """True for points (k, 3) [m] that a surface hides, whose distances in a window are known (rows, columns) [m]."""
+    first = np.array(corner(window)[::-1], np.float32)
+    in_front = read(surface, first, project_with_jacobian(camera, points)[0], (camera.width, camera.height))
+    behind = in_front < np.linalg.norm(points - camera.center, axis=1) - HIDDEN_BEHIND_M
+    return behind & (in_front > -np.inf)

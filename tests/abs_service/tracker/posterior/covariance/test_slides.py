@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 import abs_service as a
 from abs_service.tracker.detection.strip.strip_detection import Strip
 from abs_service.tracker.models.gravity import Gravity
-from abs_service.tracker.posterior.covariance.slides import SlideObservability, add_information
+from abs_service.tracker.posterior.covariance.slides import SlideObservability, add_held, add_information
 from abs_service.tracker.posterior.curvature import Quadratic
 from abs_service.tracker.posterior.linearized_cost import LinearizedCost
 from abs_service.tracker.posterior.optimum import Optimum
@@ -167,3 +167,14 @@ def test_information_on_rigid_motions_matches_numpy(seed: int, count: int):
     weighted = motions * np.linalg.norm(rows, axis=1)[:, None, None]
     in_sight = weighted - np.einsum("mi,mj,mjk->mik", sight, sight, weighted)
     np.testing.assert_allclose(most, np.einsum("mik,mil->kl", in_sight, in_sight), atol=1e-9)
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(0, 4))
+def test_what_holds_each_slide_matches_numpy(seed: int, count: int):
+    generator = np.random.default_rng(seed)
+    slides, roots = generator.standard_normal((6, 6)), generator.standard_normal((2, count, 6, 6))
+    known, feigned = roots @ roots.transpose(0, 1, 3, 2)
+    held = np.zeros(6)
+    add_held(slides, known, feigned, held)
+    along = np.einsum("is,pij,js->ps", slides, known - feigned, slides)
+    np.testing.assert_allclose(held, np.maximum(along, 0).sum(axis=0), rtol=1e-9, atol=1e-9)

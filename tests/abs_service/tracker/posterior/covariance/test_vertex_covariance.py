@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from abs_service.tracker.models.base import SparseJacobian
 from abs_service.tracker.objectives import likelihood
-from abs_service.tracker.posterior.covariance.vertex_covariance import propagated
+from abs_service.tracker.posterior.covariance.vertex_covariance import add_errors, propagated
 from abs_service.tracker.posterior.curvature import gauss_newton, posterior_covariance
 from abs_service.tracker.terms.linearization import Linearization
 from abs_service.tracking.offsets.vertex_offsets import FixedOffsets, LearntOffsets
@@ -38,6 +38,18 @@ def test_groups_of_vertices_in_any_order_have_the_covariance_of_the_dense_jacobi
     root = generator.standard_normal((7, 7))
     expected = np.einsum("nid,de,nje->nij", sparse_jacobian.dense, root @ root.T, sparse_jacobian.dense)
     np.testing.assert_allclose(propagated(sparse_jacobian, root @ root.T), expected, atol=1e-12)
+
+
+@given(SEEDS)
+def test_errors_across_and_along_the_surface_are_added(seed):
+    generator = np.random.default_rng(seed)
+    normals = generator.standard_normal((3, 9)).astype(np.float32)
+    normals /= np.linalg.norm(normals, axis=0)
+    across, along, known = generator.random(9), generator.random(9), generator.standard_normal((9, 3, 3))
+    n, found = normals.T.astype(np.float64), known.copy()
+    add_errors(normals, across, along, found)
+    expected = along[:, None, None] * np.eye(3) + (across - along)[:, None, None] * n[:, :, None] * n[:, None]
+    np.testing.assert_allclose(found, known + expected, atol=1e-12)
 
 
 def test_estimates_say_how_well_each_vertex_is_known():

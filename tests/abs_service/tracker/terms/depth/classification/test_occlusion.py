@@ -1,6 +1,8 @@
 """Vertices behind the mesh's own surface, or that face away, are occluded in every candidate of a frame."""
 
 import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.synthesis.rasterization.raster import Raster
@@ -59,6 +61,19 @@ def test_vertices_behind_the_mesh_s_own_surface_and_those_that_face_away_are_no_
     assert (pixel[covered] == -1).all()
     assert (pixel[near & (x < 0.03)] == -1).all()  # they face away
     assert (pixel[x < -0.08] > 0).all()
+
+
+@given(st.integers(0, 2**32 - 1))
+@settings(max_examples=10)
+def test_a_view_that_is_rendered_as_well_hides_the_same_vertices(seed):
+    mesh = folded()
+    noise = np.random.default_rng(seed).normal(0, 2e-3, mesh.vertices.shape)
+    surface = as_surface((mesh.vertices + noise, mesh.normals))
+    view = SparseView(CAMERA, mesh.faces, mesh.colors)
+    alone, image = view.observe(surface).synthesize(surface), view.render(surface).copy()
+    both, rendered = view.observe_rendered(surface)
+    np.testing.assert_array_equal(both.synthesize(surface).pixel, alone.pixel)
+    np.testing.assert_array_equal(rendered, image)
 
 
 def test_what_is_hidden_stays_hidden_for_every_candidate_of_the_frame():

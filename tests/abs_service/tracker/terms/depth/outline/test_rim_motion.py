@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from abs_service.tracker.terms.depth.outline.rim_motion import displacement, motion
+from abs_service.tracker.terms.depth.outline.rim_motion import displacement, motion, shown_by, without_motion
 
 ALONG = np.linspace(-30, 30, 15)
 #: Least distance of an edge outside the outline if nothing tells how far [m].
@@ -95,3 +97,26 @@ def test_far_outside_counts_as_least_as_far_as_is_known():
     sides = np.repeat([[1.0, 0.0], [-1.0, 0.0]], 10, axis=0)
     assert displacement(np.repeat([0.02, -np.inf], 10), sides, BEYOND_M) == pytest.approx(0.02)
     assert displacement(np.full(10, -np.inf), sides[:10], BEYOND_M) == pytest.approx(BEYOND_M)
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(8, 40), st.booleans())
+def test_the_motion_is_that_of_least_squares(seed: int, count: int, is_strip: bool):
+    """Edges of a strip show no motion along it."""
+    generator = np.random.default_rng(seed)
+    places, angles = generator.uniform(0, 200, (count, 2)), generator.uniform(0, 7, count)
+    directions = np.stack([np.cos(angles), np.sin(angles)], axis=1) * ((0, 1) if is_strip else (1, 1))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    arms = places - places.mean(axis=0)
+    rows = shown_by(directions, arms)
+    away = rows @ (*generator.normal(0, 4, 2), generator.normal(0, 0.05)) + generator.normal(0, 0.3, count)
+    left = away - rows @ np.linalg.lstsq(rows, away)[0]
+    np.testing.assert_allclose(without_motion(away, directions, places), left, atol=1e-9)
+    reach = np.sqrt(np.mean(np.sum(arms**2, axis=1)))
+    shown_as, sizes, motions = np.linalg.svd(shown_by(directions, arms / reach), full_matrices=False)
+    shown = sizes >= 0.25 * np.sqrt(count)
+    parts = (away @ shown_as)[shown]
+    along, across, turn = (parts / sizes[shown]) @ motions[shown]
+    x, y = arms.T / reach
+    length = np.median(np.hypot(along - turn * y, across + turn * x))
+    counts = parts @ parts > 0.7 * (away @ away) and length > 2
+    assert motion(away, directions, places) == pytest.approx(length if counts else 0.0)
