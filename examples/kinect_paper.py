@@ -12,10 +12,13 @@ import numpy as np
 
 import abs_service as a
 
-folder = Path(sys.argv[1])
+folder = Path(sys.argv[1] if len(sys.argv) > 1 else ".")
+paths = sorted(folder.glob("depth_*.png"))
+if not paths:
+    raise SystemExit(f"{__doc__}\n{folder.resolve()} holds no depth_*.png.")
 camera = a.Camera(640, 480, fx=528.0144, fy=528.0144, cx=320, cy=240)
 tracker = a.Tracker(depth=camera, color=camera, model=a.Nurbs())
-for path in sorted(folder.glob("depth_*.png")):
+for path in paths:
     number = path.stem.removeprefix("depth_")
     depth_m = np.asarray(cv2.imread(str(path), cv2.IMREAD_UNCHANGED)) * 0.0001
     image = cv2.imread(str(folder / f"color_{number}.jpg"), cv2.IMREAD_COLOR_RGB)

@@ -12,11 +12,14 @@ import numpy as np
 
 import abs_service as a
 
-folder = Path(sys.argv[1])
+folder = Path(sys.argv[1] if len(sys.argv) > 1 else ".")
+paths = sorted(folder.glob("depth_mm_*.png"))
+if not paths:
+    raise SystemExit(f"{__doc__}\n{folder.resolve()} holds no depth_mm_*.png.")
 camera = a.Camera(320, 240, fx=275, fy=275, cx=160, cy=120)
 noise = a.noise.StructuredLight(floor=0.001)  # 1 mm: pores are finer than the mesh
 tracker = a.Tracker(depth=camera, color=camera, model=a.Nurbs(6, 6), noise=noise, priors={"stretch": 0.1})
-for path in sorted(folder.glob("depth_mm_*.png")):
+for path in paths:
     number = path.stem.removeprefix("depth_mm_")
     depth_m = np.asarray(cv2.imread(str(path), cv2.IMREAD_UNCHANGED)) * 0.001
     image = cv2.imread(str(folder / f"color_{number}.png"), cv2.IMREAD_COLOR_RGB)

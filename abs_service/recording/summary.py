@@ -164,8 +164,13 @@ class Summary:
     def _add_health(self, topic: str, message: Message) -> None:
         health = parse_message(Health, message.data)
         for name, number in health.counters.items():
-            if number and name.partition(".")[0] in LOSSES:
+            if number and (name.partition(".")[0] in LOSSES or _of_a_device(name)):
                 self.losses[f"{health.component}: {name}"] = number
+
+
+def _of_a_device(counter: str) -> bool:
+    """True for what a device counts beside its frames: why exposures are missing that it never delivered."""
+    return counter.startswith("device.") and not counter.endswith(".frames")
 
 
 def summarize(path: Path, advance: Callable[[int, int], None]) -> Summary:

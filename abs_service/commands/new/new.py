@@ -181,15 +181,22 @@ def _answered_by_options(arguments: argparse.Namespace, name: str) -> Answers:
 
 
 def _ask(option: str, question: str, choices: Mapping[str, str]) -> str:
-    """Asks until the answer is a number or a name among the choices; any line if there are none."""
+    """Asks until the answer is a number or a name among the choices; any line if there are none.
+
+    Raises:
+        OptionError: the input has ended (Ctrl-D).
+    """
     print(question)
     width = max(map(len, choices), default=0)
     for number, (name, text) in enumerate(choices.items(), 1):
         print(f"  {number}  {name:<{width}}  {text}")
     while True:
-        answer = input("> ").strip()
+        try:
+            answer = input("> ").strip()
+        except EOFError:
+            raise OptionError(f"the input ended before --{option} was answered; nothing is written") from None
         if not choices or answer in choices:
             return answer
         if answer.isdecimal() and 1 <= int(answer) <= len(choices):
             return list(choices)[int(answer) - 1]
-        print(f"one of 1 to {len(choices)}, please")
+        print(f"a number from 1 to {len(choices)} or one of {', '.join(choices)}, please")

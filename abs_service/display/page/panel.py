@@ -16,6 +16,9 @@ from abs_service.display.page.readouts.words import StatusLine
 from abs_service.display.page.scene.fields import FIELDS, PALETTES
 from abs_service.display.page.style import GONE, STYLE
 
+#: Room around a plot, from its top clockwise [px]: half of a number at the end of an axis lies in it.
+PADDING = 10, 12, 0, 8
+
 _LINES = ("#3b82f6", "#f59e0b", "#10b981", "#ef4444", "#a78bfa")
 
 
@@ -164,7 +167,9 @@ class Panel:
                         {"x": uplot.Scale(time=False, range=(-MINUTE_S, 0.0))},
                     )
                     add = self._server.gui.add_uplot
-                    self._plots[title] = add(data, series, title=title, scales=scales, axes=axes, aspect=2.6)
+                    self._plots[title] = add(
+                        data, series, title=title, scales=scales, axes=axes, aspect=2.4, padding=PADDING
+                    )
                 continue
             with self._server.atomic():
                 if known.series != series:

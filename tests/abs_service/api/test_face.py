@@ -1,6 +1,7 @@
 """The names that are promised, what they cost to import, and the examples that use them."""
 
 import inspect
+import os
 import re
 import subprocess
 import sys
@@ -84,3 +85,14 @@ def test_an_example_needs_only_the_public_face(name):
     text = (ROOT / "examples" / name).read_text(encoding="utf-8")
     assert re.findall(r"^(?:import|from) abs_service.*", text, re.M) == ["import abs_service as a"]
     assert len(text.splitlines()) <= 35
+
+
+@pytest.mark.parametrize("name", ["toy_folder.py", "kinect_paper.py"])
+@pytest.mark.parametrize("arguments", [[], ["missing"]])
+def test_an_example_without_its_images_says_what_it_needs(name, arguments, tmp_path):
+    command = [sys.executable, ROOT / "examples" / name, *arguments]
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert f"{tmp_path.joinpath(*arguments)} holds no depth_" in done.stderr
+    assert "Traceback" not in done.stderr

@@ -140,6 +140,26 @@ def test_a_person_is_asked(tmp_path):
     assert table["trackers"]["object"]["region"]["type"] == "above_plane"
 
 
+def test_an_end_of_the_input_is_told_and_leaves_no_file(tmp_path, monkeypatch, capsys):
+    lines = iter(["one"])
+
+    def answer(prompt):
+        try:
+            return next(lines)
+        except StopIteration:
+            raise EOFError from None
+
+    monkeypatch.setattr("builtins.input", answer)
+    monkeypatch.setattr("sys.stdin.isatty", lambda: True)
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
+    given = ["--device", "simulated", "--object", "sheet", "--color"]
+    assert cli.main(["new", str(tmp_path / "lab.toml"), *given]) == Exit.USER
+    said = capsys.readouterr()
+    assert "a number from 1 to 3 or one of space, plane, things, please" in said.out
+    assert "the input ended before --behind was answered" in said.err
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_device_that_no_file_is_written_for_is_told_the_way(tmp_path, capsys):
     with pytest.raises(SystemExit) as ended:
         cli.main(["new", str(tmp_path / "rig.toml"), "--device", "zed"])

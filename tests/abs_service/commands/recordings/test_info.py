@@ -8,6 +8,7 @@ import sys
 import numpy as np
 import pytest
 from absmsg.v1.deformed_mesh_pb2 import MeshTopology
+from absmsg.v1.health_pb2 import Health
 
 from abs_service import config
 from abs_service.cli import main
@@ -65,6 +66,17 @@ def test_exposures_that_are_missing_are_lost_and_leave_a_gap(tmp_path, capsys):
     topic = found["topics"]["/tof/depth/info"]
     assert (topic["lost"], topic["gaps"], topic["reconnects"]) == (4, 1, 0)
     assert topic["longest_gap_s"] == pytest.approx(5 / 30, rel=1e-3)
+
+
+def test_why_a_device_delivered_fewer_exposures_stands_among_the_losses(tmp_path, capsys):
+    counters = {"device.sim.frames": 90, "device.sim.late": 40, "device.sim.lost": 0, "published.tof/depth/image": 90}
+    health = Health(component="capture", counters=counters)
+    with (tmp_path / "x.mcap").open("wb") as stream:
+        file = McapFile(stream, Compression.LZ4)
+        file.write("/health/capture", Health.DESCRIPTOR.full_name, health.SerializeToString(), 1, 1)
+        file.finish()
+    assert main(["info", str(tmp_path / "x.mcap")]) == 0
+    assert [line for line in capsys.readouterr().out.splitlines() if " = " in line] == ["capture: device.sim.late = 40"]
 
 
 def test_a_recording_that_was_cut_short_is_described_up_to_there(tmp_path, capsys):
