@@ -58,12 +58,16 @@ class Background:
             self.lost = missing
             return missing
         count, labels = cv2.connectedComponents(missing.view(np.uint8), connectivity=4)
-        results = np.empty((2, *missing.shape), np.bool_)
-        for at_first, result in zip((self._empty, self._returned), results, strict=True):
-            first = np.ascontiguousarray(at_first[window])
-            _mark_shared(np.asarray(labels, np.int32), first, np.zeros(count, np.int64), result)
-        empty, self.lost = results
-        return empty
+        areas = np.asarray(labels, np.int32)
+        self.lost = _sharing(areas, count, self._returned[window])
+        return _sharing(areas, count, self._empty[window])
+
+
+def _sharing(areas: NDArray[np.int32], count: int, pixels: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """The areas (rows, columns), numbered below a count, that share enough pixels with others; see `_mark_shared`."""
+    result = np.empty(areas.shape, np.bool_)
+    _mark_shared(areas, np.ascontiguousarray(pixels), np.zeros(count, np.int64), result)
+    return result
 
 
 @kernel
