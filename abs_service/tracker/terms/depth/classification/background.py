@@ -72,19 +72,19 @@ def _sharing(areas: NDArray[np.int32], count: int, pixels: NDArray[np.bool_]) ->
 
 @kernel
 def _mark_shared(
-    labels: NDArray[np.int32], empty: NDArray[np.bool_], shared: NDArray[np.int64], result: NDArray[np.bool_]
+    labels: NDArray[np.int32], pixels: NDArray[np.bool_], shared: NDArray[np.int64], result: NDArray[np.bool_]
 ) -> None:
     """Marks the areas that share enough pixels with what the first image showed.
 
     Args:
         labels: of the areas (rows, columns), 0 for none.
-        empty: pixels (rows, columns) of the first image.
+        pixels: those (rows, columns) of the first image.
         shared: number of pixels that every area shares with it (areas,), zeros at the start.
         result: see above (rows, columns).
     """
     for row in range(labels.shape[0]):
         for column in range(labels.shape[1]):
-            if empty[row, column] and labels[row, column] > 0:
+            if pixels[row, column] and labels[row, column] > 0:
                 shared[labels[row, column]] += 1
     for row in range(labels.shape[0]):
         for column in range(labels.shape[1]):
