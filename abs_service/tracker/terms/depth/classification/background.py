@@ -58,29 +58,33 @@ class Background:
             self.lost = missing
             return missing
         count, labels = cv2.connectedComponents(missing.view(np.uint8), connectivity=4)
-        results = np.empty((2, *missing.shape), np.bool_)
-        for at_first, result in zip((self._empty, self._returned), results, strict=True):
-            first = np.ascontiguousarray(at_first[window])
-            _mark_shared(np.asarray(labels, np.int32), first, np.zeros(count, np.int64), result)
-        empty, self.lost = results
-        return empty
+        areas = np.asarray(labels, np.int32)
+        self.lost = _sharing(areas, count, self._returned[window])
+        return _sharing(areas, count, self._empty[window])
+
+
+def _sharing(areas: NDArray[np.int32], count: int, pixels: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """The areas (rows, columns), numbered below a count, that share enough pixels with others; see `_mark_shared`."""
+    result = np.empty(areas.shape, np.bool_)
+    _mark_shared(areas, np.ascontiguousarray(pixels), np.zeros(count, np.int64), result)
+    return result
 
 
 @kernel
 def _mark_shared(
-    labels: NDArray[np.int32], empty: NDArray[np.bool_], shared: NDArray[np.int64], result: NDArray[np.bool_]
+    labels: NDArray[np.int32], pixels: NDArray[np.bool_], shared: NDArray[np.int64], result: NDArray[np.bool_]
 ) -> None:
     """Marks the areas that share enough pixels with what the first image showed.
 
     Args:
         labels: of the areas (rows, columns), 0 for none.
-        empty: pixels (rows, columns) of the first image.
+        pixels: those (rows, columns) of the first image.
         shared: number of pixels that every area shares with it (areas,), zeros at the start.
         result: see above (rows, columns).
     """
     for row in range(labels.shape[0]):
         for column in range(labels.shape[1]):
-            if empty[row, column] and labels[row, column] > 0:
+            if pixels[row, column] and labels[row, column] > 0:
                 shared[labels[row, column]] += 1
     for row in range(labels.shape[0]):
         for column in range(labels.shape[1]):
