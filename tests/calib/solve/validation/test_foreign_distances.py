@@ -49,6 +49,7 @@ def turned(view: PlaneView) -> PlaneView:
 def test_they_are_named(spoil: Callable[[PlaneView], PlaneView], said: str) -> None:
     verdict, count = assessed(spoil)
     assert verdict.startswith(f"Do not trust it yet: {said}")
+    assert "e+" not in verdict
     assert count == 1
 
 
