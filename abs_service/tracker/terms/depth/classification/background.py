@@ -28,20 +28,18 @@ OWN_PX = 16
 
 
 class Background:
-    """Pixels at which the background gives no return, learnt from the first depth image.
-
-    Attributes:
-        lost: missing returns (rows, columns) of the last image in areas in which the background has had some.
-    """
+    """Pixels at which the background gives no return, learnt from the first depth image."""
 
     def __init__(self) -> None:
-        self._empty = self._returned = self.lost = np.zeros((0, 0), np.bool_)
+        self._empty = self._returned = np.zeros((0, 0), np.bool_)
         self._begun = False
 
     def observe(
         self, missing: NDArray[np.bool_], expected: NDArray[np.bool_], window: Window, shape: tuple[int, ...]
-    ) -> NDArray[np.bool_]:
-        """Missing returns (rows, columns) that show the background; the first call learns.
+    ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Missing returns (rows, columns) that show the background; those in areas in which it has had some.
+
+        The first call learns.
 
         Args:
             missing: areas without return (rows, columns) in the window.
@@ -55,12 +53,10 @@ class Background:
             self._empty[window] = missing & ~grown(expected, MARGIN_PX)
             self._returned[window] = ~(missing | grown(expected, OWN_PX))
         if not missing.any():
-            self.lost = missing
-            return missing
+            return missing, missing
         count, labels = cv2.connectedComponents(missing.view(np.uint8), connectivity=4)
         areas = np.asarray(labels, np.int32)
-        self.lost = _sharing(areas, count, self._returned[window])
-        return _sharing(areas, count, self._empty[window])
+        return _sharing(areas, count, self._empty[window]), _sharing(areas, count, self._returned[window])
 
 
 def _sharing(areas: NDArray[np.int32], count: int, pixels: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -61,10 +61,10 @@ class Classifier:
         hole = interruptions(surfaces, areas, silhouette) if self._is_interrupted else np.False_
         if not self._begun:
             self._begun, self._is_interrupted = True, bool(hole.any())
-        empty = self._background.observe(areas & ~hole, silhouette, window, shape)
+        empty, lost = self._background.observe(areas & ~hole, silhouette, window, shape)
         given = expected, self._focal, empty, single, beyond
         seen = classify(surfaces, *given, agreement=AGREEMENT_M * (step / LARGEST_STEP_M))
         if is_flat and not seen.object.any():  # it moved farther than a finer agreement allows for
             seen = classify(surfaces_of(distance), *given)
-        unsettled, lost = self._fixed_edges.unsettled[window], self._background.lost
+        unsettled = self._fixed_edges.unsettled[window]
         return replace(seen, hole=seen.hole | hole, unsettled=unsettled, lost=lost)

@@ -82,7 +82,7 @@ def test_a_missing_return_beside_the_sheet_is_free_space_where_the_background_ha
     moved = np.roll(first, -12, axis=1)
     moved[30:33, 60:64] = np.nan  # a hole in the sheet
     missing = np.isnan(moved)
-    empty = background.observe(missing, EXPECTED, WHOLE, first.shape)
+    empty, _ = background.observe(missing, EXPECTED, WHOLE, first.shape)
     assert not empty[30:33, 60:64].any()
     assert np.array_equal(empty, missing & ~np.pad(np.ones((3, 4), bool), ((30, 39), (60, 76))))
     seen = classify(surfaces_of(moved), PREDICTED, STRAIGHT.fx, empty)
@@ -94,7 +94,7 @@ def test_a_missing_return_beside_the_sheet_is_free_space_where_the_background_ha
     deep = first.copy()
     deep[:, 70:] = np.nan
     deep_seen = classify(
-        surfaces_of(deep), PREDICTED, STRAIGHT.fx, background.observe(np.isnan(deep), EXPECTED, WHOLE, deep.shape)
+        surfaces_of(deep), PREDICTED, STRAIGHT.fx, background.observe(np.isnan(deep), EXPECTED, WHOLE, deep.shape)[0]
     )
     assert deep_seen.hole[36, 80:92].all()
     assert np.all(deep_seen.free_m[36, 99:102] > 0)
@@ -205,7 +205,7 @@ def test_missing_returns_are_background_if_their_area_shares_enough_pixels_with_
     labels = np.asarray(cv2.connectedComponents(later.view(np.uint8), connectivity=4)[1], np.intp)
     shared = np.bincount(labels[first & later], minlength=labels.max() + 1)
     areas = later & (shared >= MIN_PIXELS)[labels]
-    np.testing.assert_array_equal(background.observe(later, expected, WHOLE, first.shape), areas)
+    np.testing.assert_array_equal(background.observe(later, expected, WHOLE, first.shape)[0], areas)
 
 
 def test_an_area_is_lost_if_the_background_had_returns_in_it_far_from_the_object():
@@ -213,11 +213,10 @@ def test_an_area_is_lost_if_the_background_had_returns_in_it_far_from_the_object
     first = np.zeros(EXPECTED.shape, np.bool_)
     first[2:70, 24:115] = ~EXPECTED[2:70, 24:115]
     background = Background()
-    background.observe(first, EXPECTED, WHOLE, first.shape)
-    assert not background.lost.any()
+    assert not background.observe(first, EXPECTED, WHOLE, first.shape)[1].any()
     later = first.copy()
     later[20:45, 2:45] = True  # of the wall, the shadow, and the sheet
-    assert background.observe(later, EXPECTED, WHOLE, first.shape)[20:45, 2:45].all()
-    assert np.array_equal(background.lost, later)
-    background.observe(np.zeros_like(first), EXPECTED, WHOLE, first.shape)
-    assert not background.lost.any()
+    empty, lost = background.observe(later, EXPECTED, WHOLE, first.shape)
+    assert empty[20:45, 2:45].all()
+    assert np.array_equal(lost, later)
+    assert not background.observe(np.zeros_like(first), EXPECTED, WHOLE, first.shape)[1].any()
