@@ -94,7 +94,7 @@ def without_motion(
 
 
 def _fitted(
-    away: NDArray[np.float64], directions: NDArray[np.float64], places: NDArray[np.float64], least: float
+    away: NDArray[np.float64], directions: NDArray[np.float64], places: NDArray[np.float64], minimum: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
     """The motion (3,) of `shown_by` that explains the distances of edges (k,) best, by least squares.
 
@@ -104,7 +104,7 @@ def _fitted(
     equations, arms = np.zeros((4, 4)), np.empty_like(places)
     add_equations(away, directions, places, equations, arms)
     squares, motions = np.linalg.eigh(equations[:3, :3])
-    shown = squares >= least
+    shown = squares >= minimum
     squares, motions = squares[shown], motions[:, shown]
     parts = equations[3, :3] @ motions
     return arms, motions @ (parts / squares), float(parts @ (parts / squares))
