@@ -102,7 +102,7 @@ class ObservedRimOutline:
         return RimFit(
             visible=visible,
             outside=int(np.count_nonzero(outside)),
-            lost=int(np.count_nonzero(outside & (self.lost_at(edges.places) > 0))),
+            lost=int(np.count_nonzero(self.lost_at(edges.places[outside]) > 0)) if outside.any() else 0,
             inside=int(np.count_nonzero(edges.away > self.off_px)),
             off_m=max(self._displacement(edges, known) if visible else 0.0, hanging_m),
             occluded=self.hidden + len(known) - visible,

@@ -5,7 +5,6 @@ between the pixels on the object and those beside it. Which stretches of the rim
 image (`rim_classes`).
 """
 
-from collections.abc import Callable
 from functools import partial
 
 import numpy as np
@@ -107,7 +106,7 @@ class RimOutline:
             is_round=self._is_round,
             deviation=deviation,
             off_px=off_px,
-            lost_at=self._at(seen.lost, window),
+            lost_at=partial(self._read, seen.lost, window),
             doubtful=doubtful,
             kernel=self._kernel,
             classes=self._of_vertices(predicted.vertices.shape[2], is_cut),
@@ -119,16 +118,22 @@ class RimOutline:
         hides = (self.classes == RimClass.OCCLUDED) | (self.classes == RimClass.BORDER)
         return self._edges.some(np.flatnonzero(hides | is_cut))
 
-    def _at(self, mask: NDArray[np.bool_], window: Window) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
-        """Reads a mask (rows, columns) of a window at places (k, 2) in the image: 1 in it."""
-        return partial(read, mask.astype(np.float32), np.array(corner(window)[::-1], np.float32), last=self._size)
+    def _read(
+        self, part: NDArray[np.float32] | NDArray[np.bool_], window: Window, places: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Values (k,) of a window (rows, columns) at places (k, 2) in the image, see `read`; 1 in a mask."""
+        first = np.array(corner(window)[::-1], np.float32)
+        return read(part.astype(np.float32, copy=False), first, places, self._size)
 
     def _in_sight(
         self, predicted: Surface, is_cut: NDArray[np.bool_], expected: NDArray[np.float32], window: Window
     ) -> tuple[Edges, int]:
         """Free edges that the predicted mesh does not hide, and the number of those that it hides; see `observe`."""
         free = self._edges.some(np.flatnonzero((self.classes == RimClass.FREE) & ~is_cut))
-        hidden = is_behind(self._camera, free.ends(predicted), expected, window)
+        ends = free.ends(predicted)
+        in_front = self._read(expected, window, project_with_jacobian(self._camera, ends)[0])
+        behind = in_front < np.linalg.norm(ends - self._camera.center, axis=1) - HIDDEN_BEHIND_M
+        hidden = behind & (in_front > -np.inf)
         return free.some(np.flatnonzero(~hidden)), int(np.count_nonzero(hidden))
 
     def _of_vertices(self, count: int, is_cut: NDArray[np.bool_]) -> bytes:
@@ -162,9 +167,7 @@ class RimOutline:
         """
         if not (beyond.any() or self._was_cut.any()):
             return self._was_cut
-        first = np.array(corner(window)[::-1], np.float32)
-        image = beyond.astype(np.float32)
-        at_first, now = (read(image, first, places, self._size) for places in (self._first, self._beside(surface)))
+        at_first, now = (self._read(beyond, window, places) for places in (self._first, self._beside(surface)))
         self._was_cut = np.where(np.isfinite(at_first), at_first > 0, self._was_cut)
         return self._was_cut | (now > 0)
 
@@ -187,17 +190,6 @@ class RimOutline:
             return are_ends
         size = np.array(self._size)
         near = np.concatenate([places > (1 - MARGIN) * size, places < MARGIN * size], axis=1).T
-        first = np.array(corner(window)[::-1], np.float32)
-        towards = [read(distance, first, places + BESIDE_PX * step, self._size) for step in _TO_SIDES]
-        is_open = read(unsettled.astype(np.float32), first, places, self._size) > 0
+        towards = [self._read(distance, window, places + BESIDE_PX * step) for step in _TO_SIDES]
+        is_open = self._read(unsettled, window, places) > 0
         return are_ends & ~(is_open & np.any(near & ~np.isfinite(towards), axis=0))
-
-
-def is_behind(
-    camera: Camera, points: NDArray[np.float64], surface: NDArray[np.float32], window: Window
-) -> NDArray[np.bool_]:
-    """True for points (k, 3) [m] that a surface hides, whose distances in a window are known (rows, columns) [m]."""
-    first = np.array(corner(window)[::-1], np.float32)
-    in_front = read(surface, first, project_with_jacobian(camera, points)[0], (camera.width, camera.height))
-    behind = in_front < np.linalg.norm(points - camera.center, axis=1) - HIDDEN_BEHIND_M
-    return behind & (in_front > -np.inf)
