@@ -66,7 +66,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--rig", metavar="NAME", help="name on the wire instead of the configuration's")
     devices = parser.add_mutually_exclusive_group()
     devices.add_argument("--seed", metavar="N", type=SEED, help="seed of all simulated devices")
-    devices.add_argument("--connect", metavar="ENDPOINT", help="open no device: `capture` does, which listens here")
+    devices.add_argument(
+        "--connect", metavar="ENDPOINT", default="", help="open no device: `capture` does, which listens here"
+    )
     parser.add_argument("--view", action="store_true", help="serve a page that shows the rig, as `abs-service view`")
     parser.add_argument("--view-port", metavar="N", type=port, help=f"--view at this port (default: {view.PORT})")
     parser.add_argument("--view-only", action="store_true", help="--view without anything that acts on the rig")
@@ -99,8 +101,8 @@ def run(arguments: argparse.Namespace) -> int:
         about = (rig.name, rig.bus.endpoint, rig.record.directory)
         notifier = systemd.notifier(os.environ)
         watchers = (notifier.update, measure, lambda _: forked.ensure_running())
-        clock, captured_at = WallClock(), arguments.connect or ""
-        session = RunSession(bus, *about, rig.trackers, supervisor, display, clock, watchers, captured_at)
+        clock = WallClock()
+        session = RunSession(bus, *about, rig.trackers, supervisor, display, clock, watchers, arguments.connect)
         session.answer_reloads(partial(renewal, file, arguments, page))
         rig_process.on_hangup(session.reload, stop)
         try:
@@ -195,7 +197,7 @@ def with_seed(uri: str, seed: int) -> str:
 
 
 def children(
-    rig: config.ServiceConfig, path: Path, page: Sequence[str] | None = None, captured_at: str | None = None
+    rig: config.ServiceConfig, path: Path, page: Sequence[str] | None = None, captured_at: str = ""
 ) -> list[Child]:
     """The processes of a rig; the recorder is to stop last.
 
@@ -203,7 +205,7 @@ def children(
         rig: the effective configuration.
         path: the file that it is in.
         page: options of `abs-service view`; None: without it.
-        captured_at: endpoint of the host that captures; None: this one does.
+        captured_at: endpoint of the host that captures; "" if this one does.
     """
     captures = [] if captured_at else [Child("capture", ("capture", str(path)), 0)]
     trackers = [Child(f"track/{name}", ("track", str(path), name), 1) for name in rig.trackers]
