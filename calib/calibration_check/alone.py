@@ -1,6 +1,6 @@
 """Fit of each stored sensor to its own corners, and of its distances to them."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,10 +67,7 @@ def distance_bias(stored: Stored, views: Views, sensor: str) -> DistanceBias | N
     for view in views.planes:
         if view.sensor == sensor and boards.get(view.shot):
             T_sb = boards[view.shot][0].T_sb
-            directions = replace(state.camera, T_rs=np.eye(4)).directions(view.pixels)
-            true = (T_sb[:3, 2] @ T_sb[:3, 3]) / (directions @ T_sb[:3, 2])
-            predicted = (1 + state.depth_scale) * true + state.depth_offset
-            excesses.append(float(np.median(view.distances - predicted)))
+            excesses.append(float(np.median(view.distances - state.predicted_distances(T_sb, view.pixels))))
     if len(excesses) < MIN_SHOTS:
         return None
     return DistanceBias(

@@ -3,6 +3,9 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from calib.camera import Camera
 from calib.pose import Pose
 
@@ -21,6 +24,12 @@ class SensorState:
     depth_offset: float = 0.0
     depth_scale: float = 0.0
     time_offset: float = 0.0
+
+    def predicted_distances(self, T_sb: Pose, pixels: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Radial distances (n,) [m] that the sensor measures of a board's plane z = 0 at pixels (n, 2)."""
+        normal = T_sb[:3, 2]
+        distances = (normal @ T_sb[:3, 3]) / (self.camera.directions(pixels) @ normal)
+        return np.asarray((1 + self.depth_scale) * distances + self.depth_offset, np.float64)
 
 
 @dataclass(frozen=True, slots=True)

@@ -94,11 +94,10 @@ def _of_sensor(solution: Solution, name: str, views: list[PlaneView]) -> list[Fo
     state = solution.state.sensors[name]
     said, own = [], []
     for view in views:
-        rays, board = state.camera.directions(view.pixels), state.camera.T_sr @ solution.boards[view.shot]
-        distances = (board[:3, 2] @ board[:3, 3]) / (rays @ board[:3, 2])
-        said.append((1 + state.depth_scale) * distances + state.depth_offset)
+        said.append(state.predicted_distances(state.camera.T_sr @ solution.boards[view.shot], view.pixels))
         normal, height = fit_plane(state.camera, view)
-        own.append(float(np.median(np.abs(view.distances - height / (rays @ normal)))))
+        along = state.camera.directions(view.pixels) @ normal
+        own.append(float(np.median(np.abs(view.distances - height / along))))
     medians = [np.array([np.median(each) for each in of]) for of in (said, [view.distances for view in views])]
     factor, offset = robust_line(*medians)
     pairs = zip(views, said, strict=True)
