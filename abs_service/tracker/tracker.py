@@ -16,16 +16,12 @@ from abs_service.pairing.observation import Observation
 from abs_service.tracker.estimates import status
 from abs_service.tracker.estimates.estimate import Estimate, SearchReport, Status
 from abs_service.tracker.estimates.shape_quality import ShapeComparison
-from abs_service.tracker.optimizers.base import Budget, Optimizer, Outcome, Search
-from abs_service.tracker.posterior.covariance.observability import single_frame_deviation
-from abs_service.tracker.posterior.covariance.slides import SlideObservability
-from abs_service.tracker.posterior.covariance.theta_covariance import ThetaCovariance
-from abs_service.tracker.posterior.covariance.vertex_covariance import VertexCovariance
+from abs_service.tracker.optimizers.base import Budget, Optimizer, Outcome, RunningSearch, Search
 from abs_service.tracker.posterior.frame_posterior import FramePosterior
 from abs_service.tracker.posterior.posterior import Posterior
 from abs_service.tracker.posterior.relocation import fit_to_points
 from abs_service.tracker.posterior.search_start import search_start
-from abs_service.tracker.posterior.slide_drift import SlideDrift
+from abs_service.tracker.posterior.uncertainty import Uncertainty
 from abs_service.tracker.terms.patches import patches_of
 
 #: Frames after a start that are searched from scratch: in the first, nothing is known, and in the second, not how fast
@@ -59,12 +55,10 @@ class Tracker:
         self._optimizer = optimizer
         self._evaluations = evaluations
         self._limits = limits.for_side(np.sqrt(model.mesh.area))
-        self._theta_covariance = ThetaCovariance(model, registration_m)
-        self._vertex_covariance = VertexCovariance(model, registration_m, centers)
+        self._uncertainty = Uncertainty(model, registration_m, centers)
         self._patches = patches_of(model.mesh)
         self._shape = ShapeComparison(model.mesh)
-        self._slides, self._drift = SlideObservability(model), SlideDrift()
-        self._followed = 0
+        self._frames = 0  # since the start or a relocation
         self._last_tracked = model.rest
 
     def track(self, observation: Observation, in_time: Callable[[], bool]) -> Estimate:
@@ -74,49 +68,47 @@ class Tracker:
             observation: the images of all sensors at one moment.
             in_time: False when the time is up; the first frame is searched to the end.
         """
-        frame = self._posterior.observe(observation)  # predicts Θ; renders the noise models per pixel
-        is_warm = self._followed >= COLD_FRAMES
-        budget = Budget(self._evaluations, in_time if self._followed else _without_end)
-        start = self._optimizer.follow if is_warm else self._optimizer.explore  # warm or cold start
+        prediction = self._posterior.predict(observation.t_host_ns)  # predict: the motion prior of Θ
+        frame = self._posterior.observe(observation, prediction)  # observe: noise models rendered per pixel
+        budget = Budget(self._evaluations, in_time if self._frames else _without_end)
+        search = self._optimizer.follow if self._frames >= COLD_FRAMES else self._optimizer.explore
         frame, theta = search_start(frame, self._patches)  # the prediction, or where images show the surface's print
-        outcome = self._minimize(frame, start(frame, theta, budget), budget)
+        outcome = self._minimize(frame, search(frame, theta, budget), budget)
         if frame.motion.is_too_narrow(outcome.theta):  # a sudden motion
             frame = frame.with_motion(frame.motion.widened(outcome.theta))
             outcome = self._minimize(frame, self._optimizer.follow(frame, outcome.theta, budget), budget)
-        self._followed += 1
+        self._frames += 1
         return self._estimate(observation, frame, outcome, budget)
 
     def relocate(self, points: NDArray[np.float64]) -> None:
         """Warm start from points (k, 3) [m] of a lost object: the next search begins with the mesh laid over them."""
         motion = self._posterior.motion
         motion.restart(fit_to_points(self.model, self._last_tracked, points))
-        self._theta_covariance.restart(motion.longest_covariance)
-        self._vertex_covariance.restart()
-        self._drift.restart()
-        self._followed = 0
+        self._uncertainty.restart(motion.longest_covariance)
+        self._frames = 0
 
     def _minimize(self, frame: FramePosterior, search: Search, budget: Budget) -> Outcome:
         """Analysis by synthesis: ask, deform, synthesise, score, tell, until budget or convergence ends the search."""
-        thetas = next(search)  # ask: candidates (population, dim)
-        while True:
+        running = RunningSearch(search)
+        while running.outcome is None:
+            thetas = running.ask()  # candidates (population, dim)
             surface = frame.surfaces.deform(thetas)  # deform: eqs. 2–8
             costs = frame.cost(thetas, surface)  # synthesise into every sensor (eqs. 10, 11, 20), score (eqs. 16–22)
             budget.evaluations += len(thetas)
-            try:
-                thetas = search.send(costs)  # tell, and ask again
-            except StopIteration as ended:
-                return ended.value
+            running.tell(costs)
+        return running.outcome
 
     def _estimate(self, observation: Observation, frame: FramePosterior, outcome: Outcome, spent: Budget) -> Estimate:
         """Covariances, agreement of the sensors and status at the optimum."""
         optimum = frame.optimum(outcome.theta, outcome.linearized)
         motion = self._posterior.motion.update(frame.motion, optimum.theta, optimum.inverse_curvature)
-        covariance = self._theta_covariance.update(optimum, frame.motion, motion)
-        vertex_covariance = self._vertex_covariance.update(optimum, frame, covariance)
-        slides = self._slides.of(optimum)
-        single_frame_m = max(single_frame_deviation(optimum, frame.motion), slides.deviation_m)
-        # Without drift: it tells how far the mesh may be off, not how far it has to be seen to be off.
-        shape = self._shape.compare(optimum.vertices, vertex_covariance, single_frame_m, slides.no_outline_deviation_m)
+        covariance = self._uncertainty.update(optimum, frame, motion)
+        shape = self._shape.compare(
+            optimum.vertices,
+            covariance.without_drift,
+            covariance.single_frame_deviation_m,
+            covariance.no_outline_deviation_m,
+        )
         fits = outcome.compared(frame).fits
         frame.learn(optimum.surface)
         verdict, reasons = status.judge(
@@ -132,9 +124,9 @@ class Tracker:
             status=verdict,
             reasons=reasons,
             theta=optimum.theta,
-            covariance=covariance,
+            covariance=covariance.theta,
             vertices=optimum.vertices,
-            vertex_covariance=vertex_covariance + self._drift.update(slides, frame.motion),
+            vertex_covariance=covariance.vertices,
             fits=fits,
             shape=shape,
             search=SearchReport.of(outcome, spent),

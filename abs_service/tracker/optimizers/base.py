@@ -1,7 +1,7 @@
 """The optimiser interface: a search asks for the cost of candidates and returns the best theta within a budget.
 
-A search is a generator: it yields candidates (ask), is sent their costs (tell), and returns an `Outcome`. The tracker
-drives it (`abs_service.tracker.tracker`), so every optimiser has the same loop. `cma.py` is the one to copy.
+A search is a generator: it yields candidates, is sent their costs, and returns an `Outcome`. The tracker drives it by
+ask and tell (`RunningSearch`), so every optimiser has the same loop. `cma.py` is the one to copy.
 """
 
 from collections.abc import Callable, Generator
@@ -107,6 +107,34 @@ class Outcome:
 
 #: Yields candidates (population, dim), receives their costs (population,), returns the outcome.
 Search = Generator[NDArray[np.float64], Costs, Outcome]
+
+
+class RunningSearch:
+    """A search in the form of ask and tell.
+
+    Args:
+        search: a search that has not begun; it asks at least once.
+
+    Attributes:
+        outcome: None while the search goes on.
+    """
+
+    def __init__(self, search: Search):
+        self.outcome: Outcome | None = None
+        self._search = search
+        self._thetas = next(search)
+
+    def ask(self) -> NDArray[np.float64]:
+        """Candidates (population, dim) whose costs the search waits for."""
+        return self._thetas
+
+    def tell(self, costs: Costs) -> None:
+        """Passes the costs (population,) of the candidates on; the search asks for others, or ends."""
+        try:
+            self._thetas = self._search.send(costs)
+        except StopIteration as ended:
+            self.outcome = ended.value
+
 
 #: Starts a search of a problem at parameters (dim,).
 StartSearch = Callable[[Problem, NDArray[np.float64], Budget], Search]

@@ -6,6 +6,7 @@ from abs_service.pairing.observation import Observation
 from abs_service.tracker.models.base import DeformationModel
 from abs_service.tracker.objectives.base import Objective
 from abs_service.tracker.posterior.frame_posterior import FramePosterior
+from abs_service.tracker.posterior.priors.motion_prediction import MotionPrediction
 from abs_service.tracker.posterior.priors.motion_prior import MotionPrior
 from abs_service.tracker.posterior.priors.shape_prior import ShapePrior
 from abs_service.tracker.posterior.priors.stretch_prior import StretchPrior
@@ -27,14 +28,17 @@ class Posterior:
         """Number of parameters."""
         return len(self.model.rest)
 
-    def observe(self, observation: Observation) -> FramePosterior:
-        """Predicts theta, and renders every noise model over its image around the predicted surface.
+    def predict(self, t_ns: int) -> MotionPrediction:
+        """Prior of theta at time `t_ns` [ns] from the motion of the last frames."""
+        return self.motion.predict(t_ns)
+
+    def observe(self, observation: Observation, prediction: MotionPrediction) -> FramePosterior:
+        """Renders every noise model over its image around the predicted surface.
 
         Vertex offsets that the model has learnt since the last frame have moved its mesh at rest. Images are rendered
         into the memory of the last frame's, whose posterior answers no more.
         """
         self.stretch.rest_on(self.model.mesh.vertices)
-        motion = self.motion.predict(observation.t_host_ns)
         surfaces = FrameSurfaces(self.model)
-        observed = self.objective.observe(observation, surfaces.deform(motion.theta[None]), motion.reach_m)
-        return FramePosterior(self.model, observed, self.stretch, self.shape, motion, surfaces)
+        observed = self.objective.observe(observation, surfaces.deform(prediction.theta[None]), prediction.reach_m)
+        return FramePosterior(self.model, observed, self.stretch, self.shape, prediction, surfaces)

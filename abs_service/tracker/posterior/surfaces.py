@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from abs_service.tracker.memo import Memo
 from abs_service.tracker.models.base import DeformationModel, SparseJacobian, Surface
 
 
@@ -17,17 +18,14 @@ class FrameSurfaces:
 
     def __init__(self, model: DeformationModel):
         self._model = model
-        self._known: dict[bytes, Surface] = {}
-        self._jacobians: dict[bytes, SparseJacobian] = {}
+        self._single: Memo[bytes, Surface] = Memo()
+        self._jacobians: Memo[bytes, SparseJacobian] = Memo()
 
     def deform(self, thetas: NDArray[np.float64]) -> Surface:
         """The mesh deformed with every row of `thetas` (population, dim)."""
         if len(thetas) > 1:
             return self._model.deform(thetas)
-        key = thetas.tobytes()
-        if key not in self._known:
-            self._known[key] = self._model.deform(thetas)
-        return self._known[key]
+        return self._single.get(thetas.tobytes(), lambda key: self._model.deform(thetas))
 
     def with_jacobian(self, theta: NDArray[np.float64]) -> tuple[Surface, SparseJacobian]:
         """The mesh deformed with theta (dim,), a population of one, and the derivatives of its vertices."""
@@ -35,7 +33,4 @@ class FrameSurfaces:
 
     def sparse_jacobian(self, theta: NDArray[np.float64]) -> SparseJacobian:
         """Derivatives of the vertices with respect to theta (dim,)."""
-        key = theta.tobytes()
-        if key not in self._jacobians:
-            self._jacobians[key] = self._model.sparse_jacobian(theta)
-        return self._jacobians[key]
+        return self._jacobians.get(theta.tobytes(), lambda key: self._model.sparse_jacobian(theta))

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from abs_service.pairing.images import Window
 from abs_service.pairing.observation import Observation
+from abs_service.tracker.memo import Memo
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from calib.camera import Camera
@@ -59,19 +60,15 @@ class Synthesis:
     interpolation: Interpolation
 
 
-def once(known: dict[Surface, Synthesis], surface: Surface, synthesize: Callable[[Surface], Synthesis]) -> Synthesis:
+def once(single: Memo[Surface, Synthesis], surface: Surface, synthesize: Callable[[Surface], Synthesis]) -> Synthesis:
     """The synthesis of a population; that of a surface by itself is kept, since costs, fits and derivatives ask for it.
 
     Args:
-        known: what is kept, in one frame.
+        single: syntheses of populations of one in one frame.
         surface: the population.
-        synthesize: makes what is not known.
+        synthesize: makes one that is not known.
     """
-    if len(surface.vertices) > 1:
-        return synthesize(surface)
-    if surface not in known:
-        known[surface] = synthesize(surface)
-    return known[surface]
+    return synthesize(surface) if len(surface.vertices) > 1 else single.get(surface, synthesize)
 
 
 class ObservedView(Protocol):

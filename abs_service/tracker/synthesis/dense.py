@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from abs_service.pairing.images import Window
 from abs_service.pairing.observation import Observation
+from abs_service.tracker.memo import Memo
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import AS_MEASURED, Resampling, Synthesis, View, once
@@ -96,7 +97,7 @@ class DenseView:
         expected = float(samples.covered[0]) / max(float(share[0]), MIN_SHARE)
         seen = self._painted(samples, share, expected)
         return ObservedDenseView(
-            self.camera, lambda surface: self._painted(*self._rasterize(surface), expected), {predicted: seen}
+            self.camera, lambda surface: self._painted(*self._rasterize(surface), expected), Memo({predicted: seen})
         )
 
     def render(self, surface: Surface) -> NDArray[np.float32]:
@@ -125,10 +126,10 @@ class ObservedDenseView:
     Args:
         camera: the camera.
         synthesize: synthesises a population.
-        single: what was synthesised of populations of one, see `once`.
+        single: syntheses of populations of one, see `once`.
     """
 
-    def __init__(self, camera: Camera, synthesize: Callable[[Surface], Synthesis], single: dict[Surface, Synthesis]):
+    def __init__(self, camera: Camera, synthesize: Callable[[Surface], Synthesis], single: Memo[Surface, Synthesis]):
         self.camera = camera
         self._synthesize = synthesize
         self._single = single

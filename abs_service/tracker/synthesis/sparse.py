@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from abs_service.pairing.images import Window
 from abs_service.pairing.observation import Observation
+from abs_service.tracker.memo import Memo
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.attribute_gradients import (
@@ -114,7 +115,7 @@ class SparseView:
         rows, columns = np.divmod(np.maximum(pixel - (stride + 1), 0), stride)
         front, hidden = front_at(rows, columns), np.empty_like(view.hidden)
         hide(predicted.vertices[0], predicted.normals[0], self.camera.center, front, distance, pixel, hidden)
-        return replace(view, hidden=hidden, single={})
+        return replace(view, hidden=hidden)
 
     def unoccluded(self, predicted: Surface) -> "ObservedSparseView":
         """The view of all vertices, whatever may be before them."""
@@ -150,7 +151,7 @@ class ObservedSparseView:
         attributes: of the vertices (channels, n).
         gradients: of the attributes in the image.
         hidden: vertices (n,) that are no samples.
-        single: what was synthesised of populations of one, see `once`.
+        single: syntheses of populations of one, see `once`; `replace` makes a new one.
     """
 
     camera: Camera
@@ -158,7 +159,7 @@ class ObservedSparseView:
     attributes: NDArray[np.float32]
     gradients: ImageGradients
     hidden: NDArray[np.bool_]
-    single: dict[Surface, Synthesis] = field(default_factory=dict)
+    single: Memo[Surface, Synthesis] = field(init=False, default_factory=Memo[Surface, Synthesis])
 
     def synthesize(self, surface: Surface) -> Synthesis:
         """Synthesises a population of deformed meshes; a surface by itself once."""

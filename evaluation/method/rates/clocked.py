@@ -8,7 +8,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.optimizers.base import Budget, Optimizer, Problem, Search
+from abs_service.tracker.optimizers.base import Budget, Optimizer, Problem, RunningSearch, Search
 from abs_service.tracker.posterior.curvature import Quadratic
 from abs_service.tracker.posterior.linearized_cost import LinearizedCost
 from abs_service.tracker.terms.sensor_fit import SensorFit
@@ -67,17 +67,15 @@ class WatchedSearch:
         """See `Optimizer`."""
         clocked, own_s = Clocked(problem, problem.dimension), 0.0
         begin = time.thread_time()
-        search = self.search.follow(clocked, start, budget)
-        thetas = next(search)
-        while True:
+        running = RunningSearch(self.search.follow(clocked, start, budget))
+        while running.outcome is None:
+            thetas = running.ask()
             own_s += time.thread_time() - begin
             costs = yield thetas
             begin = time.thread_time()
-            try:
-                thetas = search.send(costs)
-            except StopIteration as ended:
-                self.watched.took_s.append(own_s + time.thread_time() - begin - clocked.spent_s)
-                return ended.value
+            running.tell(costs)
+        self.watched.took_s.append(own_s + time.thread_time() - begin - clocked.spent_s)
+        return running.outcome
 
     def explore(self, problem: Problem, start: NDArray[np.float64], budget: Budget) -> Search:
         """See `Optimizer`."""

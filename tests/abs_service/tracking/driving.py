@@ -10,6 +10,7 @@ from abs_service import config, wiring
 from abs_service.tracker.estimates.estimate import Estimate, Status
 from abs_service.tracker.models.base import DeformationModel
 from abs_service.tracker.optimizers import cma_es
+from abs_service.tracker.posterior.frame_posterior import FramePosterior
 from abs_service.tracker.posterior.posterior import Posterior
 from abs_service.tracking.log.truth import Errors
 from abs_service.tracking.observer import Observer
@@ -95,3 +96,9 @@ def posterior_of(model: DeformationModel, rig: Rig, frames: list[Frame]) -> Post
     """Likelihood and priors of a model that has observed the frames of one exposure."""
     observation = Observer(rig).observe(frame_set(frames, 0))
     return make_posterior(default_plan(), rig, model, observation)[0]
+
+
+def frame_posterior_of(model: DeformationModel, rig: Rig, first: list[Frame], second: list[Frame]) -> FramePosterior:
+    """The posterior of a second exposure, without a motion before it, of a model that has observed a first one."""
+    posterior, observation = posterior_of(model, rig, first), Observer(rig).observe(frame_set(second, 1))
+    return posterior.observe(observation, posterior.predict(observation.t_host_ns))

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from abs_service.tracker.memo import Memo
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import ObservedView, Synthesis
 from abs_service.tracker.terms.base import Bounds, facing
@@ -44,8 +45,8 @@ class ObservedDepth:
         fluctuation: of the sensor's distances, for later frames.
         scale: of the noise model's deviations in this frame, from the fluctuation in earlier ones.
         is_surprised: nothing in the image agrees with the prediction.
-        residuals: those known, by what was synthesised: descent, fit and misfit ask for the same.
-        misfits: those known, by surface: covariance and learning ask for the same.
+        residuals: of the samples of a synthesis, for descent, fit and misfit.
+        misfits: of a surface, for covariance and learning.
     """
 
     sensor: str
@@ -60,8 +61,8 @@ class ObservedDepth:
     fluctuation: Fluctuation
     scale: float
     is_surprised: bool
-    residuals: dict[Synthesis, Residuals] = field(default_factory=dict)
-    misfits: dict[Surface, NDArray[np.float64]] = field(default_factory=dict)
+    residuals: Memo[Synthesis, Residuals] = field(init=False, default_factory=Memo[Synthesis, Residuals])
+    misfits: Memo[Surface, NDArray[np.float64]] = field(init=False, default_factory=Memo[Surface, NDArray[np.float64]])
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
         """−Σ_v log φ (population,) plus the cost of the outline."""
@@ -83,7 +84,7 @@ class ObservedDepth:
         return [measured, free, self.outline.linearize(surface, sparse_jacobian)]
 
     def _linearize_measured(self, surface: Surface, samples: SparseJacobian, seen: Synthesis) -> PointLinearization:
-        found = self._residuals(seen)
+        found = self.residuals.get(seen, self._residuals)
         use = np.flatnonzero(found.cost < self.bounds.outlier - self.bounds.inlier)
         vertices, normals = (
             seen.interpolation.spread(values) for values in (surface.vertices[0].T, surface.normals[0].T)
@@ -112,7 +113,7 @@ class ObservedDepth:
     def fit(self, surface: Surface) -> SensorFit:
         """Agreement of the sensor with a population of one."""
         seen = self.view.synthesize(surface)
-        residual, _, cost = self._residuals(seen)
+        residual, _, cost = self.residuals.get(seen, self._residuals)
         measured, pixel = cost < np.inf, np.where(self.classes.beyond.ravel()[seen.pixel[0]], 0, seen.pixel[0])
         classes = self.classes.at(pixel)
         free = (classes.free_m > 0) & (pixel > 0)
@@ -140,15 +141,13 @@ class ObservedDepth:
         In free space it is that from the object, without noise. Zero where nothing is measured, and everywhere if the
         samples of the synthesis are not the vertices.
         """
-        if surface not in self.misfits:
-            self.misfits[surface] = self._misfit(surface)
-        return self.misfits[surface]
+        return self.misfits.get(surface, self._misfit)
 
     def _misfit(self, surface: Surface) -> NDArray[np.float64]:
         seen = self.view.synthesize(surface)
         if seen.pixel.shape[1] != surface.vertices.shape[2]:
             return np.zeros((2, 1))
-        residual, inverse, cost = self._residuals(seen)
+        residual, inverse, cost = self.residuals.get(seen, self._residuals)
         classes = self.classes.at(np.maximum(seen.pixel[0], 0))
         deviation = 1 / np.maximum(inverse, 1e-9)
         signed = np.clip(residual * deviation, -LARGEST_MISFIT_M, LARGEST_MISFIT_M)
@@ -163,7 +162,6 @@ class ObservedDepth:
 
     def _residuals(self, seen: Synthesis) -> Residuals:
         """Residuals of the samples of a population of one."""
-        if seen not in self.residuals:
-            found = self.residuals[seen] = Residuals(*np.empty((3, seen.pixel.shape[1])))
-            normalize(seen.pixel[0], seen.distance[0], self.texels.at(seen.pixel), found)
-        return self.residuals[seen]
+        found = Residuals(*np.empty((3, seen.pixel.shape[1])))
+        normalize(seen.pixel[0], seen.distance[0], self.texels.at(seen.pixel), found)
+        return found

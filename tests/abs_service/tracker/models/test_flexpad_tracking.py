@@ -9,7 +9,6 @@ import pytest
 from abs_service.tracker.estimates.estimate import Status
 from abs_service.tracker.models.flexpad import FlexPad, Settings
 from abs_service.tracker.objectives import euclidean
-from abs_service.tracking.observer import Observer
 from abs_service.tracking.session import TrackingSession
 from drivers.simulated.shapes.rectangle import PlacedRectangle
 from drivers.simulated.simulation import Simulation
@@ -17,9 +16,9 @@ from tests.abs_service.tracker.models.test_flexpad import COLLAPSED, RADIUS, ben
 from tests.abs_service.tracking.driving import (
     default_plan,
     drive,
+    frame_posterior_of,
     frame_set,
     mean_errors,
-    posterior_of,
     rig_of,
     simulate,
     tracked_error_mm,
@@ -57,8 +56,7 @@ def test_the_truth_is_likelier_than_a_collapsed_sheet(value, collapse):
     tracker, rig = tracking(simulation), rig_of(simulation)
     tracker.track(frame_set(flat := simulation.expose(0)[0], 0), lambda: True)
     assert tracker.model is not None
-    posterior = posterior_of(tracker.model, rig, flat)
-    frame = posterior.observe(Observer(rig).observe(frame_set(bent.expose(1)[0], 1)))
+    frame = frame_posterior_of(tracker.model, rig, flat, bent.expose(1)[0])
     truth = bend(e=value, w=value)
     surface = tracker.model.deform(np.stack([truth, truth + collapse * COLLAPSED]))
     costs = frame.objective.cost(surface) + frame.stretch.cost(surface)

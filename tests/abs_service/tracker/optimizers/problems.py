@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.models.base import SparseJacobian
-from abs_service.tracker.optimizers.base import Budget, Outcome, Search
+from abs_service.tracker.optimizers.base import Budget, Outcome, RunningSearch, Search
 from abs_service.tracker.posterior.curvature import Quadratic
 from abs_service.tracker.posterior.linearized_cost import LinearizedCost
 from abs_service.tracker.terms.sensor_fit import SensorFit
@@ -59,13 +59,12 @@ class Known:
 
 def minimize(problem: Known, search: Search, budget: Budget) -> Outcome:
     """The outcome of a search, driven as the tracker does."""
-    thetas = next(search)
-    while True:
+    running = RunningSearch(search)
+    while running.outcome is None:
+        thetas = running.ask()
         budget.evaluations += len(thetas)
-        try:
-            thetas = search.send(problem.cost(thetas))
-        except StopIteration as ended:
-            return ended.value
+        running.tell(problem.cost(thetas))
+    return running.outcome
 
 
 def linear(target: NDArray[np.float64], scale: NDArray[np.float64]) -> Known:

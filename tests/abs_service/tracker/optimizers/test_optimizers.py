@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from abs_service.tracker.optimizers.base import Outcome, RunningSearch, Search, Stop
 from abs_service.tracker.optimizers.cma import PycmaSampler
 from abs_service.tracker.optimizers.cma_es import FORGOTTEN, CmaEsSampler
 from abs_service.tracker.optimizers.search.ask_and_tell import Sampler, default_population
@@ -136,3 +137,19 @@ def test_equal_costs_are_survived(make):
     strategy = make()
     minimize(strategy, lambda x: np.zeros(len(x)), 20)
     assert np.isfinite(strategy.mean).all()
+
+
+def test_a_running_search_asks_until_it_has_an_outcome():
+    def search() -> Search:
+        first = yield np.zeros((2, 1))
+        second = yield np.ones((3, 1))
+        return Outcome(np.array([first.sum() + second.sum()]), 0.0, "two", Stop.CONVERGED, 0.0)
+
+    running = RunningSearch(search())
+    asked: list[int] = []
+    while running.outcome is None:
+        thetas = running.ask()
+        asked.append(len(thetas))
+        running.tell(thetas[:, 0])
+    assert asked == [2, 3]
+    assert running.outcome.theta == [3.0]

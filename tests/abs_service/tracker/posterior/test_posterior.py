@@ -9,7 +9,7 @@ from abs_service.tracker.posterior.curvature import search_metric
 from abs_service.tracker.posterior.linearized_cost import NEAR
 from abs_service.tracker.terms.linearization import stack
 from abs_service.tracking.observer import Observer
-from tests.abs_service.tracking.driving import frame_set, posterior_of
+from tests.abs_service.tracking.driving import frame_posterior_of, frame_set, posterior_of
 from tests.abs_service.tracking.test_session import RIG, SHEET, drive, tracking
 
 
@@ -17,7 +17,7 @@ def test_a_linearisation_serves_a_near_optimum_and_is_made_anew_for_a_far_one():
     *_, step = drive(one := tracking(vertices=120), SHEET, [0, 1])
     assert one.model is not None
     theta, exposed = step.estimate.theta, SHEET.expose(1)[0]
-    frame = posterior_of(one.model, RIG, exposed).observe(Observer(RIG).observe(frame_set(exposed, 1)))
+    frame = frame_posterior_of(one.model, RIG, exposed, exposed)
     at = frame.linearize(theta)
     direction = search_metric(at.quadratic) @ np.ones(len(theta)) / np.sqrt(len(theta))  # one standard deviation
     small, large = (size * direction * np.sqrt(2 * NEAR * len(theta)) for size in (0.99, 1.01))
@@ -33,7 +33,7 @@ def test_the_order_in_which_a_frame_is_asked_changes_nothing():
     *_, step = drive(one := tracking(vertices=120), SHEET, [0, 1])
     assert one.model is not None
     theta, exposed = step.estimate.theta, SHEET.expose(1)[0]
-    frame = posterior_of(one.model, RIG, exposed).observe(Observer(RIG).observe(frame_set(exposed, 1)))
+    frame = frame_posterior_of(one.model, RIG, exposed, exposed)
     first = frame.optimum(theta, None)
     fits = frame.fits(theta)
     frame.linearize(theta + 1e-4)
@@ -48,7 +48,7 @@ def test_the_motion_prior_adds_its_own_gradient_and_precision_to_the_other_prior
     *_, step = drive(one := tracking(vertices=120), SHEET, [0, 1])
     assert one.model is not None
     theta, exposed = step.estimate.theta, SHEET.expose(1)[0]
-    frame = posterior_of(one.model, RIG, exposed).observe(Observer(RIG).observe(frame_set(exposed, 1)))
+    frame = frame_posterior_of(one.model, RIG, exposed, exposed)
     motion, narrow = frame.motion, frame.with_motion(replace(frame.motion, speed=frame.motion.speed / 2))
     rows = motion.metric.root / (motion.speed * motion.elapsed_s)  # of residuals whose half squares are the cost
     residual = rows @ (theta - motion.theta)
@@ -64,7 +64,8 @@ def test_the_posterior_of_a_frame_answers_no_more_once_the_next_is_observed():
     theta, exposed = step.estimate.theta, SHEET.expose(1)[0]
     posterior = posterior_of(one.model, RIG, exposed)
     observation = Observer(RIG).observe(frame_set(exposed, 1))
-    first, second = posterior.observe(observation), posterior.observe(observation)
+    prediction = posterior.predict(observation.t_host_ns)
+    first, second = posterior.observe(observation, prediction), posterior.observe(observation, prediction)
     assert len(second.fits(theta)) == 2
     with pytest.raises(RuntimeError, match="after the next frame"):
         first.fits(theta)

@@ -8,8 +8,7 @@ import pytest
 from abs_service.tracker.posterior.frame_posterior import FramePosterior
 from abs_service.tracker.posterior.search_start import search_start
 from abs_service.tracker.terms.patches import patches_of
-from abs_service.tracking.observer import Observer
-from tests.abs_service.tracking.driving import frame_set, posterior_of
+from tests.abs_service.tracking.driving import frame_posterior_of
 from tests.abs_service.tracking.test_session import RIG, SHEET, drive, tracking
 
 
@@ -19,7 +18,7 @@ def observed() -> tuple[FramePosterior, np.ndarray]:
     *_, step = drive(one := tracking(vertices=300), SHEET, [0, 1])
     assert one.model is not None
     exposed = SHEET.expose(1)[0]
-    frame = posterior_of(one.model, RIG, exposed).observe(Observer(RIG).observe(frame_set(exposed, 1)))
+    frame = frame_posterior_of(one.model, RIG, exposed, exposed)
     return frame, step.estimate.theta
 
 

@@ -7,6 +7,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from abs_service.tracker.memo import Memo
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.perspective import project_with_jacobian
 from abs_service.tracker.terms.depth.outline.rim import Edges, LocatedEdges, OutlineImage, by_side, chain
@@ -58,7 +59,7 @@ class ObservedRimOutline:
     doubtful: NDArray[np.bool_]
     kernel: Callable[..., None]
     classes: bytes = b""
-    located: dict[Surface, LocatedEdges] = field(default_factory=dict)
+    located: Memo[Surface, LocatedEdges] = field(default_factory=Memo[Surface, LocatedEdges])
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
         """Cost (population,) of every deformed mesh."""
@@ -113,9 +114,7 @@ class ObservedRimOutline:
 
     def _locate(self, surface: Surface) -> LocatedEdges:
         """The free edges of a population of one."""
-        if surface not in self.located:
-            self.located[surface] = self.image.locate(self.edges, surface)
-        return self.located[surface]
+        return self.located.get(surface, partial(self.image.locate, self.edges))
 
     def _displacement(self, edges: LocatedEdges, known: NDArray[np.bool_]) -> float:
         """The larger of `displacement` and `motion` [m] of free edges, of which some (k,) are known."""

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.pairing.images import Window
+from abs_service.tracker.memo import Memo
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.synthesis.perspective import project_with_jacobian
 from abs_service.tracker.synthesis.projection import Projection
@@ -110,7 +111,7 @@ class RimOutline:
             doubtful=doubtful,
             kernel=self._kernel,
             classes=self._of_vertices(predicted.vertices.shape[2], is_cut),
-            located={predicted: located},
+            located=Memo({predicted: located}),
         )
 
     def _covered(self, is_cut: NDArray[np.bool_]) -> Edges:

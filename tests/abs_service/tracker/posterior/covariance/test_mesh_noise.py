@@ -11,9 +11,8 @@ from abs_service.tracker.models import nurbs
 from abs_service.tracker.models.base import SparseJacobian
 from abs_service.tracker.posterior.covariance.mesh_noise import uncorrected_variance
 from abs_service.tracker.terms.linearization import stack
-from abs_service.tracking.observer import Observer
 from tests.abs_service.tracker.scenes import CAMERA, plane_distance, sheet
-from tests.abs_service.tracking.driving import frame_set, posterior_of
+from tests.abs_service.tracking.driving import frame_posterior_of
 from tests.abs_service.tracking.test_session import RIG, SHEET, drive, tracking
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -53,8 +52,7 @@ def test_the_search_answers_each_vertex_s_own_error_as_it_answers_a_motion_of_it
     *_, step = drive(one, SHEET, [0, 1])
     assert one.model is not None
     model, theta, exposed = one.model, step.estimate.theta, SHEET.expose(1)[0]
-    posterior = posterior_of(model, RIG, exposed)
-    frame = posterior.observe(Observer(RIG).observe(frame_set(exposed, 1)))
+    frame = frame_posterior_of(model, RIG, exposed, exposed)
     offsets = np.random.default_rng(1).normal(0, 1e-3, step.estimate.vertices.shape)
     surface, n = model.deform(theta[None]), len(offsets)
     single = np.zeros((n, 3, n))
