@@ -10,6 +10,7 @@ from abs_service.pairing.synchroniser import Synchroniser
 from abs_service.tracker.detection.templates import first_image
 from abs_service.tracker.detection.templates.base import BindsToMesh
 from abs_service.tracker.measurements import measurement
+from abs_service.tracker.models.base import HasOffsets
 from abs_service.tracking.observer import streams
 from abs_service.tracking.plan import Plan
 from calib.camera import Camera
@@ -39,7 +40,8 @@ def plan(config: ServiceConfig, tracker: str) -> Plan:
             f"trackers.{tracker}.sensors = {list(table.sensors)} must contain "
             f'the sensor of the tracker\'s reference, "{reference}"'
         )
-    if table.vertex_offsets.random_walk and not getattr(table.model, "has_offsets", False):
+    has_offsets = isinstance(table.model, HasOffsets)
+    if table.vertex_offsets.random_walk and not has_offsets:
         raise PlanError(
             f"trackers.{tracker}.vertex_offsets.random_walk = {table.vertex_offsets.random_walk:g} "
             f'needs a model whose vertices have offsets, such as "nurbs", not "{model_name(config, tracker)}"; '

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol, runtime_checkable
+from typing import Literal, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,6 +80,16 @@ class HasDerived(Protocol):
     @property
     def derived(self) -> Mapping[str, tuple[float, ...]]:
         """These numbers, as they are in use, by key."""
+        ...
+
+
+@runtime_checkable
+class HasOffsets(Protocol):
+    """Settings of a model whose vertices have offsets, which can be learnt (`vertex_offsets` of a tracker)."""
+
+    @property
+    def has_offsets(self) -> Literal[True]:
+        """True."""
         ...
 
 

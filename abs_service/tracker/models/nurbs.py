@@ -40,8 +40,7 @@ class Settings:
             object with limbs or steps that the surface could not follow without bending too sharply.
     """
 
-    #: The vertices of the model have offsets, which can be learnt (`vertex_offsets` of a tracker).
-    has_offsets: ClassVar[bool] = True
+    has_offsets: ClassVar[Literal[True]] = True
 
     control_points: Literal["auto"] | tuple[ControlPoints, ControlPoints] = "auto"
     degree: Literal["auto"] | Annotated[int, Interval(ge=1, le=4)] = "auto"

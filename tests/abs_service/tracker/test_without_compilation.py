@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.abs_service.tracker.random_vertices import INTERPRETED
+from tests.abs_service.tracker.synthesis.random_vertices import INTERPRETED
 
 HERE = Path(__file__).parent
 FILES = (HERE / "synthesis" / "test_sparse_kernels.py", HERE / "terms" / "depth" / "test_cost_kernels.py")

@@ -12,13 +12,13 @@ from calib import pose
 from calib.camera import Camera
 from calib.lenses.lens import Lens
 from tests import reference
-from tests.abs_service.tracker.random_vertices import decided, few, scattered, seeds, undecided
 from tests.abs_service.tracker.scenes import (
     CAMERA,
     FISHEYE,
     as_surface,
     seen,
 )
+from tests.abs_service.tracker.synthesis.random_vertices import decided, few, scattered, seeds, undecided
 
 
 @few

@@ -11,8 +11,8 @@ from abs_service.tracker.models.nurbs import Settings as Nurbs
 from abs_service.tracker.posterior.priors.edge_runs import EdgeRuns
 from abs_service.tracker.posterior.priors.stretch_prior import StretchPrior
 from tests import reference
-from tests.abs_service.tracker.random_vertices import few, seeds
 from tests.abs_service.tracker.scenes import as_surface, sheet
+from tests.abs_service.tracker.synthesis.random_vertices import few, seeds
 
 
 def grid_with_holes(generator: np.random.Generator, rows: int, columns: int, share: float) -> Mesh:

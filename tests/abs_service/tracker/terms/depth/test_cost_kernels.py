@@ -18,7 +18,6 @@ from calib.noise.images.color import GaussianColor
 from calib.noise.structured_light import StructuredLight
 from calib.rig import Rig, Sensor
 from tests import reference
-from tests.abs_service.tracker.random_vertices import decided, few, seeds
 from tests.abs_service.tracker.scenes import (
     CAMERA,
     as_surface,
@@ -28,6 +27,7 @@ from tests.abs_service.tracker.scenes import (
     sheet,
     sparse,
 )
+from tests.abs_service.tracker.synthesis.random_vertices import decided, few, seeds
 
 SHARE, RANGE_M = 0.05, 5.0
 

@@ -19,8 +19,8 @@ from calib.noise.images.grey import GaussianGrey
 from calib.noise.images.intensity import GaussianIntensity
 from calib.rig import Rig, Sensor
 from tests import reference
-from tests.abs_service.tracker.random_vertices import decided
 from tests.abs_service.tracker.scenes import CAMERA, as_surface, in_sight, observation, sheet, sparse
+from tests.abs_service.tracker.synthesis.random_vertices import decided
 
 SHARE = 0.05
 seeds = st.integers(0, 2**32 - 1)

@@ -13,8 +13,8 @@ from calib.noise.images.bayer import GaussianBayer
 from calib.noise.images.grey import GaussianGrey
 from calib.rig import Sensor
 from tests import reference
-from tests.abs_service.tracker.random_vertices import decided
 from tests.abs_service.tracker.scenes import CAMERA, as_surface, sparse
+from tests.abs_service.tracker.synthesis.random_vertices import decided
 
 GENERATOR_SEED = 5
 

@@ -24,8 +24,8 @@ from calib.noise.images.bayer import GaussianBayer
 from calib.noise.images.color import GaussianColor
 from calib.rig import Rig, Sensor
 from tests import reference
-from tests.abs_service.tracker.random_vertices import decided
 from tests.abs_service.tracker.scenes import CAMERA, as_surface, in_sight, sheet, sparse
+from tests.abs_service.tracker.synthesis.random_vertices import decided
 from tests.abs_service.tracking.driving import TrackingSession, default_plan, drive, mean_errors, rig_of, simulate
 
 SHARE = 0.05
