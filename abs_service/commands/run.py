@@ -34,9 +34,10 @@ from abs_service.recording.disk import folder
 from abs_service.supervision.children import forked
 from abs_service.supervision.children.child import Child
 from abs_service.supervision.children.child_process import ChildProcess, Process, Spawn
+from abs_service.supervision.display import Display
 from abs_service.supervision.exit_codes import Exit
 from abs_service.supervision.health import metrics, systemd
-from abs_service.supervision.health.rig_view import Display
+from abs_service.supervision.health.rig_view import RigPlaces
 from abs_service.supervision.limits import Limits
 from abs_service.supervision.process_setup import log_lines
 from abs_service.supervision.repeats import Tracebacks
@@ -98,11 +99,11 @@ def run(arguments: argparse.Namespace) -> int:
         starts = starting(display, arguments)
         processes = children(rig, file.path, page, arguments.connect)
         supervisor = Supervisor(processes, starts, time.monotonic_ns, limits(rig))
-        about = (rig.name, rig.bus.endpoint, rig.record.directory)
+        places = RigPlaces(rig.name, rig.bus.endpoint, rig.record.directory, captured_at=arguments.connect)
         notifier = systemd.notifier(os.environ)
         watchers = (notifier.update, measure, lambda _: forked.ensure_running())
         clock = WallClock()
-        session = RunSession(bus, *about, rig.trackers, supervisor, display, clock, watchers, arguments.connect)
+        session = RunSession(bus, places, rig.trackers, supervisor, display, clock, watchers)
         session.answer_reloads(partial(renewal, file, arguments, page))
         rig_process.on_hangup(session.reload, stop)
         try:

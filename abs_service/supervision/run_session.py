@@ -1,10 +1,8 @@
 """One run of a rig: passes messages to the display and heartbeats to the supervisor."""
 
-import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, replace
 from pathlib import Path
 from queue import SimpleQueue
 
@@ -15,10 +13,11 @@ from abs_service.bus.queues import LatestQueue
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.bus.zenoh_session.pools import EndedPools
 from abs_service.supervision.children.child import PROCESS, Child, ChildState
+from abs_service.supervision.display import Display
 from abs_service.supervision.health import rig_state
-from abs_service.supervision.health.rig_view import Display, RigView
+from abs_service.supervision.health.rig_view import RigPlaces, RigView
+from abs_service.supervision.health.tracker_silence import TrackerSilence
 from abs_service.supervision.supervisor import Supervisor
-from abs_service.tracking.monitors.silence_monitor import SilenceMonitor
 from abs_service.wire import commands
 from abs_service.wire.checked_bus import CheckedBus
 from abs_service.wire.sole_publishers import SolePublishers
@@ -70,41 +69,36 @@ class RunSession:
 
     Args:
         bus: of the rig.
-        rig: its name.
-        endpoint: where applications connect, for people to read.
-        directory: folder of the recordings, for people to read.
+        rig: its name and places, for people to read.
         trackers: names of the trackers.
         supervisor: of the processes.
         display: shows the state.
         clock: time.
         watchers: see the state as often as the display does.
-        captured_at: endpoint of the host that captures; "" if this one does.
     """
 
     def __init__(
         self,
         bus: CheckedBus,
-        rig: str,
-        endpoint: str,
-        directory: Path,
+        rig: RigPlaces,
         trackers: Iterable[str],
         supervisor: Supervisor,
         display: Display,
         clock: WallClock,
         watchers: Sequence[Callable[[RigView], None]] = (),
-        captured_at: str = "",
     ) -> None:
-        self._bus, self._rig, self._endpoint, self._directory = bus, rig, endpoint, directory
-        # Before the first estimate, the tracker itself says why there is none.
-        trackers = tuple(trackers)
-        self._monitor = partial(SilenceMonitor, clock.monotonic, math.inf)
-        self._silence_monitors = {keys.state(name): self._monitor() for name in trackers}
+        self._bus = bus
+        self._rig = rig
+        self._supervisor = supervisor
+        self._display = display
+        self._clock = clock
+        self._watchers = watchers
         self._renewals: SimpleQueue[Renewal] = SimpleQueue()
-        self._supervisor, self._display, self._clock = supervisor, display, clock
-        self._watchers, self._captured_at = watchers, captured_at
         self._begin_ns = self._queried_ns = clock.monotonic()
+        trackers = tuple(trackers)
+        self._silence = TrackerSilence(trackers, clock.monotonic)
         self._live = rig_state.RigState(trackers, clock.monotonic)
-        self._headers = HeaderFactory(rig, clock)
+        self._headers = HeaderFactory(rig.name, clock)
         self._health = Health(bus, "run", self._headers)
         bus.declare_liveliness("run")
         self._pools = EndedPools(clock.monotonic)
@@ -143,7 +137,7 @@ class RunSession:
             self._supervisor.poll()
             self._pools.update(self._supervisor.processes())
             self._report()
-            self._report_silence()
+            self._silence.report(self._health)
             self._listen(PERIOD_S)
             self._request_missing_topologies()
 
@@ -164,8 +158,6 @@ class RunSession:
         """Snapshot of the rig."""
         return RigView(
             rig=self._rig,
-            endpoint=self._endpoint,
-            directory=self._directory,
             live=self._live,
             children=tuple(self._supervisor.children.values()),
             elapsed_s=self.elapsed_s,
@@ -173,8 +165,7 @@ class RunSession:
             host_clock=self._headers.host_clock,
             refused=self._bus.trouble,
             rivals=self._publishers.trouble,
-            captured_at=self._captured_at,
-            silent={key.partition("/")[0]: one.found for key, one in self._silence_monitors.items() if one.found},
+            silent=self._silence.found,
         )
 
     def _listen(self, seconds: float) -> None:
@@ -190,25 +181,22 @@ class RunSession:
 
     def _renew(self, renewal: Renewal) -> None:
         """Starts some processes again with another configuration; the others go on, capture with what it publishes."""
-        self._directory = renewal.directory
+        self._rig = replace(self._rig, directory=renewal.directory)
         known = self._supervisor.children.keys()
         self._supervisor.exchange(renewal.children)
         names = [child.component for child in renewal.children if child.component.startswith("track/")]
         trackers = [name.removeprefix("track/") for name in names]
         self._live.follow(trackers)
-        monitors = self._silence_monitors
-        self._silence_monitors = {topic: monitors.get(topic) or self._monitor() for topic in map(keys.state, trackers)}
+        gone = self._silence.follow(trackers)
         for component in renewal.ends:
             self._health.label(f"{PROCESS}{component}", "")
-        for topic in (*renewal.ends, *(monitors.keys() - self._silence_monitors.keys())):
+        for topic in (*renewal.ends, *map(keys.state, gone)):
             self._health.report(topic, Level.OK)
         if "capture" in known - set(renewal.components):  # not if another host captures
             self._supervisor.children["capture"].process.wake()
         for component in [one for one in renewal.starts if one in known]:
             self._supervisor.renew(component)
-            topic = keys.state(component.removeprefix("track/"))
-            if topic in self._silence_monitors:
-                self._silence_monitors[topic] = self._monitor()
+            self._silence.restart(component.removeprefix("track/"))
 
     def _request_missing_topologies(self) -> None:
         """Queries topologies that the network dropped: each is sent once, and errors cannot be computed without."""
@@ -222,17 +210,10 @@ class RunSession:
     def _take(self, topic: str, sample: Sample) -> None:
         for report in self._live.take(sample):
             self._display.estimate(report)
-        if topic in self._silence_monitors:
-            self._silence_monitors[topic].add()
+        self._silence.received(topic)
         if topic.startswith("health/"):
             component = topic.removeprefix("health/")
             self._supervisor.heartbeat(component, busy=self._live.prepares(component))
-
-    def _report_silence(self) -> None:
-        for topic, monitor in self._silence_monitors.items():
-            silence = monitor.check()
-            level = Level.ERROR if silence else Level.OK
-            self._health.report(topic, level, silence and f"track/{topic.partition('/')[0]}: {silence}")
 
     def _report(self) -> None:
         for child in self._supervisor.children.values():

@@ -12,7 +12,7 @@ from abs_service.display.terminal.journal import JournalDisplay
 from abs_service.display.terminal.lines import JsonDisplay, PlainDisplay
 from abs_service.display.terminal.output import Background
 from abs_service.display.terminal.table import TableDisplay
-from abs_service.supervision.health.rig_view import Display
+from abs_service.supervision.display import Display
 
 
 @contextmanager

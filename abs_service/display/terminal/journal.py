@@ -12,7 +12,8 @@ from collections.abc import Callable, Mapping
 
 from absmsg.v1.health_pb2 import Health
 
-from abs_service.supervision.health.rig_view import Display, RigView
+from abs_service.supervision.display import Display
+from abs_service.supervision.health.rig_view import RigView
 from abs_service.supervision.process_setup import log_lines
 from abs_service.supervision.repeats import Repeats
 
@@ -40,7 +41,7 @@ class JournalDisplay(Display):
 
     def update(self, view: RigView) -> None:
         """See `Display`."""
-        self._rig = view.rig
+        self._rig = view.rig.name
         if view.now_ns < self._next_ns:
             return
         self._now_ns = view.now_ns

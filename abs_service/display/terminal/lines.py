@@ -4,7 +4,8 @@ import json
 from contextlib import suppress
 
 from abs_service.display.terminal.output import Output
-from abs_service.supervision.health.rig_view import Display, RigView, size
+from abs_service.supervision.display import Display
+from abs_service.supervision.health.rig_view import RigView, size
 from abs_service.tracking.log.tracker_log import EstimateReport
 
 PERIOD_NS = 1_000_000_000

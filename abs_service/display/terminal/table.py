@@ -14,7 +14,8 @@ from rich.text import Text
 
 from abs_service.display.terminal.output import Output
 from abs_service.supervision.children.child import ChildState
-from abs_service.supervision.health.rig_view import Display, RigView, size
+from abs_service.supervision.display import Display
+from abs_service.supervision.health.rig_view import RigView, size
 from abs_service.tracking.log.tracker_log import EstimateReport, TrackerLog
 
 #: Time between two tables [ns].
@@ -91,7 +92,9 @@ def _level(level: int) -> str:
 def _head(view: RigView) -> Text:
     minutes, seconds = divmod(int(view.elapsed_s), 60)
     return Text.assemble(
-        (f" {view.rig}", "bold"), f"   {minutes:02d}:{seconds:02d}   applications connect to ", (view.endpoint, "cyan")
+        (f" {view.rig.name}", "bold"),
+        f"   {minutes:02d}:{seconds:02d}   applications connect to ",
+        (view.rig.endpoint, "cyan"),
     )
 
 

@@ -64,7 +64,9 @@ class _Snapshot:
         """Takes the numbers if the period is over."""
         if view.now_ns >= self._next_ns:
             self._next_ns = view.now_ns + PERIOD_NS
-            self._rows = [(name, text, {"rig": view.rig, **labels}, value) for name, text, labels, value in rows(view)]
+            self._rows = [
+                (name, text, {"rig": view.rig.name, **labels}, value) for name, text, labels, value in rows(view)
+            ]
 
     def collect(self) -> "Iterator[CounterMetricFamily | GaugeMetricFamily]":
         """Called by prometheus-client for each request."""

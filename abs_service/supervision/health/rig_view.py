@@ -3,14 +3,12 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Protocol, Self
 
 from absmsg.v1.health_pb2 import Health
 
 from abs_service.bus import keys
 from abs_service.supervision.children.child import Child, ChildState
 from abs_service.supervision.health.rig_state import Received, RigState
-from abs_service.tracking.log.tracker_log import EstimateReport
 
 #: Time without health of a component, which is due once a second, after which its numbers are out of date [ns].
 SILENT_NS = 5_000_000_000
@@ -43,14 +41,29 @@ class Recording:
     forecast: str
 
 
+@dataclass(frozen=True, slots=True)
+class RigPlaces:
+    """Name of a rig, and where it is found.
+
+    Attributes:
+        name: of the rig.
+        endpoint: where applications connect.
+        directory: folder of the recordings.
+        captured_at: endpoint of the host that captures; "" if this one does.
+    """
+
+    name: str
+    endpoint: str = ""
+    directory: Path = field(default_factory=Path)
+    captured_at: str = ""
+
+
 @dataclass(frozen=True)
 class RigView:
     """Snapshot of a running rig.
 
     Attributes:
-        rig: its name.
-        endpoint: where applications connect.
-        directory: folder of the recordings.
+        rig: its name and places.
         live: current state of the rig.
         children: the processes.
         elapsed_s: time since the start.
@@ -58,13 +71,10 @@ class RigView:
         host_clock: which host's clock that is, see `drivers.contract.host_clock`; ages on others are not shown.
         refused: messages that this process did not take, in words.
         rivals: topics that another process publishes, too, in words.
-        captured_at: endpoint of the host that captures; "" if this one does.
         silent: for how long there has been no estimate, in words, by each tracker of which that is too long.
     """
 
-    rig: str
-    endpoint: str
-    directory: Path
+    rig: RigPlaces
     live: RigState
     children: Sequence[Child]
     elapsed_s: float
@@ -72,7 +82,6 @@ class RigView:
     host_clock: str
     refused: str = ""
     rivals: str = ""
-    captured_at: str = ""
     silent: Mapping[str, str] = field(default_factory=dict)
 
     @property
@@ -106,7 +115,7 @@ class RigView:
         if not health.labels.get("file"):
             return None
         return Recording(
-            file=self.directory / Path(health.labels["file"]).name.removesuffix(".active"),
+            file=self.rig.directory / Path(health.labels["file"]).name.removesuffix(".active"),
             size=int(health.gauges.get("file_bytes", 0)),
             rate=self.live.received["record"].rate("file_bytes"),
             files=counters["files"],
@@ -144,9 +153,9 @@ class RigView:
         """For how long nothing has come from the host that captures, in words; "" if it speaks, or is this one."""
         last_ns = self.live.received.get("capture", Received()).t_ns
         silent_s = min((self.now_ns - last_ns) * 1e-9, self.elapsed_s)
-        if not self.captured_at or silent_s * 1e9 < SILENT_NS:
+        if not self.rig.captured_at or silent_s * 1e9 < SILENT_NS:
             return ""
-        return f"nothing comes from capture --listen at {self.captured_at}, for {silent_s:.0f} s"
+        return f"nothing comes from capture --listen at {self.rig.captured_at}, for {silent_s:.0f} s"
 
     @property
     def activity(self) -> str:
@@ -155,8 +164,8 @@ class RigView:
             compiled = self.live.compiled()
             return f"Compiling kernels for this rig: {compiled} …" if compiled else "Loading kernels …"
         if "capture" not in self.live.received:
-            elsewhere = f"Waiting for capture --listen of {self.rig} at {self.captured_at} …"
-            return elsewhere if self.captured_at else "Starting the processes …"
+            elsewhere = f"Waiting for capture --listen of {self.rig.name} at {self.rig.captured_at} …"
+            return elsewhere if self.rig.captured_at else "Starting the processes …"
         if any(tracker.last is None for tracker in self.live.trackers.values()):
             return "Waiting for the first estimate …"
         return ""
@@ -189,35 +198,6 @@ class RigView:
                 age_ms = (self.now_ns - t_host_ns) * 1e-6
                 ages[sensor] = min(age_ms, ages.get(sensor, age_ms))
         return ages
-
-
-class Display(Protocol):
-    """Shows a running rig. Used in a `with` statement; after it, the terminal is restored.
-
-    A class that inherits from it ignores what it does not override.
-    """
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        return
-
-    def update(self, view: RigView) -> None:
-        """Shows the current state; called some twenty times a second."""
-        return
-
-    def estimate(self, report: EstimateReport) -> None:
-        """Shows one estimate."""
-        return
-
-    def note(self, text: str) -> None:
-        """Shows a message once. May be called from any thread."""
-        ...
-
-    def close(self, view: RigView) -> int:
-        """Shows the summary; returns the number of lines that a program was to read and that are lost."""
-        ...
 
 
 def dropped(counters: Mapping[str, int]) -> int:

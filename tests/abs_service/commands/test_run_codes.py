@@ -1,7 +1,5 @@
 """The exit code of `run` says whether its recordings are complete, and whether anything was tracked."""
 
-from pathlib import Path
-
 import pytest
 from absmsg.v1.common_pb2 import Header
 from absmsg.v1.deformation_state_pb2 import DeformationState
@@ -13,7 +11,7 @@ from abs_service.commands.running import outcome
 from abs_service.supervision.children.child import Child, ChildState
 from abs_service.supervision.exit_codes import Exit
 from abs_service.supervision.health.rig_state import RigState
-from abs_service.supervision.health.rig_view import RigView
+from abs_service.supervision.health.rig_view import RigPlaces, RigView
 from abs_service.tracking.log.tracker_log import TrackerLog
 
 
@@ -24,7 +22,7 @@ def view(code, *failures):
         said = Health(component="record", header=Header(boot_id=str(boot)), counters={"failures": number})
         live.take(Sample(keys.health("record"), Health.DESCRIPTOR.full_name, said.SerializeToString()))
     ended = Child("record", (), 0, ChildState.STOPPED, worst_code=code)
-    return RigView("bench", "", Path(), live, [ended], 0.0, 0, "")
+    return RigView(RigPlaces("bench"), live, [ended], 0.0, 0, "")
 
 
 @pytest.mark.parametrize(("code", "expected"), [(0, Exit.OK), (1, Exit.FAILED), (137, Exit.FAILED)])

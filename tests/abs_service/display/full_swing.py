@@ -6,7 +6,7 @@ from absmsg.v1.health_pb2 import Health
 
 from abs_service.bus.contract import Sample
 from abs_service.supervision.children.child import Child, ChildState
-from abs_service.supervision.health.rig_view import RigView
+from abs_service.supervision.health.rig_view import RigPlaces, RigView
 from abs_service.tracking.log.tracker_log import EstimateReport
 from tests.abs_service.supervision.children.idle_process import Idle
 
@@ -75,9 +75,7 @@ def view(live, **changes):
     ]
     children[0].process = Idle()
     fields = {
-        "rig": "demo",
-        "endpoint": "tcp/127.0.0.1:7447",
-        "directory": Path("/takes"),
+        "rig": RigPlaces("demo", "tcp/127.0.0.1:7447", Path("/takes")),
         "live": live,
         "children": children,
         "elapsed_s": 83.4,

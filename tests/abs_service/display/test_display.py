@@ -13,13 +13,13 @@ from abs_service.display.terminal.lines import JsonDisplay, PlainDisplay, line
 from abs_service.display.terminal.output import Output
 from abs_service.display.terminal.table import TableDisplay
 from abs_service.supervision.health.rig_state import RigState
-from abs_service.supervision.health.rig_view import size
+from abs_service.supervision.health.rig_view import RigPlaces, size
 from tests.abs_service.display.full_swing import Clock, S, recorder, report, take_health, view
 
 
 def test_the_summary_lists_images_estimates_errors_losses_file_and_restarts(live, tmp_path):
     (tmp_path / "demo_2026.mcap").touch()
-    assert view(live, directory=tmp_path).summary() == [
+    assert view(live, rig=RigPlaces("demo", directory=tmp_path)).summary() == [
         "83.4 s, 60 images, 4 dropped",
         "sheet: 12 estimates, 3 frame sets skipped, 17.3 ms each, 12 TRACKING",
         "sheet: vertex error mean 2.35 mm, max 2.35 mm; surface error mean 0.99 mm, max 0.99 mm",
@@ -32,9 +32,11 @@ def test_the_summary_says_what_there_is_of_a_recording_that_failed(live, tmp_pat
     failed = recorder(2_000_000)
     failed.counters["failures"], failed.labels["last_failure"] = 2, "No space left on device"
     take_health(live, failed)
-    assert f"{tmp_path}/demo_2026.mcap (is gone): 2.0 MB" in "\n".join(view(live, directory=tmp_path).summary())
+    assert f"{tmp_path}/demo_2026.mcap (is gone): 2.0 MB" in "\n".join(
+        view(live, rig=RigPlaces("demo", directory=tmp_path)).summary()
+    )
     (tmp_path / "demo_2026.mcap.active").touch()
-    summary = "\n".join(view(live, directory=tmp_path).summary())
+    summary = "\n".join(view(live, rig=RigPlaces("demo", directory=tmp_path)).summary())
     assert f"{tmp_path}/demo_2026.mcap.active (unfinished: `abs-service recover` completes it): 2.0 MB" in summary
     assert "recording failed 2×, last: No space left on device" in summary
 
@@ -44,7 +46,11 @@ def test_the_summary_counts_all_processes_of_a_component_that_was_started_again(
     again.header.boot_id = "another process"
     take_health(live, again)
     take_health(live, again)  # once a second
-    assert view(live, directory=tmp_path).summary()[3].endswith("1.0 MB; 2 files, 1000 messages, 6 dropped")
+    assert (
+        view(live, rig=RigPlaces("demo", directory=tmp_path))
+        .summary()[3]
+        .endswith("1.0 MB; 2 files, 1000 messages, 6 dropped")
+    )
 
 
 def test_two_living_processes_of_a_component_are_counted_once_each(live, tmp_path):
@@ -53,7 +59,9 @@ def test_two_living_processes_of_a_component_are_counted_once_each(live, tmp_pat
     for _ in range(5):  # once a second, in turn
         take_health(live, other)
         take_health(live, own)
-    assert view(live, directory=tmp_path).summary()[3].endswith("2 files, 1000 messages, 6 dropped")
+    assert (
+        view(live, rig=RigPlaces("demo", directory=tmp_path)).summary()[3].endswith("2 files, 1000 messages, 6 dropped")
+    )
 
 
 def test_the_processes_of_months_are_counted_and_few_are_kept(live):

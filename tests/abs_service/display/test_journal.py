@@ -4,7 +4,6 @@ import os
 import socket
 import sys
 from functools import partial
-from pathlib import Path
 
 import pytest
 from absmsg.v1.health_pb2 import Health
@@ -13,7 +12,7 @@ from abs_service.bus.contract import Sample
 from abs_service.display.terminal import choice, journal
 from abs_service.supervision.children.child import Child, ChildState
 from abs_service.supervision.health.rig_state import RigState
-from abs_service.supervision.health.rig_view import RigView
+from abs_service.supervision.health.rig_view import RigPlaces, RigView
 from abs_service.supervision.process_setup import log_lines
 from abs_service.tracking.log.tracker_log import EstimateReport
 
@@ -52,7 +51,7 @@ class Journal:
         self.live.trackers["sheet"].last = report
 
     def view(self, second):
-        return RigView("lab", "", Path(), self.live, [self.child], second, int(second * S), "")
+        return RigView(RigPlaces("lab"), self.live, [self.child], second, int(second * S), "")
 
     def entries(self, second=0.0):
         """Journal entries written at this time of the rig, without the fields that all entries share."""

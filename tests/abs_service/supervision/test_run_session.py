@@ -17,6 +17,7 @@ from abs_service.display.terminal.output import Output
 from abs_service.supervision.children.child import Child
 from abs_service.supervision.exit_codes import Exit
 from abs_service.supervision.health import rig_view
+from abs_service.supervision.health.rig_view import RigPlaces
 from abs_service.supervision.limits import Limits
 from abs_service.supervision.run_session import Renewal, RunSession
 from abs_service.supervision.supervisor import Supervisor
@@ -58,14 +59,11 @@ class Bench:
         self.supervisor = Supervisor(children, self._spawn, time.monotonic_ns, limits)
         self.session = RunSession(
             CheckedBus(self.bus, time.monotonic_ns),
-            "bench",
-            "tcp/127.0.0.1:1",
-            Path(),
+            RigPlaces("bench", "tcp/127.0.0.1:1", captured_at=captured_at),
             trackers,
             self.supervisor,
             display,
             WallClock(),
-            captured_at=captured_at,
         )
 
     def _spawn(self, component, _):
@@ -166,7 +164,7 @@ def test_what_a_new_configuration_concerns_starts_again_and_capture_is_told():
     assert (bench.killed, capture.woken) == (["record"], 1)
     assert bench.supervisor.children["capture"].process is capture
     assert bench.supervisor.children["record"].process is not record
-    assert bench.session.view().directory == Path("other")
+    assert bench.session.view().rig.directory == Path("other")
 
 
 def test_the_processes_are_stopped_also_when_the_output_is_closed():

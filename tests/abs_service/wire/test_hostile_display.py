@@ -4,7 +4,6 @@ import io
 import itertools
 import math
 import time
-from pathlib import Path
 
 import pytest
 from absmsg.v1.deformation_state_pb2 import DeformationState
@@ -18,7 +17,8 @@ from abs_service.bus.stamps import WallClock
 from abs_service.display.terminal.lines import JsonDisplay, PlainDisplay
 from abs_service.display.terminal.output import Output
 from abs_service.display.terminal.table import draw
-from abs_service.supervision.health.rig_view import Display
+from abs_service.supervision.display import Display
+from abs_service.supervision.health.rig_view import RigPlaces
 from abs_service.supervision.run_session import RunSession
 from abs_service.supervision.supervisor import Supervisor
 from abs_service.wire.checked_bus import CheckedBus
@@ -74,9 +74,9 @@ class Run:
     def __init__(self):
         self.bus, self.shown = LoopbackBus(), Everything()
         supervisor = Supervisor([], lambda component, _: pytest.fail(component), time.monotonic_ns)
-        about = ("demo", "tcp/127.0.0.1:1", Path(), ["sheet"])
+        places = RigPlaces("demo", "tcp/127.0.0.1:1")
         checked = CheckedBus(self.bus, time.monotonic_ns)
-        self.session = RunSession(checked, *about, supervisor, self.shown, WallClock())
+        self.session = RunSession(checked, places, ["sheet"], supervisor, self.shown, WallClock())
 
     def take(self, *hostile):
         for one in hostile:

@@ -4,7 +4,7 @@ import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from abs_service.supervision.health.rig_view import Display
+from abs_service.supervision.display import Display
 from abs_service.supervision.process_setup import log_lines
 
 

@@ -6,7 +6,6 @@ import threading
 import urllib.error
 import urllib.request
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from absmsg.v1.health_pb2 import Health
@@ -15,7 +14,7 @@ from abs_service.bus.contract import Sample
 from abs_service.supervision.children.child import Child, ChildState
 from abs_service.supervision.health import metrics
 from abs_service.supervision.health.rig_state import RigState
-from abs_service.supervision.health.rig_view import RigView
+from abs_service.supervision.health.rig_view import RigPlaces, RigView
 from abs_service.tracking.log.tracker_log import EstimateReport
 
 S = 1_000_000_000
@@ -35,7 +34,7 @@ def view(now_ns=NOW_NS, **capture):
     log.last = EstimateReport("sheet", 1, "", "DEGRADED", (), (), (), None, None, None, 8.0, 20.0, 1, 1, 0)
     log.exposure_ns = {"tof": NOW_NS - S // 4}
     children = [Child("record", (), 1, ChildState.RUNNING, restarts=2)]
-    return RigView("demo", "", Path(), live, children, 1.0, now_ns, "")
+    return RigView(RigPlaces("demo"), live, children, 1.0, now_ns, "")
 
 
 @pytest.fixture

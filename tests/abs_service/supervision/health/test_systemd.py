@@ -5,7 +5,6 @@ import signal
 import socket
 from collections.abc import Iterator
 from contextlib import suppress
-from pathlib import Path
 
 import pytest
 from absmsg.v1.health_pb2 import Health
@@ -15,7 +14,7 @@ from abs_service.supervision.children.child import Child
 from abs_service.supervision.exit_codes import Exit
 from abs_service.supervision.health import systemd
 from abs_service.supervision.health.rig_state import RigState
-from abs_service.supervision.health.rig_view import RigView
+from abs_service.supervision.health.rig_view import RigPlaces, RigView
 from abs_service.tracking.log.tracker_log import EstimateReport
 
 S = 1_000_000_000
@@ -52,7 +51,7 @@ class Manager:
     def after(self, seconds):
         """Messages sent until then, without the status texts."""
         self.now_ns += int(seconds * S)
-        self.notifier.update(RigView("demo", "", Path(), self.live, self.children, 0.0, self.now_ns, ""))
+        self.notifier.update(RigView(RigPlaces("demo"), self.live, self.children, 0.0, self.now_ns, ""))
         return [message for message in self.received() if not message.startswith("STATUS=")]
 
     def close(self):
@@ -152,15 +151,15 @@ def test_systemd_hears_in_words_what_happens(start):
     manager = start("sheet")
     manager.says("track/sheet", labels={"phase": "preparing", "kernels": "3 of 31"})
     manager.after(0)
-    manager.notifier.update(RigView("demo", "", Path(), manager.live, (), 0.0, 2 * S, ""))
+    manager.notifier.update(RigView(RigPlaces("demo"), manager.live, (), 0.0, 2 * S, ""))
     assert manager.received() == []  # said already
     manager.estimates("sheet", "DEGRADED")
     manager.says("capture")
     manager.says("track/sheet", level=Health.LEVEL_WARNING, message="DEGRADED:\nfew vertices")
-    manager.notifier.update(RigView("demo", "", Path(), manager.live, (), 0.0, 3 * S, ""))
+    manager.notifier.update(RigView(RigPlaces("demo"), manager.live, (), 0.0, 3 * S, ""))
     said = [message for message in manager.received() if message.startswith("STATUS=")]
     assert said == ["STATUS=sheet DEGRADED; track/sheet: DEGRADED: few vertices"]
-    silent = RigView("demo", "", Path(), manager.live, (), 0.0, 9 * S, "", silent={"sheet": "no estimate for 6 s"})
+    silent = RigView(RigPlaces("demo"), manager.live, (), 0.0, 9 * S, "", silent={"sheet": "no estimate for 6 s"})
     manager.notifier.update(silent)
     assert manager.received() == ["STATUS=sheet silent; track/sheet: DEGRADED: few vertices"]
     manager.notifier.stopping()
