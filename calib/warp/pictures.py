@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.camera import Camera
-from calib.warp.mesh import LARGEST_STEP_M, MeshWarp
+from calib.warp.mesh import MAX_STEP_M, MeshWarp
 
 #: Depth difference beyond which a point is occluded [m].
 HIDING_M = 0.02
@@ -16,10 +16,8 @@ HIDING_M = 0.02
 class PictureLookup:
     """Maps a camera's images into a view by means of the view's distances."""
 
-    def __init__(
-        self, view: Camera, camera: Camera, largest_step_m: float = LARGEST_STEP_M, hiding_m: float = HIDING_M
-    ):
-        self._warp = MeshWarp(view, camera, largest_step_m)
+    def __init__(self, view: Camera, camera: Camera, maximum_step_m: float = MAX_STEP_M, hiding_m: float = HIDING_M):
+        self._warp = MeshWarp(view, camera, maximum_step_m)
         self._ray_length = camera.lookup.ray_length
         self._hiding_m = hiding_m
 
@@ -42,7 +40,7 @@ class PictureLookup:
         # The rendered surface ends at its outermost pixel centres, so points beside a depth edge are checked
         # separately.
         around = np.asarray(cv2.erode(front, np.ones((3, 3), np.uint8)), np.float32)
-        nearest = np.minimum(front + self._hiding_m, around + max(self._hiding_m, self._warp.largest_step_m))
+        nearest = np.minimum(front + self._hiding_m, around + max(self._hiding_m, self._warp.maximum_step_m))
         with np.errstate(invalid="ignore"):
             visible = inside & (self._ray_length[row, column] / warped.points.inverse_z < nearest[row, column])
         return Sight(place, visible)

@@ -39,7 +39,7 @@ PLATE_AT_M, PLATE_RADIUS_M, PLATE_STEP = 0.6, 0.09, np.deg2rad(2)
 CURTAINS, CURTAIN_SIGMA = (0.0, 2.0, 4.0), 2e-3
 
 #: Distances beyond are no returns in the scene without a background [m].
-FARTHEST_M = 1.3
+MAX_DISTANCE_M = 1.3
 
 #: A sequence: its name, its scene, and what the sensor measures of a frame.
 SlidSheet = tuple[str, SheetScene, Callable[[SheetFrame], SheetFrame]]
@@ -123,7 +123,7 @@ def _as_it_is(frame: SheetFrame) -> SheetFrame:
 
 
 def _without_background(frame: SheetFrame) -> SheetFrame:
-    return replace(frame, distance=np.where(frame.distance > FARTHEST_M, np.float32(np.nan), frame.distance))
+    return replace(frame, distance=np.where(frame.distance > MAX_DISTANCE_M, np.float32(np.nan), frame.distance))
 
 
 def _without_last_columns(frame: SheetFrame) -> SheetFrame:

@@ -15,7 +15,7 @@ from absmsg.v1.deformed_mesh_pb2 import DeformedMesh, MeshTopology
 README = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
 
 #: Most characters in what one turn of a loop prints: two lines of a terminal.
-LONGEST = 320
+MAX_LENGTH = 320
 
 
 def test_ten_lines_say_why_nothing_is_tracked(capsys):
@@ -24,7 +24,7 @@ def test_ten_lines_say_why_nothing_is_tracked(capsys):
     printed = capsys.readouterr().out
     assert "INITIALIZING" in printed
     assert re.search(r"\('.+'", printed)
-    assert len(printed) < LONGEST
+    assert len(printed) < MAX_LENGTH
 
 
 def test_the_subscriber_prints_numbers_one_can_read(capsys, monkeypatch):
@@ -33,7 +33,7 @@ def test_the_subscriber_prints_numbers_one_can_read(capsys, monkeypatch):
     stale, tracking = capsys.readouterr().out.split("TRACKING")
     assert "STALE ('nothing was received',)" in stale
     assert "(287, 3)" in tracking
-    assert len(tracking) < LONGEST
+    assert len(tracking) < MAX_LENGTH
 
 
 def run(section: str, **given: Any) -> None:

@@ -1,5 +1,6 @@
 """The house's language: docstrings that state, and a glossary whose rows are complete."""
 
+import ast
 import io
 import re
 import tokenize
@@ -9,6 +10,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 FOLDERS = ("abs_service", "calib", "client", "drivers", "evaluation", "examples", "tests")
+SUPERLATIVES = {"largest", "longest", "farthest", "fewest", "least", "most", "smallest", "shortest", "widest"}
 QUESTION = re.compile(r'^ *"""(What|How|Where|Whether|Which|Why|When|Who)(ever|se)?\b.*', re.MULTILINE)
 
 
@@ -34,6 +36,30 @@ def test_names_use_the_standard_terms(folder):
         and {"heard", "told", "usual", "lately"} & set(token.string.lower().split("_"))
     }
     assert found == set()
+
+
+@pytest.mark.parametrize("folder", FOLDERS)
+def test_bounds_are_named_minimum_and_maximum(folder):
+    """Constants, arguments and fields; results such as the longest gap of a recording keep their words."""
+    found = {
+        f"{path.relative_to(ROOT)}: {name}"
+        for path in sorted((ROOT / folder).rglob("*.py"))
+        for name in bounds(ast.parse(path.read_text(encoding="utf-8")))
+        if SUPERLATIVES & set(name.lower().split("_"))
+    }
+    assert found == set()
+
+
+def bounds(module):
+    """Names that may be bounds: of constants, arguments and fields of classes."""
+    for node in ast.walk(module):
+        match node:
+            case ast.arg(arg=name):
+                yield name
+            case ast.Name(id=name, ctx=ast.Store()) if name.isupper():
+                yield name
+            case ast.AnnAssign(target=ast.Name(id=name)):
+                yield name
 
 
 def test_every_row_of_the_glossary_has_all_columns():

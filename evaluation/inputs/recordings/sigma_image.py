@@ -31,7 +31,7 @@ from drivers.o3r.buffers import SENSOR, O3rBuffers
 from evaluation.sequences import demo_plan
 
 #: Neighbouring pixels whose distances differ by more show different surfaces [m].
-LARGEST_STEP_M = 0.015
+MAX_STEP_M = 0.015
 #: Surfaces with fewer pixels are left out.
 MIN_PIXELS = 700
 #: One pixel in so many is hidden.
@@ -131,7 +131,7 @@ def _without(exposure: O3rExposure, hidden: NDArray[np.bool_]) -> O3rExposure:
 
 def _hidden(seen: O3rExposure, noise: DepthNoise, whole: O3rExposure) -> Iterator[Samples]:
     """Of every surface the pixels that the tracker did not see, with the mesh that it found as the true surface."""
-    labels = connected_surfaces(seen.frames[Kind.DEPTH].si(), LARGEST_STEP_M).labels
+    labels = connected_surfaces(seen.frames[Kind.DEPTH].si(), MAX_STEP_M).labels
     sizes = np.bincount(labels.ravel())
     distance, own = whole.image(Kind.DEPTH), whole.image(Kind.DEVIATION)
     unseen = ~np.isfinite(seen.image(Kind.DEPTH)) & np.isfinite(distance) & np.isfinite(own)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import ObservedView, Synthesis
 from abs_service.tracker.terms.base import Bounds, facing
-from abs_service.tracker.terms.depth.depth_cost import FREE_SCALE_M, Residuals, depth_cost, normalize
+from abs_service.tracker.terms.depth.depth_cost import FREE_SCALE_M, DepthResiduals, depth_cost, normalize
 from abs_service.tracker.terms.depth.fluctuation import Fluctuation
 from abs_service.tracker.terms.depth.outline.base import ObservedOutline
 from abs_service.tracker.terms.depth.pixel_classes import PixelClasses
@@ -24,7 +24,7 @@ from abs_service.tracker.terms.vertex_counts import VertexMasks
 MIN_FREE_M = 0.005
 
 #: A measurement that is farther from its vertex is no measurement of the object [m].
-LARGEST_MISFIT_M = 0.05
+MAX_MISFIT_M = 0.05
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,7 +60,7 @@ class ObservedDepth:
     fluctuation: Fluctuation
     scale: float
     is_surprised: bool
-    residuals: dict[Synthesis, Residuals] = field(default_factory=dict)
+    residuals: dict[Synthesis, DepthResiduals] = field(default_factory=dict)
     misfits: dict[Surface, NDArray[np.float64]] = field(default_factory=dict)
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
@@ -151,7 +151,7 @@ class ObservedDepth:
         residual, inverse, cost = self._residuals(seen)
         classes = self.classes.at(np.maximum(seen.pixel[0], 0))
         deviation = 1 / np.maximum(inverse, 1e-9)
-        signed = np.clip(residual * deviation, -LARGEST_MISFIT_M, LARGEST_MISFIT_M)
+        signed = np.clip(residual * deviation, -MAX_MISFIT_M, MAX_MISFIT_M)
         usable, measured = (seen.pixel[0] > 0) & ~classes.unknown, cost < np.inf
         distance = np.where(measured, signed, classes.free_m.astype(np.float64))
         return np.stack([distance, np.where(measured, deviation, 0.0)]) * usable
@@ -161,9 +161,9 @@ class ObservedDepth:
         distance, deviation = self.misfit(surface)
         self.fluctuation.update(distance, deviation / self.scale)
 
-    def _residuals(self, seen: Synthesis) -> Residuals:
+    def _residuals(self, seen: Synthesis) -> DepthResiduals:
         """Residuals of the samples of a population of one."""
         if seen not in self.residuals:
-            found = self.residuals[seen] = Residuals(*np.empty((3, seen.pixel.shape[1])))
+            found = self.residuals[seen] = DepthResiduals(*np.empty((3, seen.pixel.shape[1])))
             normalize(seen.pixel[0], seen.distance[0], self.texels.at(seen.pixel), found)
         return self.residuals[seen]

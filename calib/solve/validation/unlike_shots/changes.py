@@ -75,11 +75,11 @@ def of_focus(sensor: str, deviation: float) -> str:
     )
 
 
-def unseen(least: Mapping[str, float]) -> str:
+def unseen(hidden: Mapping[str, float]) -> str:
     """Sentence on the least changes of focal lengths [1] that would have shown, by sensor; "" without any."""
-    if not least:
+    if not hidden:
         return ""
-    sensor = max(least, key=lambda name: least[name])
-    of = f"the focal length of {sensor}" if len(least) > 1 else "its focal length"
-    size = f" of less than {max(least[sensor], 0.001):.1%}" if np.isfinite(least[sensor]) else ""
+    sensor = max(hidden, key=lambda name: hidden[name])
+    of = f"the focal length of {sensor}" if len(hidden) > 1 else "its focal length"
+    size = f" of less than {max(hidden[sensor], 0.001):.1%}" if np.isfinite(hidden[sensor]) else ""
     return f" A change of {of} half way{size} would not have shown."

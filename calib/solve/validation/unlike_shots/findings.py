@@ -78,16 +78,16 @@ def _contradicting(found: Sequence[Contradiction]) -> list[str]:
     ]
 
 
-def _scattered(solution: Solution, contradicting: Sequence[Contradiction], least_px: float) -> list[Scatter]:
-    found = scatter(solution, least_px)
+def _scattered(solution: Solution, contradicting: Sequence[Contradiction], minimum_px: float) -> list[Scatter]:
+    found = scatter(solution, minimum_px)
     if found and contradicting:  # a few wrong shots spoil the others until they are left out
-        found = _scatter_without({one.shot for one in contradicting}, solution, least_px)
+        found = _scatter_without({one.shot for one in contradicting}, solution, minimum_px)
     return found
 
 
-def _scatter_without(shots: Collection[int], solution: Solution, least_px: float) -> list[Scatter]:
+def _scatter_without(shots: Collection[int], solution: Solution, minimum_px: float) -> list[Scatter]:
     rest = solution.task.of_shots([shot for shot in solution.task.shots if shot not in shots])
     try:
-        return scatter(calibrate(rest), least_px)
+        return scatter(calibrate(rest), minimum_px)
     except ValueError:  # nor can the rest be calibrated
-        return scatter(solution, least_px)
+        return scatter(solution, minimum_px)

@@ -24,8 +24,8 @@ CASES = pytest.mark.parametrize("case", MODELS, ids=str)
 seeds = st.integers(0, 2**32 - 1)
 
 
-def vectors(largest: float) -> st.SearchStrategy[np.ndarray]:
-    return st.tuples(*[st.floats(-largest, largest)] * 3).map(np.array)
+def vectors(maximum: float) -> st.SearchStrategy[np.ndarray]:
+    return st.tuples(*[st.floats(-maximum, maximum)] * 3).map(np.array)
 
 
 def vertices_of(model: Nurbs, theta: np.ndarray) -> np.ndarray:
