@@ -39,7 +39,7 @@ class SequenceGaps:
         return gap
 
     def add_image(self, sample: Sample) -> None:
-        """As `add`, for an image, whose number is in its attachment."""
+        """Counts an image like `add`; its number is in the attachment."""
         with suppress(DecodeError):  # reported when it is decoded
             header = FrameInfo.FromString(sample.attachment).header
             self.add(sample.topic, header.boot_id, header.seq)

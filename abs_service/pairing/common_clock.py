@@ -23,7 +23,7 @@ class ClockOffset(Protocol):
 
     @property
     def error_ns(self) -> int:
-        """Its largest error [ns]."""
+        """Largest error of the offset [ns]."""
         ...
 
 

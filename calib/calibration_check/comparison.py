@@ -79,7 +79,7 @@ class Comparison:
 
     @property
     def chosen(self) -> Explanation:
-        """Of those that no other beats, the one with the fewest parameters; one about a sensor before the board's."""
+        """Explanation with the fewest parameters of those that no other beats; a sensor's before the board's."""
         return min(self._unbeaten, key=lambda each: (len(each.values), each.hypothesis.kind == Kind.BOARD))
 
     @property
@@ -91,7 +91,7 @@ class Comparison:
         ]
 
     def without_focal(self, unseen: Mapping[str, float]) -> "Comparison":
-        """Without the other focal lengths that a sensor's own corners would have shown.
+        """Comparison without the other focal lengths that a sensor's own corners would have shown.
 
         Args:
             unseen: largest relative change that they would not show, by sensor.

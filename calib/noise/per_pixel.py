@@ -144,7 +144,7 @@ def fit_regions(
     own_degree: int = 1,
     repeats: Repeats = ONCE,
 ) -> PerPixel:
-    """Like `fit`, but with pixels equal to their region."""
+    """Fits regions relative to the image's model; pixels equal their region, see `fit`."""
     samples.returns(with_amplitude=model.uses_amplitude)
     distances = domain(samples.true)
     residual = samples.residual - model.mean(samples.true, samples.amplitude, samples.pixels)

@@ -53,7 +53,7 @@ def together(parts: Sequence[Evidence]) -> Evidence:
 
 
 def thinned(samples: Samples, maximum: int, generator: np.random.Generator) -> Samples:
-    """At most `maximum` of the samples, drawn at random."""
+    """Samples, at most `maximum` of them, drawn at random."""
     return samples if len(samples) <= maximum else samples.take(generator.choice(len(samples), maximum, replace=False))
 
 

@@ -21,7 +21,7 @@ class NoReturnsError(WarpError):
 
 
 class NoOverlapError(WarpError):
-    """No measurement is in the target's view."""
+    """Image of which no measurement is in the target's view."""
 
 
 class UnitError(WarpError):

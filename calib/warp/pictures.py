@@ -66,7 +66,7 @@ class Sight:
         return result
 
     def blended(self, picture: NDArray[np.generic]) -> NDArray[np.float32]:
-        """Like `nearest`, but bilinear; the outermost half pixel is extrapolated."""
+        """Picture sampled bilinearly, see `nearest`; the outermost half pixel is extrapolated."""
         height, width, _ = picture.shape
         result = np.full((*self.visible.shape, picture.shape[2]), np.nan, np.float32)
         place = np.clip(self.place[self.visible], 0, (width - 1, height - 1))

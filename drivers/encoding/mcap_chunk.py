@@ -34,7 +34,7 @@ def records(chunk: Chunk) -> list[McapRecord]:
 
 
 def _decompressed(chunk: Chunk) -> bytes:
-    """At most one byte more than the chunk claims."""
+    """Content of a chunk, cut at one byte more than it claims."""
     size = chunk.uncompressed_size
     if chunk.compression == "zstd":
         if zstandard.frame_content_size(chunk.data) not in (size, -1):  # for which memory would be reserved

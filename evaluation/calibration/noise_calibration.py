@@ -99,7 +99,7 @@ def petit(data: Path) -> tuple[Static, sequences.Sequence]:
 
 
 def by_distance(static: Static, one: sequences.Sequence) -> list[tuple[float, float, float, int]]:
-    """Of every bin: median deviation of the static pixels' z and of all [mm], share that is not static, pixels."""
+    """Rows by distance: median deviation of the static pixels' z and of all [mm], share not static, pixels."""
     z = np.sort(one.lengths, axis=0)
     middle = z[(np.isfinite(z).sum(axis=0) - 1).clip(0) // 2, *np.indices(z.shape[1:])] * 1e3
     always = np.isfinite(one.lengths).all(axis=0)

@@ -143,14 +143,14 @@ def _without_corners(frame: SheetFrame) -> SheetFrame:
 
 
 def _plate(frame: SheetFrame) -> SheetFrame:
-    """Without what is farther from the centre of the sheet than the plate's radius, on the line of sight."""
+    """Frame without what is farther from the line of sight to the sheet's centre than the plate's radius."""
     x, y, z = np.moveaxis(CAMERA.rays(), -1, 0)
     on = frame.sheet & (np.hypot(x, y) / z * PLATE_AT_M < PLATE_RADIUS_M)
     return replace(frame, distance=np.where(on, frame.distance, np.float32(np.nan)), sheet=on)
 
 
 def _striped(frame: SheetFrame) -> SheetFrame:
-    """Without the returns of the sheet in the stripes, as in the shadow of a projector."""
+    """Frame without the returns of the sheet in the stripes, as in the shadow of a projector."""
     sheet, distance = frame.sheet.copy(), frame.distance.copy()
     for first in STRIPES:
         stripe = (slice(None), slice(first, first + STRIPE_PX))

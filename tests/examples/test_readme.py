@@ -43,7 +43,7 @@ def run(section: str, **given: Any) -> None:
 
 
 def states() -> Iterator[State]:
-    """Before the first estimate, and an estimate of 287 vertices."""
+    """States before the first estimate, and an estimate of 287 vertices."""
     yield State(DeformationState(), DeformedMesh(), MeshTopology(), Status.STALE, ("nothing was received",), math.nan)
     vertices, covariance = np.zeros((287, 3), "<f4"), np.zeros((287, 6), "<f4")
     mesh = DeformedMesh(vertices_f32=vertices.tobytes(), covariance_f32=covariance.tobytes())

@@ -11,6 +11,11 @@ import pytest
 ROOT = Path(__file__).parents[2]
 FOLDERS = ("abs_service", "calib", "client", "drivers", "evaluation", "examples", "tests")
 SUPERLATIVES = {"largest", "longest", "farthest", "fewest", "least", "most", "smallest", "shortest", "widest"}
+#: Beginnings of the middle of a sentence: the thing itself is missing.
+FRAGMENT = re.compile(
+    r"(After|Also|As|Both|But|Does|If|In|It|Its|Nothing|Of|Only|Or|So many|Such|That|Their|There|These|They|This|Those"
+    r"|To|Until|At|By|From|With|Without)\b"
+)
 QUESTION = re.compile(r'^ *"""(What|How|Where|Whether|Which|Why|When|Who)(ever|se)?\b.*', re.MULTILINE)
 
 
@@ -22,6 +27,30 @@ def test_a_docstring_says_what_a_thing_is_or_returns(folder):
         for found in QUESTION.finditer(path.read_text(encoding="utf-8"))
     ]
     assert asking == []
+
+
+@pytest.mark.parametrize("folder", FOLDERS)
+def test_a_docstring_begins_with_its_thing(folder):
+    """Those of tests excepted: they continue the sentence that is the name."""
+    fragments = [
+        f"{path.relative_to(ROOT)}: {text}"
+        for path in sorted((ROOT / folder).rglob("*.py"))
+        for text in docstrings(ast.parse(path.read_text(encoding="utf-8")))
+        if FRAGMENT.match(text)
+    ]
+    assert fragments == []
+
+
+def docstrings(module):
+    """First lines of the docstrings of a module, its classes and functions, without tests."""
+    for node in ast.walk(module):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and not is_test(node):
+            yield (ast.get_docstring(node) or "-").splitlines()[0]
+
+
+def is_test(node):
+    """True for a test, whose name is a sentence."""
+    return getattr(node, "name", "").startswith("test_")
 
 
 @pytest.mark.parametrize("folder", FOLDERS)

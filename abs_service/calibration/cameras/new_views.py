@@ -37,7 +37,7 @@ def of_known_sensors(seen: BoardObservations, stored: Stored) -> Views:
 
 
 def thinned(views: Views) -> Views:
-    """At most a fixed number of evenly spread shots: of each distinct pose the one that most sensors saw."""
+    """Views of a limited number of evenly spread shots: of each distinct pose the one that most sensors saw."""
     poses = distinct_poses(views.corners)
     seen = Counter(view.shot for view in views.corners)
     best = {poses[shot]: shot for shot in sorted(seen, key=lambda shot: seen[shot])}

@@ -127,7 +127,7 @@ def stop_on_signals() -> threading.Event:
 def on_hangup(act: Callable[[], object], stop: threading.Event) -> None:
     """Lets SIGHUP call a function, from a thread and once for all that have arrived, in a process without a terminal.
 
-    There it says nothing of a terminal, but is the usual wish that a service reads its configuration again. When `stop`
+    There it customarily asks a service to read its configuration again, and says nothing of a terminal. When `stop`
     is set, it has no effect any more.
     """
 

@@ -40,7 +40,7 @@ class AlwaysTrigger:
         return 'record.when = "always": it records as long as it runs'
 
     def watch(self, sample: Sample) -> None:
-        """Does nothing."""
+        """Ignores the message: everything is recorded."""
 
 
 ALWAYS = AlwaysTrigger()

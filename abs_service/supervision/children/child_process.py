@@ -32,7 +32,7 @@ class Process(Protocol):
 
     @property
     def pid(self) -> int:
-        """Its number; 0 if there is none."""
+        """Number of the process; 0 if there is none."""
         ...
 
     def poll(self) -> int | None:
@@ -74,13 +74,13 @@ class _NoProcess:
         return {}
 
     def terminate(self) -> None:
-        """Does nothing."""
+        """No operation: there is no process."""
 
     def kill(self) -> None:
-        """Does nothing."""
+        """No operation: there is no process."""
 
     def wake(self) -> None:
-        """Does nothing."""
+        """No operation: there is no process."""
 
     def output_tail(self) -> str:
         """Empty."""

@@ -72,7 +72,7 @@ def ensure_running() -> None:
 
 
 def detach() -> None:
-    """In the fork server: leaves the terminal and its reader to `run`.
+    """Detaches the fork server from the terminal, which is left to `run`.
 
     It ends when `run` has ended, and removes what `run` cannot if it was killed.
     """

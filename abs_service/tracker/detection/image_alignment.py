@@ -160,7 +160,7 @@ def _jumps(distance: NDArray[np.float32]) -> NDArray[np.intp]:
 
 
 def _beside(values: NDArray[np.float32], right: int, down: int) -> NDArray[np.float32]:
-    """Of every pixel (height, width), the value of the one so far to the right and down; 0 outside."""
+    """Image (height, width) shifted left by `right` and up by `down` pixels; 0 where it was outside."""
     move = np.array([[1.0, 0.0, right], [0.0, 1.0, down]])
     moved = cv2.warpAffine(values, move, values.shape[::-1], flags=cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP)
     return np.asarray(moved, np.float32)

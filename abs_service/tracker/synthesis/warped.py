@@ -147,7 +147,7 @@ class _SharedView:
         return _ObservedSharedView(self.camera, self._common.observe(predicted), self._attributes)
 
     def observe_rendered(self, predicted: Surface) -> tuple["_ObservedSharedView", NDArray[np.float32]]:
-        """Both; the view is that of all sensors."""
+        """View of one frame and its rendered distances; the view is that of all sensors."""
         return self.observe(predicted), self.render(predicted)
 
 

@@ -53,7 +53,7 @@ def centers(target: Circles | AsymmetricCircles, ids: NDArray[np.intp], pixels: 
 
 
 def _center(levels: Grey, start: Array, axes: Array, white: float, around: float) -> Array:
-    """Centre of one disc (2,), whose radii along the board are `axes` (2, 2) [px]; `start` where it cannot be told."""
+    """Centre of one disc (2,), whose radii along the board are `axes` (2, 2) [px]; `start` if unknown."""
     if np.linalg.svd(axes, compute_uv=False)[-1] < _LARGE_PX:
         return start
     reach = np.ceil(around * np.linalg.norm(axes, axis=1)) + 1

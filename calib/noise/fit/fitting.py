@@ -195,7 +195,7 @@ def polynomials(samples: Samples, sigma_degrees: tuple[int, int], mu_degrees: tu
 
 
 def subsampled(samples: Samples) -> Samples:
-    """At most `MAX_SAMPLES` of the samples, drawn at random with a fixed seed."""
+    """Samples, at most `MAX_SAMPLES` of them, drawn at random with a fixed seed."""
     if len(samples) <= MAX_SAMPLES:
         return samples
     return samples.take(np.random.default_rng(0).choice(len(samples), MAX_SAMPLES, replace=False))

@@ -68,7 +68,7 @@ def motions(solution: Solution, distance: float) -> list[Motion]:
 
 
 def noticed(found: Sequence[Motion], needed_px: float) -> list[Motion]:
-    """Those that matter where projections are needed to `needed_px` [px]."""
+    """Motions that matter where projections are needed to `needed_px` [px]."""
     return [one for one in found if one.effect_px > NOTICED * needed_px]
 
 

@@ -61,7 +61,7 @@ class _Reader(BaseHTTPRequestHandler):
             self.close_connection = True  # the reader is gone
 
     def log_message(self, format: str, *args: object) -> None:  # noqa: A002 the name in the base class
-        """Nothing: a page is no event."""
+        """Suppresses the log of requests."""
 
     def _answer(self) -> None:
         if self.path == "/":

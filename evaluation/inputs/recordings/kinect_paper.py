@@ -52,7 +52,7 @@ class Cell:
 
     @property
     def name(self) -> str:
-        """In words."""
+        """Name in words."""
         return f"{'colour + depth' if self.color else 'depth only'}, {'wall' if self.wall else 'no wall'}, {self.model}"
 
     def tracker(self) -> a.Tracker:

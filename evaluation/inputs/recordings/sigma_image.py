@@ -130,7 +130,7 @@ def _without(exposure: O3rExposure, hidden: NDArray[np.bool_]) -> O3rExposure:
 
 
 def _hidden(seen: O3rExposure, noise: DepthNoise, whole: O3rExposure) -> Iterator[Samples]:
-    """Of every surface the pixels that the tracker did not see, with the mesh that it found as the true surface."""
+    """Pixels of every surface that the tracker did not see, with its mesh as the true surface."""
     labels = connected_surfaces(seen.frames[Kind.DEPTH].si(), MAX_STEP_M).labels
     sizes = np.bincount(labels.ravel())
     distance, own = whole.image(Kind.DEPTH), whole.image(Kind.DEVIATION)

@@ -41,14 +41,14 @@ def in_theta(problem: FrameProblem, start: Array) -> tuple[Array, Array]:
 
 
 def after_newton(problem: FrameProblem, start: Array) -> tuple[Array, Array]:
-    """At the best of none, half and all of a Newton step, all parameters alike."""
+    """Start at the best of none, half and all of a Newton step, all parameters alike."""
     quadratic = problem.linearize(start).quadratic
     shares = np.outer([0.0, 0.5, 1.0], newton_step(quadratic, search_metric(quadratic)))
     return start + shares, SCALE_M * np.eye(len(start))
 
 
 def in_metric(problem: FrameProblem, start: Array) -> tuple[Array, Array]:
-    """At the start, in the metric of the curvature."""
+    """Given start, in the metric of the curvature."""
     return start[None], search_metric(problem.linearize(start).quadratic)
 
 

@@ -133,7 +133,7 @@ class Bent:
 
     @cached_property
     def moves(self) -> OneDirection:
-        """Its motion."""
+        """Motion of the sheet."""
         rotation, bend = (np.deg2rad(13), np.deg2rad(13), np.deg2rad(10)), np.deg2rad(self.bend)
         motion = Motion(self.seed, (0.0, 0.0, REST_Z), (0.04, 0.03, 0.05), rotation, bend, WIDTH, HEIGHT, 0.0, 0.0)
         return OneDirection(motion, self.degrees)

@@ -22,7 +22,7 @@ PAPER_RATIO, NEAR = 1.92, 1.3
 
 
 def findings(first: Sequence[SequenceResult], repeats: Sequence[SequenceResult]) -> Findings:
-    """Of the first sequence of every geometry, and of further ones with other seeds."""
+    """Findings of the first sequence of every geometry, and of further ones with other seeds."""
     ratios = np.array([_ratio(one, "control") for one in first])
     to_bound = np.array([_to_bound(one, LIKELIHOOD, "posterior") for one in first])
     every = np.array([_to_bound(one, EVERY_PIXEL, "full") for one in first])

@@ -125,7 +125,7 @@ def registration_deviation(samples: Samples) -> float:
 
 
 def _distinct(fits: list[tuple[Pose, float]]) -> list[tuple[Pose, float]]:
-    """Those of poses and their costs, the best first, that differ in rotation from all better ones."""
+    """Poses with their costs, the best first, without those whose rotation is about that of a better one."""
     kept: list[tuple[Pose, float]] = []
     for T_ro, cost in fits:
         if all(np.trace(other[:3, :3].T @ T_ro[:3, :3]) < 1 + 2 * np.cos(SAME_TURN) for other, _ in kept):

@@ -52,7 +52,7 @@ def exchanged(view: CornerView) -> CornerView:
 
 
 def mirrored(view: CornerView) -> CornerView:
-    """As a detector numbers the board's mirror image."""
+    """Views as a detector numbers the board's mirror image."""
     if view.sensor != "right":
         return view
     points_b = view.points_b * (-1, 1, 1) + (board_points()[:, 0].max(), 0, 0)

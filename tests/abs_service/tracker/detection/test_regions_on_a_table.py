@@ -36,7 +36,7 @@ SMALL = (slice(60, 85), slice(100, 130), 0.05)
 
 
 def assert_is(selected: np.ndarray, thing: tuple[slice, slice, float]) -> None:
-    """Only pixels of the thing, and all but its rim."""
+    """Asserts that pixels of the thing alone are selected, and all but its rim."""
     inside = np.zeros(selected.shape, bool)
     inside[thing[:2]] = True
     assert not (selected & ~inside).any()

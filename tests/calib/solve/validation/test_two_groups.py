@@ -1,4 +1,4 @@
-"""Of two groups of shots that contradict each other each shot is found; the smaller group is named, or both."""
+"""Two groups of shots that contradict each other: each shot is found; the smaller group is named, or both."""
 
 from functools import cache
 

@@ -1,7 +1,7 @@
 """Missing returns of what is nearer than a depth sensor can measure: a surface that comes so near does not end there.
 
-The line at which it leaves the range stays in place while the surface moves along itself. It is told from the end of an
-object by the first image: nothing is nearer than it, its distance is the same all along it, and the surface comes
+The line at which it leaves the range stays in place while the surface moves along itself. It differs from the end of an
+object in the first image: nothing is nearer than it, its distance is the same all along it, and the surface comes
 nearer towards it.
 """
 

@@ -11,7 +11,7 @@ from tests.abs_service.tracker.terms.depth.outline.test_rim_motion import OUT, P
 
 
 def after(away: list[np.ndarray], minimum: float = 0.5, maximum: float = 3.0) -> Raggedness:
-    """That of an outline after frames with such distances of its edges."""
+    """Raggedness of an outline after frames with such distances of its edges."""
     ragged = Raggedness(minimum, maximum)
     for frame in away:
         ragged.update(frame, OUT, PLACES)
