@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from calib import pose
-from calib.calibration_check.stored import Stored, Views
+from calib.calibration_check.stored_calibration import Stored, Views
 from calib.camera import Camera
 from calib.pose import Pose
 from calib.solve.bundle.adjustment import NotSolvedError, adjust

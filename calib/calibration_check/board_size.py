@@ -5,7 +5,7 @@ from itertools import combinations
 import numpy as np
 
 from calib.board.views import CornerView, PlaneView
-from calib.calibration_check.stored import Stored, Views
+from calib.calibration_check.stored_calibration import Stored, Views
 from calib.pose import Pose
 from calib.solve.start.board_poses import pose_candidates
 

@@ -15,7 +15,7 @@ from scipy import linalg
 
 from calib.calibration_check.hypotheses import Hypothesis, Kind, board, hypotheses
 from calib.calibration_check.shot_equations import Linearised, WhiteShot, linearise
-from calib.calibration_check.stored import Stored, Views
+from calib.calibration_check.stored_calibration import Stored, Views
 
 #: A hypothesis predicts better if the shots are e³ times as probable, and by this many standard errors …
 DECISIVE, STANDARD_ERRORS = 3.0, 2.0

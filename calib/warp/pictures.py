@@ -21,7 +21,7 @@ class PictureLookup:
         self._ray_length = camera.lookup.ray_length
         self._hiding_m = hiding_m
 
-    def look(self, distance: NDArray[np.floating]) -> "Sight":
+    def look(self, distance: NDArray[np.floating]) -> "Correspondence":
         """Positions of the view's points, given by radial distances (height, width) [m], in the camera's image.
 
         A point is occluded if the surface spanned by all points is nearer to the camera there.
@@ -43,11 +43,11 @@ class PictureLookup:
         nearest = np.minimum(front + self._hiding_m, around + max(self._hiding_m, self._warp.maximum_step_m))
         with np.errstate(invalid="ignore"):
             visible = inside & (self._ray_length[row, column] / warped.points.inverse_z < nearest[row, column])
-        return Sight(place, visible)
+        return Correspondence(place, visible)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Sight:
+class Correspondence:
     """Correspondence of the points of a view with a camera's image.
 
     Attributes:

@@ -11,7 +11,7 @@ from abs_service.calibration.shots.corner_extraction import BoardObservations
 from abs_service.report.content import Level, Verdict
 from calib.board.distinct import distinct_poses
 from calib.board.views import PlaneView
-from calib.calibration_check.stored import Stored, Views
+from calib.calibration_check.stored_calibration import Stored, Views
 from calib.solve.bundle.parameters.state import SensorState
 
 #: Maximum number of shots, each of another pose of the board.

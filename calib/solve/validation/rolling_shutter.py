@@ -13,8 +13,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from calib.solve.bundle.additional_parameters import further
 from calib.solve.bundle.bent_boards import ByPlaces, by_places, shape_columns
-from calib.solve.bundle.further import further
 from calib.solve.solution import Solution
 from calib.solve.validation.board_shape import CERTAIN, bends, effect_px
 

@@ -25,7 +25,7 @@ from calib.noise.fit import quality
 from calib.noise.fit.quality import Quality
 from calib.noise.fit.samples import Samples, from_images
 from calib.rig import Rig, Sensor
-from calib.sequences import local
+from calib.sequences import plane_residuals
 from drivers.contract.frame import Frame, FrameSet, Kind
 from drivers.o3r.buffers import SENSOR, O3rBuffers
 from evaluation.sequences import demo_plan
@@ -117,7 +117,7 @@ def _row(name: str, results: list[tuple[DepthNoise, Samples]]) -> Row:
 def noises(exposure: O3rExposure) -> dict[str, DepthNoise]:
     """The noise models, fitted to how pixels deviate from planes through their neighbours."""
     distance, own = exposure.image(Kind.DEPTH), exposure.image(Kind.DEVIATION)
-    aside = local.normalized(distance, np.ones_like(distance), exposure.camera.rays())
+    aside = plane_residuals.normalized(distance, np.ones_like(distance), exposure.camera.rays())
     samples = from_images(distance, distance - aside, own)
     fitted = measured.fit(samples)
     return {CLAIMED: measured.Measured(), ONE: replace(constant.fit(samples), offset=0.0), FITTED: fitted}

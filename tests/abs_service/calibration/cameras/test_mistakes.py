@@ -14,7 +14,7 @@ from abs_service.report.provenance import Provenance
 from calib.board.corners import errors
 from calib.board.views import CornerView
 from calib.calibration_check import mistakes
-from calib.calibration_check.stored import Views
+from calib.calibration_check.stored_calibration import Views
 from calib.lenses.lens import Lens
 from calib.pose import Pose
 from calib.solve.start.board_poses import pose_candidates

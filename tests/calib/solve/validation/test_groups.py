@@ -12,7 +12,7 @@ from calib.solve.bundle.tasks import SensorTask, Task
 from calib.solve.calibrate import calibrate
 from calib.solve.solution import Solution
 from calib.solve.validation.free_shape import free_shape
-from calib.solve.validation.unlike_shots.groups import groups
+from calib.solve.validation.inconsistent_shots.groups import groups
 from calib.solve.validation.verdict import assess
 from evaluation.scenes.boards import board_views
 from tests.calib.solve.validation.test_steadiness import HEADS, SIZE, views

@@ -9,8 +9,8 @@ from calib.solve.bundle.adjustment import NotSolvedError
 from calib.solve.bundle.parameters.lens_parameters import ASPECT
 from calib.solve.solution import Solution
 from calib.solve.start.start import fit_camera
+from calib.solve.validation.inconsistent_shots.steadiness import Change, rms
 from calib.solve.validation.support import from_middle
-from calib.solve.validation.unlike_shots.steadiness import Change, rms
 
 #: A change shifts the corners by less than this many times what the shots before and after, fitted alone, say.
 _CONFIRMED = 2.0
