@@ -14,7 +14,7 @@ from calib.lenses.lens import Lens, LensModel
 from calib.pose import Pose
 
 #: Largest image [pixels along a side]: a larger one is a mistake, and no memory holds its rays.
-LARGEST_SIDE = 65_535
+MAX_SIDE_PX = 65_535
 
 
 class CameraError(ValueError):
@@ -48,8 +48,8 @@ class Camera:
     def __post_init__(self) -> None:
         for name in ("width", "height"):
             size = getattr(self, name)
-            if not isinstance(size, Integral) or not 1 <= int(size) <= LARGEST_SIDE:
-                raise CameraError(f"{name} = {size!r}: must be a whole number of pixels, 1 to {LARGEST_SIDE}")
+            if not isinstance(size, Integral) or not 1 <= int(size) <= MAX_SIDE_PX:
+                raise CameraError(f"{name} = {size!r}: must be a whole number of pixels, 1 to {MAX_SIDE_PX}")
         for name in ("fx", "fy", "cx", "cy"):
             _check_number(name, getattr(self, name), positive=name in ("fx", "fy"))
         # The first of them is recognised by its class; all that a protocol asks for takes fifty times as long to see.

@@ -130,5 +130,5 @@ def is_pose(T_ab: NDArray[np.float64], tolerance: float = 1e-6) -> bool:
 
 
 def _is_near(found: NDArray[np.float64], wanted: NDArray[np.float64], tolerance: float) -> bool:
-    """As `np.allclose` of finite numbers, in a tenth of the time: a calibration checks thousands of poses."""
+    """True if finite numbers agree as in `np.allclose`, which takes ten times as long: there are thousands of poses."""
     return bool(np.all(np.abs(found - wanted) <= tolerance + 1e-5 * np.abs(wanted)))

@@ -44,7 +44,7 @@ FIRST_MOVING = 40
 
 
 class UntrackedError(RuntimeError):
-    """No object is detected in the first exposure of a sequence, or its truth is unknown."""
+    """Sequence in whose first exposure no object is detected, or whose truth is unknown."""
 
 
 def expose(simulation: Simulation, indices: Iterable[int]) -> list[LabeledExposure]:

@@ -1,4 +1,4 @@
-"""From the arguments of a tracker to the configuration of a rig file, with its defaults and checks."""
+"""Configuration of a rig file from the arguments of a tracker, with its defaults and checks."""
 
 import re
 from collections.abc import Mapping

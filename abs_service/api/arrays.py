@@ -18,10 +18,10 @@ from calib.rig import Rig
 from drivers.contract.frame import Frame, FrameSet, Geometry, Kind
 
 #: A depth image whose median is larger [m] is one in millimetres.
-FARTHEST_M = 100.0
+MAX_DISTANCE_M = 100.0
 
 #: Times beyond it do not fit 64 bits of nanoseconds [s].
-LATEST_S = 9e9
+MAX_TIME_S = 9e9
 
 #: Encodings of 8- and 16-bit images of the brightness.
 _GREY = {"u1": "mono8", "u2": "mono16"}
@@ -106,8 +106,8 @@ class FrameBuilder:
 
     def _time_ns(self, time_s: float) -> int:
         seconds = checks.number("time_s", time_s, "a time in seconds")
-        if not abs(seconds) < LATEST_S:
-            raise ArgumentError(f"time_s = {time_s}: must be a time in seconds, less than {LATEST_S:g}")
+        if not abs(seconds) < MAX_TIME_S:
+            raise ArgumentError(f"time_s = {time_s}: must be a time in seconds, less than {MAX_TIME_S:g}")
         t_ns = round(seconds * 1e9)
         if self._last_ns is not None and t_ns <= self._last_ns:
             raise ArgumentError(f"time_s = {time_s}: must be later than the frame before, {self._last_ns * 1e-9:g}")
@@ -206,9 +206,9 @@ def _metres(array: NDArray[Any], label: str) -> NDArray[np.float32]:
         raise ArgumentError(f"{label} holds {array.dtype}, must be floating-point metres: millimetres * 0.001")
     some = array[::4, ::4]
     returns = some[np.isfinite(some) & (some != 0)]
-    if returns.size and np.median(np.abs(returns)) > FARTHEST_M:
+    if returns.size and np.median(np.abs(returns)) > MAX_DISTANCE_M:
         raise ArgumentError(
-            f"{label} has a median of {np.median(returns):g}, must be metres, less than {FARTHEST_M:g}: "
+            f"{label} has a median of {np.median(returns):g}, must be metres, less than {MAX_DISTANCE_M:g}: "
             "millimetres * 0.001"
         )
     with np.errstate(over="ignore"):

@@ -20,7 +20,7 @@ class RegionOrMask:
         self._region = region
 
     def build(self) -> Region:
-        """This region itself."""
+        """Returns this region: it needs no building."""
         return self
 
     def select(self, view: DepthView) -> NDArray[np.bool_]:

@@ -84,7 +84,7 @@ class Bus(Protocol):
         ...
 
     def latched_publisher(self, topic: str, message: str) -> Publisher:
-        """Like `publisher`, but also answers queries with the last message; for data that changes rarely."""
+        """Publisher that also answers queries with its last message; for data that changes rarely."""
         ...
 
     def answer_queries(self, topic: str, message: str, payload: Callable[[], bytes]) -> Subscription:

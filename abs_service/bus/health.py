@@ -15,7 +15,7 @@ from drivers.contract.text import printable
 
 PERIOD_NS = 1_000_000_000
 #: The largest number that a counter holds; drivers count in ways of their own.
-LARGEST = 2**64 - 1
+MAX_COUNT = 2**64 - 1
 
 
 class Level(IntEnum):
@@ -64,10 +64,10 @@ class Health:
             return self._counters[name]
 
     def count_up_to(self, totals: Mapping[str, int], prefix: str = "") -> None:
-        """Sets counters to totals counted elsewhere, up to `LARGEST`; a smaller one, as of a new epoch, is ignored."""
+        """Sets counters to totals counted elsewhere, up to `MAX_COUNT`; smaller ones, of a new epoch, are ignored."""
         with self._lock:
             for name, total in totals.items():
-                self._counters[prefix + name] = min(max(self._counters[prefix + name], total), LARGEST)
+                self._counters[prefix + name] = min(max(self._counters[prefix + name], total), MAX_COUNT)
 
     def gauge(self, name: str, value: float) -> None:
         """Sets a current value, none if it is not finite; the name ends in its unit."""

@@ -37,7 +37,7 @@ def watch(session: zenoh.Session, on_event: Callable[[zenoh.LinkEvent], None]) -
 
 
 def _let_sockets_close() -> None:
-    """Of this whole process, as zenoh does not say which is whose; it is the kernel's default."""
+    """Sets no lingering, the kernel's default, for all sockets of this process: zenoh does not say which is whose."""
     with suppress(OSError):  # no descriptor is left to list them
         for name in os.listdir("/proc/self/fd"):
             with suppress(OSError):  # it is closed meanwhile

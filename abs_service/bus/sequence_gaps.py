@@ -8,7 +8,7 @@ from absmsg.v1.frame_info_pb2 import FrameInfo
 from google.protobuf.message import DecodeError
 
 from abs_service.bus.contract import Sample
-from drivers.encoding.message_check import LARGEST_GAP
+from drivers.encoding.message_check import MAX_GAP
 
 #: Publishers of a topic that are followed: the most recent ones. Two hosts with cameras both publish `health/capture`.
 PUBLISHERS = 4
@@ -33,13 +33,13 @@ class SequenceGaps:
         latest[publisher] = seq
         if len(latest) > PUBLISHERS:
             del latest[next(iter(latest))]
-        if not 0 < gap <= LARGEST_GAP:
+        if not 0 < gap <= MAX_GAP:
             return 0
         self._lost[topic] += gap
         return gap
 
     def add_image(self, sample: Sample) -> None:
-        """As `add`, for an image, whose number is in its attachment."""
+        """Counts an image like `add`; its number is in the attachment."""
         with suppress(DecodeError):  # reported when it is decoded
             header = FrameInfo.FromString(sample.attachment).header
             self.add(sample.topic, header.boot_id, header.seq)

@@ -17,7 +17,7 @@ from abs_service.bus.security import expiry
 from abs_service.bus.security.mutual_tls import NO_SECURITY, MutualTls, NoSecurity
 from abs_service.bus.zenoh_session import connection, shared_memory
 from abs_service.bus.zenoh_session.pools import own_size
-from drivers.encoding.message_check import LARGEST_IMAGE
+from drivers.encoding.message_check import MAX_IMAGE_BYTES
 
 _log = logging.getLogger(__name__)
 
@@ -35,8 +35,8 @@ MIN_SHARED_MEMORY_BYTES = 32 << 20
 #: The times that zenoh can write begin in 1970 and are shorter [s]: beyond, each message would end the process.
 WALL_CLOCK_S, WALL_CLOCK = 2**32, "zenoh needs one between 1970 and 2106; set it (timedatectl)"
 
-#: A larger message is refused before it is put together: an image of `message_check.LARGEST_IMAGE` and its attachment.
-LARGEST_MESSAGE_BYTES = LARGEST_IMAGE + (1 << 20)
+#: Larger messages are refused before they are complete: an image of `message_check.MAX_IMAGE_BYTES` and its attachment.
+MAX_MESSAGE_BYTES = MAX_IMAGE_BYTES + (1 << 20)
 
 #: Without zenoh's ?…, which is for several links between two programs: a mistake in it keeps everybody out, or panics.
 _ENDPOINT = re.compile(r"(tcp|tls|quic|udp|ws)/(\[[0-9a-fA-F:.]+\]|[^\s:/?#\[\]]+):(?P<port>\d{1,5})(#\S+)?")
@@ -200,7 +200,7 @@ def _settings(
             "unicast": {**connection.UNICAST, **_accept()},
             "link": {
                 "tx": {"lease": connection.LEASE_MS, "queue": connection.QUEUE},
-                "rx": {"max_message_size": LARGEST_MESSAGE_BYTES},
+                "rx": {"max_message_size": MAX_MESSAGE_BYTES},
                 **security.link,
             },
             "shared_memory": {

@@ -1,1 +1,1 @@
-"""From a device to frames on the bus."""
+"""Capture: frames of a device, published on the bus."""

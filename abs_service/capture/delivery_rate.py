@@ -7,7 +7,7 @@ from drivers.contract.capabilities import StreamInfo
 
 #: Time over which images are counted [ns], and the share of the promised rate below which that is reported. A camera
 #: that doubles its exposure in the dark halves its rate.
-WINDOW_NS, LEAST = 10_000_000_000, 0.45
+WINDOW_NS, MIN_SHARE = 10_000_000_000, 0.45
 #: Longest time between two checks [ns]; after a longer one, this process stood still, and not the camera.
 PAUSE_NS = 1_000_000_000
 
@@ -42,4 +42,4 @@ class DeliveryRate:
         for key, begin_ns, number in over:
             rate_hz, promised_hz = number * 1e9 / (now_ns - begin_ns), self._streams[key].rate_hz
             slow = f"{rate_hz:.1f} of {promised_hz:g} images a second; see its cable, its port and its exposure"
-            yield key, slow if rate_hz < LEAST * promised_hz else ""
+            yield key, slow if rate_hz < MIN_SHARE * promised_hz else ""

@@ -18,7 +18,7 @@ _T = TypeVar("_T")
 _log = logging.getLogger(__name__)
 
 #: Backoff before a failed device is reopened: doubles with each consecutive failure, up to the longest [s].
-FIRST_BACKOFF_S, LONGEST_BACKOFF_S = 0.5, 10.0
+FIRST_BACKOFF_S, MAX_BACKOFF_S = 0.5, 10.0
 #: Longest wait for the end of a command, before another one or before the device is closed all the same [s].
 COMMAND_S = 1.0
 #: A driver that has not returned for longer hangs; some take long to open a device [s].
@@ -145,7 +145,7 @@ class DeviceSupervisor:
             if self._stop.is_set() or self.finished or self.fatal_error:
                 self._report_state(DeviceState.CLOSED, reason)
                 return
-            backoff_s = FIRST_BACKOFF_S if delivered else min(2 * backoff_s, LONGEST_BACKOFF_S)
+            backoff_s = FIRST_BACKOFF_S if delivered else min(2 * backoff_s, MAX_BACKOFF_S)
             self._failure = reason
             self._report_state(DeviceState.RECONNECTING, f"{reason}; trying again in {backoff_s:g} s")
             self._health.count(f"device.{self._name}.reconnects")

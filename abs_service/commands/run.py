@@ -58,7 +58,7 @@ class ChildError(Exception):
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the arguments of `abs-service run`."""
     rig_process.add_config(parser)
-    forever = rig_process.LONGEST_S
+    forever = rig_process.MAX_DURATION_S
     parser.add_argument(
         "--duration", metavar="S", type=rig_process.seconds, default=forever, help="end after this many seconds"
     )

@@ -72,7 +72,7 @@ def without_calibrated(problems: Iterable[Problem]) -> list[Problem]:
 
 def _read(path: Path) -> bytes:
     try:
-        return limited.read(path, limited.LARGEST_TEXT)
+        return limited.read(path, limited.MAX_TEXT_BYTES)
     except OSError as error:
         raise ConfigError(f"{path}: the calibration cannot be read: {error.strerror}") from None
 

@@ -96,5 +96,5 @@ def _record(file: dict[str, Any]) -> Iterator[Problem]:
     if record.get("begin") == "tracking":
         yield Problem(("record", "begin"), 'the rig has no tracker to wait for; allowed is "start"', "tracking")
     if record.get("when") == "not_tracking":
-        allowed = 'the rig has no tracker; allowed are "always" and "asked"'
+        allowed = 'the rig has no tracker; allowed are "always" and "requested"'
         yield Problem(("record", "when"), allowed, "not_tracking")

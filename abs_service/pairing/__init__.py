@@ -1,1 +1,1 @@
-"""From frames to frame sets to observations in SI units."""
+"""Pairing: frame sets from frames, and observations in SI units from these."""

@@ -13,7 +13,7 @@ from drivers.contract.frame import Frame
 INTERVALS = 9
 
 
-class Offset(Protocol):
+class ClockOffset(Protocol):
     """Offset of a clock, such as `abs_service.bus.clock_offsets.Offset`."""
 
     @property
@@ -23,7 +23,7 @@ class Offset(Protocol):
 
     @property
     def error_ns(self) -> int:
-        """Its largest error [ns]."""
+        """Largest error of the offset [ns]."""
         ...
 
 
@@ -39,7 +39,7 @@ class CommonClock:
         offset: offset of a host's clock to any one clock, None if it is not known yet; see `ClockOffsets.offset`.
     """
 
-    def __init__(self, reference: Key, tolerance_ns: int, offset: Callable[[str], Offset | None]) -> None:
+    def __init__(self, reference: Key, tolerance_ns: int, offset: Callable[[str], ClockOffset | None]) -> None:
         self._reference = reference
         self._tolerance_ns = tolerance_ns
         self._offset = offset

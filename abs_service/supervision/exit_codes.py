@@ -23,7 +23,7 @@ class Exit(IntEnum):
     FAILED = 1  # something broke; starting again may help
     USER = 2  # the command line, the configuration or the surroundings have to be changed first
     NOTHING = 3  # nothing answers; starting again may help
-    ENDED = 4  # of `capture`: its devices have ended by themselves, as a recording does; OK if it was told to end
+    ENDED = 4  # of `capture`: its devices have ended by themselves, as a recording does; OK if that was requested
     INTERRUPTED = 130  # Ctrl-C before the command could end in order
     PIPE_CLOSED = 141  # the reader of the output has closed it
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 #: Number of times that the same text is reported as it comes.
 AT_ONCE = 5
 #: Time after which it is reported again then, at first and at most: it doubles each time [ns].
-FIRST_NS, LONGEST_NS = 60_000_000_000, 600_000_000_000
+FIRST_NS, MAX_INTERVAL_NS = 60_000_000_000, 600_000_000_000
 #: Texts that are remembered.
 MAX_TEXTS = 1000
 
@@ -52,7 +52,7 @@ class Repeats:
             if now_ns - last.t_ns < last.pause_ns:
                 last.left_out += 1
                 return None
-            longer_ns = min(max(2 * last.pause_ns, FIRST_NS), LONGEST_NS)
+            longer_ns = min(max(2 * last.pause_ns, FIRST_NS), MAX_INTERVAL_NS)
             self._reports[key] = _Report(now_ns, last.times + 1, longer_ns if last.times + 1 >= AT_ONCE else 0)
             return last.left_out
 

@@ -15,7 +15,7 @@ from abs_service.supervision.repeats import Repeats, counted
 _log = logging.getLogger(__name__)
 
 #: Longest backoff before a restart: it doubles with each end of a process soon after its start [ns].
-LONGEST_BACKOFF_NS = 3_000_000_000
+MAX_BACKOFF_NS = 3_000_000_000
 #: After a run that was longer than this a process is started again at once, and the next backoff is the first one [ns].
 WORKED_NS = 10_000_000_000
 #: Time without health of a process, which is due once a second, after which it is overdue [ns].
@@ -84,7 +84,7 @@ class Supervisor:
         child.start_at_ns = self._clock() + self._limits.stop_ns
 
     def exchange(self, children: Iterable[Child]) -> None:
-        """Has the given children from now on: those of new components start, those that are not given end in order."""
+        """Exchanges the children for the given ones: new ones start, those that are not given end in order."""
         wanted = {child.component: child for child in children}
         for component in self.children.keys() - wanted.keys():
             self.renew(component)
@@ -203,7 +203,7 @@ class Supervisor:
             self._give_up(child, now_ns, f"{times}; the last time it {reason}")
             return
         worked = now_ns - child.started_ns > WORKED_NS
-        child.backoff_ns = FIRST_BACKOFF_NS // 2 if worked else min(2 * child.backoff_ns, LONGEST_BACKOFF_NS)
+        child.backoff_ns = FIRST_BACKOFF_NS // 2 if worked else min(2 * child.backoff_ns, MAX_BACKOFF_NS)
         child.start_at_ns = now_ns + (1 if worked else child.backoff_ns)  # 1: at the next look, when health has said it
         child.exits_ns.append(now_ns)
         child.restarts += 1
@@ -212,7 +212,7 @@ class Supervisor:
 
     def _start_later(self, child: Child, now_ns: int, reason: str) -> None:
         """Tries again, for ever, after what is no failure of the process: a lack of the host, or of a file of its."""
-        child.lacks, child.start_at_ns = True, now_ns + LONGEST_BACKOFF_NS
+        child.lacks, child.start_at_ns = True, now_ns + MAX_BACKOFF_NS
         child.state, child.reason, child.process = ChildState.BACKOFF, reason, NO_PROCESS
         self._tell(logging.WARNING, f"{child.component} {reason}; trying again")
 

@@ -9,7 +9,7 @@ import scipy  # its parts are imported when they are first used
 #: Approximate number of vertices of a mesh; "auto": the default number, fewer if the object has fewer pixels.
 Vertices = Literal["auto"] | int
 
-#: Usual number of vertices; that of a template's mesh, which is made before the object is seen.
+#: Default number of vertices; that of a template's mesh, which is made before the object is seen.
 TYPICAL_VERTICES = 300
 
 #: A coarser grid loses too much of a small object at its rim.

@@ -30,7 +30,7 @@ COLD_FRAMES = 2
 
 
 class Tracker:
-    """For each observation, finds the parameters Θ of the largest posterior density.
+    """Finds the parameters Θ of the largest posterior density for each observation.
 
     Args:
         posterior: likelihood and priors of a deformation model.

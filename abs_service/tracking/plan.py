@@ -93,7 +93,7 @@ class Plan:
         reference: sensor from whose depth image the initial mesh is built.
         model, region, synthesis, objective, optimizer: settings of the exchangeable parts.
         evaluations: maximum number of cost evaluations per frame.
-        vertices: approximate number of vertices of the mesh; "auto": the usual number, fewer if the object has fewer
+        vertices: approximate number of vertices of the mesh; "auto": the default number, fewer if the object has fewer
             pixels.
         priors, status, reinitialization, vertex_offsets: settings of the fixed parts.
         template: settings of the object's known shape.

@@ -24,7 +24,7 @@ from drivers.contract.frame import FrameSet
 
 
 class PreviewError(ValueError):
-    """There is no depth image to preview."""
+    """Frame set without a depth image to preview."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -50,7 +50,7 @@ class Choice:
     polygon: tuple[Pixel, ...] = ()
 
     def __str__(self) -> str:
-        """It in words that continue a sentence; "" for the region of the rig file."""
+        """The object's place in words that continue a sentence; "" for the region of the rig file."""
         if self.polygon:
             return f" in a polygon of {len(self.polygon)} corners"
         return f" at pixel {list(self.seed)}" if self.seed else ""

@@ -24,7 +24,7 @@ COMPACT = deformation_state_pb2.CompactState.DESCRIPTOR.full_name
 TOPOLOGY = deformed_mesh_pb2.MeshTopology.DESCRIPTOR.full_name
 
 #: Most numbers in each table of a basis, those of 16,000 vertices and cubic splines; larger ones are not sent.
-LARGEST_BASIS = 1 << 18
+MAX_BASIS = 1 << 18
 
 _STOP = {
     Stop.NOTHING: State.STOP_UNSPECIFIED,
@@ -187,7 +187,7 @@ def topology(
 
 def _basis(model: HasVertexBasis) -> deformed_mesh_pb2.VertexBasis | None:
     basis = model.vertex_basis
-    if basis.value.size > LARGEST_BASIS:
+    if basis.value.size > MAX_BASIS:
         return None
     return deformed_mesh_pb2.VertexBasis(
         support=basis.value.shape[1],

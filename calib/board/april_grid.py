@@ -103,6 +103,6 @@ class AprilGrid:
         return np.array(found)
 
     def _places(self, tags: int) -> NDArray[np.float64]:
-        """Both edges of tags in a row (2 tags,) [m]."""
+        """Left and right edges of the tags in a row (2 tags,) [m]."""
         first = np.arange(tags, dtype=np.float64) * (self.tag + self.gap)
         return np.stack([first, first + self.tag], axis=1, dtype=np.float64).ravel()

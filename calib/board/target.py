@@ -27,7 +27,7 @@ class Chessboard:
     """Black and white squares, black in the upper left corner; its corners are where four squares meet.
 
     With `columns + rows` odd the orientation is unique. Otherwise the board is symmetric under rotation by 180°, and
-    corners are numbered so that x points to the right in the image; see `calib.solve.start.half_turns`.
+    corners are numbered so that x points to the right in the image; see `calib.solve.start.symmetric_boards`.
 
     Attributes:
         columns, rows: inner corners along x and y: one less than squares.
@@ -142,7 +142,7 @@ class Circles:
     """Black discs on a regular grid.
 
     Symmetric under rotation by 180°; discs are numbered so that x points to the right in the image; see
-    `calib.solve.start.half_turns`.
+    `calib.solve.start.symmetric_boards`.
 
     Attributes:
         columns, rows: discs along x and y.

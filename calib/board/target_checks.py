@@ -3,18 +3,18 @@
 import math
 
 #: Least and largest length of a board [m], and a typical one.
-MIN_M, LARGEST_M, TYPICAL_M = 0.01, 5.0, 0.3
+MIN_M, MAX_M, TYPICAL_M = 0.01, 5.0, 0.3
 
 
 class TargetError(ValueError):
     """Invalid board parameters; the message begins with the wrong attribute."""
 
 
-def check_counts(columns: int, rows: int, least: int) -> None:
+def check_counts(columns: int, rows: int, minimum: int) -> None:
     """Checks the numbers of points along both sides."""
     for name, count in (("columns", columns), ("rows", rows)):
-        if not least <= count <= 100:
-            raise TargetError(f"{name}: {count} must be from {least} to 100")
+        if not minimum <= count <= 100:
+            raise TargetError(f"{name}: {count} must be from {minimum} to 100")
 
 
 def check_length(name: str, length: float) -> None:
@@ -28,10 +28,10 @@ def check_length(name: str, length: float) -> None:
 def check_extent(name: str, spacing: float, count: int) -> None:
     """Checks the longer side of a board, `count` times `spacing` [m], as units are mixed up by powers of ten."""
     extent = count * spacing
-    if not MIN_M <= extent <= LARGEST_M:
+    if not MIN_M <= extent <= MAX_M:
         factor = 10.0 ** round(math.log10(TYPICAL_M / extent))
         raise TargetError(
-            f"{name}: {spacing:g} m makes the board {extent:g} m long, which must be from {MIN_M:g} to {LARGEST_M:g} "
+            f"{name}: {spacing:g} m makes the board {extent:g} m long, which must be from {MIN_M:g} to {MAX_M:g} "
             f"m; {name}_mm is in millimetres, {name} in metres. {factor * spacing:g} m would make it "
             f"{factor * extent:g} m"
         )

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from calib import pose
-from calib.calibration_check.stored import Stored, Views
+from calib.calibration_check.stored_calibration import Stored, Views
 from calib.camera import Camera
 from calib.pose import Pose
 from calib.solve.bundle.adjustment import NotSolvedError, adjust
@@ -60,13 +60,13 @@ def _task(camera: Camera) -> SensorTask:
 def _start(stored: Stored, views: Views) -> State:
     """Stored sensors, and board poses from the view with the most corners in each shot."""
     boards: dict[int, Pose] = {}
-    most: dict[int, int] = {}
+    counts: dict[int, int] = {}
     for view in views.corners:
-        if len(view.pixels) > most.get(view.shot, 0):
+        if len(view.pixels) > counts.get(view.shot, 0):
             camera = stored.sensors[view.sensor].camera
             allowed = [camera.T_rs @ each.T_sb for each in pose_candidates(camera, view)]
             boards[view.shot] = min(allowed, key=lambda T_rb: _misfit(stored, views, view.shot, T_rb))
-            most[view.shot] = len(view.pixels)
+            counts[view.shot] = len(view.pixels)
     return State({name: stored.sensors[name] for name in views.shots}, boards)
 
 

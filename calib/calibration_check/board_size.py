@@ -5,7 +5,7 @@ from itertools import combinations
 import numpy as np
 
 from calib.board.views import CornerView, PlaneView
-from calib.calibration_check.stored import Stored, Views
+from calib.calibration_check.stored_calibration import Stored, Views
 from calib.pose import Pose
 from calib.solve.start.board_poses import pose_candidates
 
@@ -16,7 +16,7 @@ GROSS = 1.2
 MIN_KNOWN, AGREEING, TOLERANCE = 3, 0.7, 0.05
 
 #: Pairs of sensors that stand nearer to each other than this share of the board's distance say nothing.
-SHORTEST = 0.02
+MIN_BASELINE = 0.02
 
 
 def gross_size(stored: Stored, views: Views) -> float:
@@ -39,7 +39,7 @@ def _by_pair(stored: Stored, one: tuple[CornerView, Pose], other: tuple[CornerVi
     moves = [camera.T_rs[:3, :3] @ T_sb[:3, 3] for camera, (_, T_sb) in zip(cameras, (one, other), strict=True)]
     between, said = cameras[1].center - cameras[0].center, moves[0] - moves[1]
     size = float(between @ said / max(said @ said, 1e-12))
-    is_short = np.linalg.norm(between) < SHORTEST * abs(size) * np.linalg.norm(moves[0])
+    is_short = np.linalg.norm(between) < MIN_BASELINE * abs(size) * np.linalg.norm(moves[0])
     return float("nan") if is_short else size
 
 

@@ -11,7 +11,7 @@ from scipy import linalg, stats
 
 from calib import pose
 from calib.calibration_check.board_poses import formulation, solve
-from calib.calibration_check.stored import Stored, Views
+from calib.calibration_check.stored_calibration import Stored, Views
 from calib.camera import Camera
 from calib.pose import Pose
 from calib.solve.bundle import rotations
@@ -19,8 +19,8 @@ from calib.solve.bundle.adjustment import Adjustment, NotSolvedError
 from calib.solve.bundle.parameters.layout import POSE
 from calib.solve.solution import Solution
 from calib.solve.validation.free_shape import free_shape
-from calib.solve.validation.unlike_shots.contradictions import Contradiction, contradictions
-from calib.solve.validation.unlike_shots.steadiness import Change, changes_of_place
+from calib.solve.validation.inconsistent_shots.contradictions import Contradiction, contradictions
+from calib.solve.validation.inconsistent_shots.steadiness import Change, changes_of_place
 
 #: Minimum number of common shots of two sensors.
 MIN_SHOTS = 3

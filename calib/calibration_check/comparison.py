@@ -15,7 +15,7 @@ from scipy import linalg
 
 from calib.calibration_check.hypotheses import Hypothesis, Kind, board, hypotheses
 from calib.calibration_check.shot_equations import Linearised, WhiteShot, linearise
-from calib.calibration_check.stored import Stored, Views
+from calib.calibration_check.stored_calibration import Stored, Views
 
 #: A hypothesis predicts better if the shots are e³ times as probable, and by this many standard errors …
 DECISIVE, STANDARD_ERRORS = 3.0, 2.0
@@ -79,19 +79,19 @@ class Comparison:
 
     @property
     def chosen(self) -> Explanation:
-        """Of those that no other beats, the one with the fewest parameters; one about a sensor before the board's."""
+        """Explanation with the fewest parameters of those that no other beats; a sensor's before the board's."""
         return min(self._unbeaten, key=lambda each: (len(each.values), each.hypothesis.kind == Kind.BOARD))
 
     @property
     def rivals(self) -> list[Explanation]:
-        """Others that these shots cannot tell from the chosen one, without those that contain it."""
+        """Explanations that these shots cannot distinguish from the chosen one, without those that contain it."""
         chosen = self.chosen
         return [
             each for each in self._unbeaten if each is not chosen and not each.hypothesis.contains(chosen.hypothesis)
         ]
 
     def without_focal(self, unseen: Mapping[str, float]) -> "Comparison":
-        """Without the other focal lengths that a sensor's own corners would have shown.
+        """Comparison without the other focal lengths that a sensor's own corners would have shown.
 
         Args:
             unseen: largest relative change that they would not show, by sensor.

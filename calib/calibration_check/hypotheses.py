@@ -7,7 +7,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from calib.calibration_check.stored import Stored
+from calib.calibration_check.stored_calibration import Stored
 from calib.camera import Camera
 from calib.solve.bundle.parameters.layout import DEPTH_TERMS, POSE
 

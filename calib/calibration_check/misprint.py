@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from calib.calibration_check.stored import Stored, Views
+from calib.calibration_check.stored_calibration import Stored, Views
 from calib.solve.bundle.adjustment import NotSolvedError
 from calib.solve.bundle.observability import UndeterminedError
 from calib.solve.bundle.parameters.lens_parameters import kind_of

@@ -15,8 +15,8 @@ import numpy as np
 from calib import pose
 from calib.board.distinct import same_images
 from calib.board.views import CornerView
-from calib.calibration_check.alone import corner_fit
-from calib.calibration_check.stored import Stored, Views
+from calib.calibration_check.sensor_fits import corner_fit
+from calib.calibration_check.stored_calibration import Stored, Views
 from calib.solve.start.board_poses import pose_candidates
 
 #: Maximum number of shots that are looked at, of those that several sensors saw.

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from calib.calibration_check.board_poses import formulation, solve
-from calib.calibration_check.stored import Stored, Views
+from calib.calibration_check.stored_calibration import Stored, Views
 from calib.solve.bundle import robust
 from calib.solve.bundle.parameters.lens_parameters import MATRIX
 from calib.solve.bundle.uncertainty import (

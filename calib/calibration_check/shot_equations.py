@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from calib.calibration_check.board_poses import formulation, solve
-from calib.calibration_check.stored import Stored, Views
+from calib.calibration_check.stored_calibration import Stored, Views
 from calib.solve.bundle import robust, rotations
 from calib.solve.bundle.blocks import Corners
 from calib.solve.bundle.equations import Equations

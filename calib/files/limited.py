@@ -15,9 +15,9 @@ from numpy.lib.npyio import NpzFile
 from numpy.typing import NDArray
 
 #: Largest text: a configuration, a calibration, a list of images [bytes].
-LARGEST_TEXT = 1 << 20
+MAX_TEXT_BYTES = 1 << 20
 #: Largest file with the arrays of a noise model or of covariances, compressed or not [bytes].
-LARGEST_ARRAYS = 1 << 28
+MAX_ARRAYS_BYTES = 1 << 28
 
 
 @contextmanager
@@ -33,7 +33,7 @@ def opened(path: Path) -> Iterator[BinaryIO]:
         yield stream
 
 
-def read(path: Path, largest: int) -> bytes:
+def read(path: Path, maximum: int) -> bytes:
     """The content of a file.
 
     Raises:
@@ -41,9 +41,9 @@ def read(path: Path, largest: int) -> bytes:
     """
     with opened(path) as stream:
         size = os.fstat(stream.fileno()).st_size
-        content = stream.read(largest + 1) if size <= largest else b""
-        if max(size, len(content)) > largest:
-            raise OSError(errno.EFBIG, f"it is larger than {largest} bytes", str(path))
+        content = stream.read(maximum + 1) if size <= maximum else b""
+        if max(size, len(content)) > maximum:
+            raise OSError(errno.EFBIG, f"it is larger than {maximum} bytes", str(path))
         return content
 
 
@@ -54,7 +54,7 @@ def text(path: Path) -> str:
         OSError: as `read`.
         UnicodeDecodeError: other bytes.
     """
-    return read(path, LARGEST_TEXT).decode("utf-8-sig")
+    return read(path, MAX_TEXT_BYTES).decode("utf-8-sig")
 
 
 def arrays(path: Path) -> dict[str, NDArray]:
@@ -64,7 +64,7 @@ def arrays(path: Path) -> dict[str, NDArray]:
         OSError: as `read`.
         ValueError: it is no .npz, or its arrays are too large together.
     """
-    return unpacked(read(path, LARGEST_ARRAYS))
+    return unpacked(read(path, MAX_ARRAYS_BYTES))
 
 
 def unpacked(content: bytes) -> dict[str, NDArray]:
@@ -76,8 +76,8 @@ def unpacked(content: bytes) -> dict[str, NDArray]:
     try:
         with ZipFile(io.BytesIO(content)) as parts:
             size = sum(part.file_size for part in parts.infolist())
-        if size > LARGEST_ARRAYS:
-            raise ValueError(f"its arrays have {size} bytes, {LARGEST_ARRAYS} are allowed")
+        if size > MAX_ARRAYS_BYTES:
+            raise ValueError(f"its arrays have {size} bytes, {MAX_ARRAYS_BYTES} are allowed")
         with NpzFile(io.BytesIO(content)) as archive:
             return dict(archive)
     # What NumPy and zlib make of damaged bytes, and of an array that claims to be larger than its part of the file.

@@ -47,7 +47,7 @@ _WIDTHS = ("image_width", "image_Width", "width")
 _HEIGHTS = ("image_height", "image_Height", "height")
 _ERRORS = ("avg_reprojection_error", "Avg_Reprojection_Error")
 #: Largest reprojection error of a calibration, as a share of the image's width.
-_LARGEST_ERROR = 0.01
+_MAX_ERROR = 0.01
 #: Largest difference of elements of two rotations that are rounded.
 _RECTIFIED = 1e-3
 _KNOWN = (
@@ -135,7 +135,7 @@ def _camera(name: str, table: Mapping[str, Any], hints: Hints) -> Camera:
             raise FormatError(f"{name}: the size of the image is missing; give it as --size WIDTHxHEIGHT")
         size = list(hints.size)
     error = _find(table, _ERRORS)
-    if error is not None and float(error) > _LARGEST_ERROR * float(size[0]):
+    if error is not None and float(error) > _MAX_ERROR * float(size[0]):
         raise FormatError(
             f"{name}: corners missed by {float(error):.3g} px when it was calibrated, which is no calibration of this "
             "camera: calibrate anew"

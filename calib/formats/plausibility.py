@@ -10,7 +10,7 @@ from calib.camera import Camera
 from calib.lenses.fisheye import KannalaBrandt
 
 #: Largest distance of two cameras of a rig [m].
-LARGEST_BASELINE_M = 5.0
+MAX_BASELINE_M = 5.0
 
 #: Least and largest field of view along the width or height of an image [rad], by the focal length alone.
 FIELDS_OF_VIEW = np.deg2rad(1.0), np.deg2rad(170.0)

@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from calib.lenses.lens import FARTHEST, padded, require_inverse
+from calib.lenses.lens import MAX_COORDINATE, padded, require_inverse
 
 COEFFICIENTS = ("k1", "k2", "k3", "k4")
 
@@ -107,7 +107,7 @@ class KannalaBrandt:
         slope[np.abs(slope) < 1e-12] = 0  # up to 90° it adds nothing, and as a leading coefficient it spoils the roots
         roots = np.roots([*slope, 1.0])  # in θ²
         real = roots.real[(np.abs(roots.imag) < 1e-9) & (roots.real > 0)]
-        return float(min(np.arctan(FARTHEST), np.sqrt(real.min(initial=np.inf))))
+        return float(min(np.arctan(MAX_COORDINATE), np.sqrt(real.min(initial=np.inf))))
 
     def _angle(self, radius: NDArray[np.float64]) -> NDArray[np.float64]:
         """Angle [rad] at a distorted radius by bracketed Newton iterations; NaN where there is none."""

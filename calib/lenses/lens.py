@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 COEFFICIENTS = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
 
 #: Bound on normalised coordinates; an iteration beyond it has diverged.
-FARTHEST = 1e6
+MAX_COORDINATE = 1e6
 
 #: Convergence tolerance of the inverse, in normalised coordinates.
 TOLERANCE = 1e-10
@@ -57,7 +57,7 @@ class LensModel(Protocol):
         ...
 
     def undistort(self, xy: NDArray[np.floating]) -> NDArray[np.float64]:
-        """Same as `inverse`, but raises where there is no solution.
+        """Points without distortion, see `inverse`, which does not raise where there is no solution.
 
         Raises:
             LensError: at least one point has no inverse; names one.
@@ -184,7 +184,7 @@ class Lens:
                 if len(moving) == 0:
                     break
                 ideal[moving] -= _solved(self.jacobian(ideal[moving]), residual)
-                ideal[~np.all(np.abs(ideal) < FARTHEST, axis=1)] = np.nan
+                ideal[~np.all(np.abs(ideal) < MAX_COORDINATE, axis=1)] = np.nan
             ideal[moving] = np.nan
             ideal[~self._is_before_fold(ideal)] = np.nan
         return ideal.reshape(np.shape(xy))

@@ -53,5 +53,5 @@ def fit(samples: Samples) -> Constant:
     """
     samples = fitting.subsampled(samples.returns(with_amplitude=False))
     one = np.ones((len(samples), 1))
-    law = fitting.maximize_likelihood(samples.residual, fitting.Design(one, one), least=samples.minimum_sigma)
+    law = fitting.maximize_likelihood(samples.residual, fitting.Design(one, one), minimum=samples.minimum_sigma)
     return Constant(fitting.minimum_sigma(np.maximum(law.spread, samples.minimum_sigma)), float(law.mean[0]))

@@ -12,7 +12,7 @@ from calib.noise.fit import fitting
 from calib.noise.fit.samples import Samples
 
 #: Upper bound of a reported deviation [m]; beyond any sensor's range.
-LARGEST_M = 100.0
+MAX_M = 100.0
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Measured:
 
     def deviation(self, x: NDArray[np.float64], a: NDArray[np.float64], p: Pixels) -> NDArray[np.float64]:
         """Standard deviation σ(a) [m]."""
-        own = self.factor * np.clip(a, 0, LARGEST_M)
+        own = self.factor * np.clip(a, 0, MAX_M)
         return np.broadcast_to(np.sqrt(own * own + self.floor**2), np.shape(x)).copy()
 
 

@@ -25,7 +25,7 @@ class PerPixel:
     amplitude varies much, this is more accurate than polynomials with separate coefficients for every pixel.
 
     Attributes:
-        law: noise model of the image.
+        model: noise model of the image.
         offset: coefficients of a pixel's own mean offset (k, height, width) [m] in powers of t, which is −1 at the
             first and 1 at the second of `distances`, and clamped outside.
         factor: factor on the deviation (height, width).
@@ -33,7 +33,7 @@ class PerPixel:
         minimum_sigma: lower bound of the deviation [m].
     """
 
-    law: DepthNoise
+    model: DepthNoise
     offset: NDArray[np.floating]
     factor: NDArray[np.floating]
     distances: NDArray[np.floating]
@@ -42,7 +42,7 @@ class PerPixel:
     @property
     def uses_amplitude(self) -> bool:
         """True if the image's model uses it."""
-        return self.law.uses_amplitude
+        return self.model.uses_amplitude
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -56,11 +56,11 @@ class PerPixel:
         t = np.clip((2 * np.asarray(x, np.float64) - near - far) / (far - near), -1, 1)
         place = np.asarray(p[0] * self.factor.shape[1] + p[1])
         table = self.offset.reshape(len(self.offset), 1, -1)
-        return self.law.mean(x, a, p) + evaluate(table, place, t, np.zeros(1), (-1.0, 1.0), _ANY)
+        return self.model.mean(x, a, p) + evaluate(table, place, t, np.zeros(1), (-1.0, 1.0), _ANY)
 
     def deviation(self, x: NDArray[np.float64], a: NDArray[np.float64], p: Pixels) -> NDArray[np.float64]:
         """Standard deviation σ_p(x, a) [m]."""
-        return np.maximum(self.factor[p] * self.law.deviation(x, a, p), self.minimum_sigma)
+        return np.maximum(self.factor[p] * self.model.deviation(x, a, p), self.minimum_sigma)
 
     def save(self, file: Path) -> None:
         """Writes the .npz that `Settings` reads; the image's model is not part of it."""
@@ -76,21 +76,21 @@ class Settings:
     Attributes:
         file: an .npz with the arrays offset (k, height, width) [m], factor (height, width), distances (2,) [m] and
             optionally minimum_sigma (), by default 1e-4.
-        law: noise model of the image, a table with its `type` and keys.
+        model: noise model of the image, a table with its `type` and keys.
     """
 
     file: Path
-    law: Any = field(metadata={"parts": "calib.noise"})
+    model: Any = field(metadata={"parts": "calib.noise"})
 
     def build(self) -> PerPixel:
         """Builds the image's model and loads the maps.
 
         Raises:
-            NoiseError: missing file or array, wrong shape, or `law` is not a depth noise model.
+            NoiseError: missing file or array, wrong shape, or `model` is not a depth noise model.
         """
-        law = self.law.build()
-        if not isinstance(law, DepthNoise):
-            raise NoiseError(f"law must be a noise model of depth, not {type(law).__name__}")
+        model = self.model.build()
+        if not isinstance(model, DepthNoise):
+            raise NoiseError(f"model must be a noise model of depth, not {type(model).__name__}")
         arrays = maps.arrays(self.file, {"offset", "factor", "distances"})
         offset, factor, distances = arrays["offset"], arrays["factor"], arrays["distances"]
         if offset.ndim != 3 or factor.ndim != 2 or offset.shape[1:] != factor.shape or not len(offset):
@@ -100,12 +100,12 @@ class Settings:
         if not (np.all(factor > 0) and np.all(np.isfinite(factor)) and np.all(np.isfinite(offset))):
             raise NoiseError(f"offset and factor in {str(self.file)!r} must be finite, and factor above 0")
         maps.check_domain(self.file, arrays, "distances")
-        return PerPixel(law, offset, factor, distances, maps.minimum_sigma(self.file, arrays))
+        return PerPixel(model, offset, factor, distances, maps.minimum_sigma(self.file, arrays))
 
 
 def fit(
     samples: Samples,
-    law: DepthNoise,
+    model: DepthNoise,
     labels: NDArray[np.integer],
     own_degree: int = 1,
     repeats: Repeats = ONCE,
@@ -114,7 +114,7 @@ def fit(
 
     Args:
         samples: measurements, or means of many measurements by one pixel.
-        law: noise model of the image, fitted to the same measurements.
+        model: noise model of the image, fitted to the same measurements.
         labels: region (height, width) of every pixel, from 0; for example `region_polynomial.blocks`.
         own_degree: degree of a region's or a pixel's own mean offset in the distance.
         repeats: replicates of the samples.
@@ -122,14 +122,14 @@ def fit(
     Raises:
         NoiseError: no sample has a distance or, if the model uses it, an amplitude.
     """
-    regions = fit_regions(samples, law, labels, own_degree, repeats)
+    regions = fit_regions(samples, model, labels, own_degree, repeats)
     residual, deviation = _from(regions, samples)
     basis = shrinkage.basis_of(samples.true, tuple(regions.distances), own_degree)
     place = samples.row * labels.shape[1] + samples.column
     offsets, factors = shrinkage.shrink(residual, deviation, basis, place, labels.size, repeats, samples.minimum_sigma)
     factors[np.bincount(place, minlength=labels.size) == 0] = 1.0  # pixels without samples equal their region
     return PerPixel(
-        law,
+        model,
         regions.offset + offsets.T.reshape(-1, *labels.shape),
         regions.factor * factors.reshape(labels.shape),
         regions.distances,
@@ -139,22 +139,22 @@ def fit(
 
 def fit_regions(
     samples: Samples,
-    law: DepthNoise,
+    model: DepthNoise,
     labels: NDArray[np.integer],
     own_degree: int = 1,
     repeats: Repeats = ONCE,
 ) -> PerPixel:
-    """Like `fit`, but with pixels equal to their region."""
-    samples.returns(with_amplitude=law.uses_amplitude)
+    """Fits regions relative to the image's model; pixels equal their region, see `fit`."""
+    samples.returns(with_amplitude=model.uses_amplitude)
     distances = domain(samples.true)
-    residual = samples.residual - law.mean(samples.true, samples.amplitude, samples.pixels)
-    deviation = law.deviation(samples.true, samples.amplitude, samples.pixels)
+    residual = samples.residual - model.mean(samples.true, samples.amplitude, samples.pixels)
+    deviation = model.deviation(samples.true, samples.amplitude, samples.pixels)
     basis = shrinkage.basis_of(samples.true, distances, own_degree)
     places = int(labels.max()) + 1
     of = labels[samples.pixels]
     offsets, factors = shrinkage.shrink(residual, deviation, basis, of, places, repeats, samples.minimum_sigma)
     least = fitting.minimum_sigma(factors[of] * deviation)
-    return PerPixel(law, np.moveaxis(offsets[labels], -1, 0), factors[labels], np.array(distances), least)
+    return PerPixel(model, np.moveaxis(offsets[labels], -1, 0), factors[labels], np.array(distances), least)
 
 
 def _from(model: PerPixel, samples: Samples) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

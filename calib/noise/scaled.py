@@ -10,20 +10,20 @@ from calib.noise.base import DepthNoise, Pixels
 
 @dataclass(frozen=True)
 class Scaled:
-    """μ of a law, and σ = factor · σ of the law."""
+    """μ of a noise model, and σ = factor · its σ."""
 
-    law: DepthNoise
+    model: DepthNoise
     factor: float
 
     @property
     def uses_amplitude(self) -> bool:
-        """As the law does."""
-        return self.law.uses_amplitude
+        """True if that model uses it."""
+        return self.model.uses_amplitude
 
     def mean(self, x: NDArray[np.float64], a: NDArray[np.float64], p: Pixels) -> NDArray[np.float64]:
         """Mean offset [m]."""
-        return self.law.mean(x, a, p)
+        return self.model.mean(x, a, p)
 
     def deviation(self, x: NDArray[np.float64], a: NDArray[np.float64], p: Pixels) -> NDArray[np.float64]:
         """Standard deviation [m]."""
-        return self.factor * self.law.deviation(x, a, p)
+        return self.factor * self.model.deviation(x, a, p)

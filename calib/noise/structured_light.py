@@ -68,10 +68,10 @@ def fit(samples: Samples, step: float) -> StructuredLight:
     """
     samples = fitting.subsampled(samples.returns(with_amplitude=False))
     spread = np.column_stack([samples.true**4, np.ones(len(samples))])
-    least = samples.minimum_sigma
-    law = fitting.maximize_likelihood(samples.residual, fitting.Design(spread[:, :0], spread), power=2, least=least)
+    minimum = samples.minimum_sigma
+    law = fitting.maximize_likelihood(samples.residual, fitting.Design(spread[:, :0], spread), power=2, minimum=minimum)
     if law.spread[1] <= 0:  # no floor above the other errors
         columns = fitting.Design(spread[:, :0], spread[:, :1])
-        law = fitting.maximize_likelihood(samples.residual, columns, power=2, least=least)
+        law = fitting.maximize_likelihood(samples.residual, columns, power=2, minimum=minimum)
     random = max(float(law.spread[0]) - step**2 / 12, (1e-3 * step) ** 2, 1e-12)
     return StructuredLight(float(np.sqrt(random)), step, float(np.sqrt(law.spread[1:].sum())))

@@ -97,10 +97,10 @@ def fit(samples: Samples, sigma_degree: int = 1, mu_degree: int = 1) -> TofAmpli
     distances, amplitudes = domain(samples.true), domain(samples.amplitude)
     x, inverse = np.clip(samples.true, *distances), 1 / np.clip(samples.amplitude, *amplitudes)
     mean, spread = (np.column_stack([polyvander(x, degree), inverse]) for degree in (mu_degree, sigma_degree))
-    least = samples.minimum_sigma
-    law = fitting.maximize_likelihood(samples.residual, fitting.Design(mean, spread), least=least)
+    minimum = samples.minimum_sigma
+    law = fitting.maximize_likelihood(samples.residual, fitting.Design(mean, spread), minimum=minimum)
     if law.spread[-1] < 0:  # errors that grow with amplitude contradict the model; use the distance only
-        law = fitting.maximize_likelihood(samples.residual, fitting.Design(mean, spread[:, :-1]), least=least)
+        law = fitting.maximize_likelihood(samples.residual, fitting.Design(mean, spread[:, :-1]), minimum=minimum)
     per_amplitude = float(law.spread[sigma_degree + 1]) if len(law.spread) > sigma_degree + 1 else 0.0
     return TofAmplitude(
         sigma=tuple(law.spread[: sigma_degree + 1].tolist()),
@@ -109,5 +109,5 @@ def fit(samples: Samples, sigma_degree: int = 1, mu_degree: int = 1) -> TofAmpli
         mu_amplitude=float(law.mean[-1]),
         distances=distances,
         amplitudes=amplitudes,
-        minimum_sigma=fitting.minimum_sigma(np.maximum(spread[:, : len(law.spread)] @ law.spread, least)),
+        minimum_sigma=fitting.minimum_sigma(np.maximum(spread[:, : len(law.spread)] @ law.spread, minimum)),
     )

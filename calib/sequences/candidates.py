@@ -103,7 +103,7 @@ def _without_own(model: PerPixel, evidence: Evidence) -> Evidence:
     """Single measurements minus the fixed errors of their places."""
     samples = evidence.samples
     x, a, p = samples.true, samples.amplitude, samples.pixels
-    own = model.mean(x, a, p) - model.law.mean(x, a, p)
+    own = model.mean(x, a, p) - model.model.mean(x, a, p)
     return replace(evidence, samples=replace(samples, measured=samples.measured - own))
 
 

@@ -52,9 +52,9 @@ def together(parts: Sequence[Evidence]) -> Evidence:
     return Evidence(samples, means, Repeats(times, variance))
 
 
-def thinned(samples: Samples, most: int, generator: np.random.Generator) -> Samples:
-    """At most `most` of the samples, drawn at random."""
-    return samples if len(samples) <= most else samples.take(generator.choice(len(samples), most, replace=False))
+def thinned(samples: Samples, maximum: int, generator: np.random.Generator) -> Samples:
+    """Samples, at most `maximum` of them, drawn at random."""
+    return samples if len(samples) <= maximum else samples.take(generator.choice(len(samples), maximum, replace=False))
 
 
 def _averaged(samples: Samples, shape: tuple[int, ...]) -> tuple[Samples, Repeats]:

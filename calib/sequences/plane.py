@@ -13,7 +13,7 @@ _TRIALS, _JUDGES = 600, 3000
 _ROUNDS = 12
 
 #: Minimum number of pixels of a plane.
-_FEWEST = 50
+_MIN_PIXELS = 50
 
 #: Cutoff of Tukey's biweight, in units of the tolerance.
 _TUKEY = 1.5
@@ -39,7 +39,7 @@ def find(
         NoiseError: there is no plane.
     """
     r, along, t = distance[where], rays[where], tolerance[where]
-    if len(r) < _FEWEST:
+    if len(r) < _MIN_PIXELS:
         raise NoiseError(f"{len(r)} static pixels are too few for a plane")
     judges = generator.choice(len(r), min(len(r), _JUDGES), replace=False)
     triples = generator.integers(0, len(r), (_TRIALS, 3))
@@ -56,7 +56,7 @@ def find(
     labels = np.zeros(where.shape, np.int32)
     scipy.ndimage.label(scipy.ndimage.binary_dilation(pixels, iterations=2), output=labels)
     pixels &= labels == np.argmax(np.bincount(labels[pixels], minlength=1))
-    if pixels.sum() < _FEWEST:
+    if pixels.sum() < _MIN_PIXELS:
         raise NoiseError("there is no plane in what is static")
     return _least_squares(q, distance[pixels], rays[pixels], tolerance[pixels]), pixels
 

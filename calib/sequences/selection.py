@@ -103,9 +103,9 @@ def choose(trials: Sequence[Trial]) -> Trial:
     return best
 
 
-def lean(evidence: Evidence, generator: np.random.Generator, most: int = ENOUGH) -> Evidence:
+def lean(evidence: Evidence, generator: np.random.Generator, maximum: int = ENOUGH) -> Evidence:
     """Evidence with subsampled single measurements and all means."""
-    return replace(evidence, samples=thinned(evidence.samples, most, generator))
+    return replace(evidence, samples=thinned(evidence.samples, maximum, generator))
 
 
 def extremes(model: DepthNoise, distances: tuple[float, float], amplitudes: tuple[float, float]) -> tuple[float, ...]:

@@ -7,7 +7,7 @@ from calib.solve.bundle.adjustment import NotSolvedError, adjust
 from calib.solve.bundle.formulation import formulate, groups_of
 from calib.solve.bundle.parameters.state import State
 from calib.solve.bundle.tasks import Task
-from calib.solve.regrouping.guesses import by_relative_pose
+from calib.solve.regrouping.initial_groups import by_relative_pose
 from calib.solve.regrouping.two_groups import two_groups
 from calib.solve.solution import Solution
 from calib.solve.start.board_poses import untilted

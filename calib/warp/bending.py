@@ -11,7 +11,7 @@ _PER_DIFFERENCE = 1 / np.sqrt(120)
 
 @kernel
 def bending(
-    distance: NDArray[np.float32], sigma: NDArray[np.float32], largest_step: float, result: NDArray[np.float32]
+    distance: NDArray[np.float32], sigma: NDArray[np.float32], maximum_step: float, result: NDArray[np.float32]
 ) -> None:
     """Root mean square error (h, w) [m] of linear interpolation around every pixel, from the second differences.
 
@@ -27,7 +27,7 @@ def bending(
                 if row < r or column < c or row + r >= height or column + c >= width:
                     continue
                 before, after = distance[row - r, column - c], distance[row + r, column + c]
-                if abs(before - d) <= largest_step and abs(after - d) <= largest_step:
+                if abs(before - d) <= maximum_step and abs(after - d) <= maximum_step:
                     second = before - np.float32(2) * d + after
                     excess = second * second - np.float32(6) * sigma[row, column] ** 2
                     total += max(excess, np.float32(0))

@@ -6,10 +6,10 @@ from numpy.typing import NDArray
 from calib.camera import Camera
 
 #: Largest plausible median distance [m]; a larger one indicates a wrong unit.
-FARTHEST_M = 100.0
+MAX_DISTANCE_M = 100.0
 
 #: Largest plausible baseline, in metres and relative to the measured distances; beyond, T_rs has a wrong unit.
-LONGEST_BASELINE_M, BASELINE_RATIO = 10.0, 10.0
+MAX_BASELINE_M, BASELINE_RATIO = 10.0, 10.0
 
 
 class WarpError(ValueError):
@@ -21,7 +21,7 @@ class NoReturnsError(WarpError):
 
 
 class NoOverlapError(WarpError):
-    """No measurement is in the target's view."""
+    """Image of which no measurement is in the target's view."""
 
 
 class UnitError(WarpError):
@@ -45,9 +45,9 @@ def check(distance: NDArray[np.floating], source: Camera, target: Camera) -> Non
         raise NoReturnsError(f"none of the {source.width} × {source.height} pixels has a distance")
     median = float(np.median(known))
     baseline = float(np.linalg.norm(target.center - source.center))
-    if not 0 < median < FARTHEST_M:
+    if not 0 < median < MAX_DISTANCE_M:
         raise UnitError(f"a median distance of {median:g} is no length in metres; were millimetres divided by 1000?")
-    if baseline > max(LONGEST_BASELINE_M, BASELINE_RATIO * median):
+    if baseline > max(MAX_BASELINE_M, BASELINE_RATIO * median):
         raise UnitError(
             f"the cameras would be {baseline:g} m apart, at distances of {median:g} m; is T_rs in millimetres?"
         )

@@ -14,7 +14,7 @@ from calib.warp.points import Geometry, Points, bands
 Value = TypeVar("Value", bound=np.generic)
 
 #: Largest difference of neighbouring distances on one surface [m]; larger ones separate surfaces.
-LARGEST_STEP_M = 0.04
+MAX_STEP_M = 0.04
 
 #: Extent of a foreground surface beyond its outermost pixel centre, as a fraction of the next pixel.
 _REACH = 0.99
@@ -41,7 +41,7 @@ class MeshWarp:
         self,
         source: Camera,
         target: Camera,
-        largest_step_m: float = LARGEST_STEP_M,
+        maximum_step_m: float = MAX_STEP_M,
         each: ParallelMap = map,
         parts: int = 1,
     ):
@@ -50,7 +50,7 @@ class MeshWarp:
         Args:
             source: the depth sensor.
             target: the view: a pinhole, or any other camera.
-            largest_step_m: largest difference of neighbouring distances on one surface [m].
+            maximum_step_m: largest difference of neighbouring distances on one surface [m].
             each: applies a function to the parts; kernels release the interpreter lock.
             parts: number of bands of rows that may be processed concurrently.
 
@@ -58,14 +58,14 @@ class MeshWarp:
             LensError: one of the lenses has no inverse on the image.
         """
         self.geometry = Geometry(source, target)
-        self.largest_step_m = largest_step_m
+        self.maximum_step_m = maximum_step_m
         self._ray_length = target.lookup.ray_length.astype(np.float32)
         reach = _REACH * max(target.fx / source.fx, target.fy / source.fy) / source.lookup.ray_length
         self._reach = reach.astype(np.float32)
         self._each = each
         self._bands = bands(target.height, parts)
 
-    def warp(self, distance: NDArray[np.floating]) -> "Warped":
+    def warp(self, distance: NDArray[np.floating]) -> "WarpedDepth":
         """Radial distances (h, w) [m] of the source, NaN without return, in the view.
 
         Raises:
@@ -79,26 +79,26 @@ class MeshWarp:
         warped = np.empty(self._ray_length.shape, np.float32)
 
         def work(rows: tuple[int, int]) -> None:
-            raster.cover(points.source, self.largest_step_m, rows, buffer)
+            raster.cover(points.source, self.maximum_step_m, rows, buffer)
             shading.measure(face, nearness, self._ray_length, *rows, warped)
 
         for _ in self._each(work, self._bands):
             pass
-        raster.fray(points.source, self.largest_step_m, self._reach, buffer, warped)
+        raster.fray(points.source, self.maximum_step_m, self._reach, buffer, warped)
         if not (face >= 0).any():
             raise errors.nothing_seen(distance, points.inverse_z, self.geometry.target)
-        return Warped(warped, points, self.geometry, self.largest_step_m, face, nearness)
+        return WarpedDepth(warped, points, self.geometry, self.maximum_step_m, face, nearness)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Warped:
+class WarpedDepth:
     """Depth image in another view, with its correspondences.
 
     Attributes:
         distance: radial distances from the view's centre (height, width) [m], NaN where unknown.
         points: the source's points in the view.
         geometry: of the two cameras.
-        largest_step_m: as in `MeshWarp`.
+        maximum_step_m: as in `MeshWarp`.
         face: index of the face that covers a pixel (`calib.warp.raster`), −1 if none.
         nearness: 1/z of that face at the pixel [1/m].
     """
@@ -106,7 +106,7 @@ class Warped:
     distance: NDArray[np.float32]
     points: Points
     geometry: Geometry
-    largest_step_m: float
+    maximum_step_m: float
     face: NDArray[np.int32]
     nearness: NDArray[np.float32]
 
@@ -114,7 +114,7 @@ class Warped:
         """Pixels (height, width) that the view sees but that are occluded for the source; their distance is unknown."""
         torn = np.zeros(self.face.shape, np.bool_)
         points = self.points
-        raster.tear(points.source, self.largest_step_m, torn)
+        raster.tear(points.source, self.maximum_step_m, torn)
         return torn & (self.face < 0)
 
     def index(self) -> NDArray[np.int32]:
@@ -145,7 +145,7 @@ class Warped:
         """
         given = np.ascontiguousarray(np.broadcast_to(sigma, self.points.distance.shape), np.float32)
         bend, result = np.empty_like(given), np.empty(self.face.shape, np.float32)
-        bending.bending(self.points.distance, given, self.largest_step_m, bend)
+        bending.bending(self.points.distance, given, self.maximum_step_m, bend)
         geometry = self.geometry
         view_rays = geometry.target.lookup.rays.astype(np.float32)
         flat = (self.points.distance.ravel(), geometry.rays.reshape(-1, 3), geometry.shift, view_rays)

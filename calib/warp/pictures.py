@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.camera import Camera
-from calib.warp.mesh import LARGEST_STEP_M, MeshWarp
+from calib.warp.mesh import MAX_STEP_M, MeshWarp
 
 #: Depth difference beyond which a point is occluded [m].
 HIDING_M = 0.02
@@ -16,14 +16,12 @@ HIDING_M = 0.02
 class PictureLookup:
     """Maps a camera's images into a view by means of the view's distances."""
 
-    def __init__(
-        self, view: Camera, camera: Camera, largest_step_m: float = LARGEST_STEP_M, hiding_m: float = HIDING_M
-    ):
-        self._warp = MeshWarp(view, camera, largest_step_m)
+    def __init__(self, view: Camera, camera: Camera, maximum_step_m: float = MAX_STEP_M, hiding_m: float = HIDING_M):
+        self._warp = MeshWarp(view, camera, maximum_step_m)
         self._ray_length = camera.lookup.ray_length
         self._hiding_m = hiding_m
 
-    def look(self, distance: NDArray[np.floating]) -> "Sight":
+    def look(self, distance: NDArray[np.floating]) -> "Correspondence":
         """Positions of the view's points, given by radial distances (height, width) [m], in the camera's image.
 
         A point is occluded if the surface spanned by all points is nearer to the camera there.
@@ -42,14 +40,14 @@ class PictureLookup:
         # The rendered surface ends at its outermost pixel centres, so points beside a depth edge are checked
         # separately.
         around = np.asarray(cv2.erode(front, np.ones((3, 3), np.uint8)), np.float32)
-        nearest = np.minimum(front + self._hiding_m, around + max(self._hiding_m, self._warp.largest_step_m))
+        nearest = np.minimum(front + self._hiding_m, around + max(self._hiding_m, self._warp.maximum_step_m))
         with np.errstate(invalid="ignore"):
             visible = inside & (self._ray_length[row, column] / warped.points.inverse_z < nearest[row, column])
-        return Sight(place, visible)
+        return Correspondence(place, visible)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Sight:
+class Correspondence:
     """Correspondence of the points of a view with a camera's image.
 
     Attributes:
@@ -68,7 +66,7 @@ class Sight:
         return result
 
     def blended(self, picture: NDArray[np.generic]) -> NDArray[np.float32]:
-        """Like `nearest`, but bilinear; the outermost half pixel is extrapolated."""
+        """Picture sampled bilinearly, see `nearest`; the outermost half pixel is extrapolated."""
         height, width, _ = picture.shape
         result = np.full((*self.visible.shape, picture.shape[2]), np.nan, np.float32)
         place = np.clip(self.place[self.visible], 0, (width - 1, height - 1))

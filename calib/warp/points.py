@@ -13,7 +13,7 @@ from calib.jit import kernel
 from calib.lenses.forward import projector
 
 #: Minimum z of a visible point [m].
-_NEAREST_M = 1e-3
+_MIN_Z_M = 1e-3
 
 
 class Source(NamedTuple):
@@ -97,7 +97,7 @@ def _see(
             z = distance[r, c] * rays[r, c, 2] + shift[2]
             inverse = one / z
             u, w = x * inverse, y * inverse
-            seen = z > np.float32(_NEAREST_M) and u * u + w * w < farthest
+            seen = z > np.float32(_MIN_Z_M) and u * u + w * w < farthest
             ideal[r, c, 0] = u if seen else zero
             ideal[r, c, 1] = w if seen else zero
             inverse_z[r, c] = inverse if seen else np.float32(np.nan)

@@ -32,7 +32,7 @@ class ZBuffer(NamedTuple):
 @kernel
 def cover(
     source: Source,
-    largest_step: float,
+    maximum_step: float,
     rows: tuple[int, int],
     buffer: ZBuffer,
 ) -> None:
@@ -43,7 +43,7 @@ def cover(
     place, inverse_z, distance = source
     (nearness, face), (top, bottom) = buffer, rows
     zero, one, edge = np.float32(0), np.float32(1), np.float32(_EDGE)
-    slack, step = np.float32(1e-3), np.float32(largest_step)
+    slack, step = np.float32(1e-3), np.float32(maximum_step)
     columns, width, lowest, highest = place.shape[1], nearness.shape[1], np.float32(top), np.float32(bottom - 1)
     rightmost = np.float32(width - 1)
     for r in range(place.shape[0] - 1):
@@ -158,7 +158,7 @@ def _fill(
 @kernel
 def fray(
     source: Source,
-    largest_step: float,
+    maximum_step: float,
     reach: NDArray[np.float32],
     buffer: ZBuffer,
     warped: NDArray[np.float32],
@@ -171,7 +171,7 @@ def fray(
     place, inverse_z, distance = source
     nearness, face = buffer
     height, width = face.shape
-    step, one = np.float32(largest_step), np.float32(1)
+    step, one = np.float32(maximum_step), np.float32(1)
     for r in range(place.shape[0] - 1):
         for c in range(place.shape[1] - 1):
             d0, d1, d2, d3 = distance[r, c], distance[r, c + 1], distance[r + 1, c], distance[r + 1, c + 1]
@@ -204,14 +204,14 @@ def largest(distance: NDArray[np.float32], r: int, c: int) -> np.float32:
 @kernel
 def tear(
     source: Source,
-    largest_step: float,
+    maximum_step: float,
     torn: NDArray[np.bool_],
 ) -> None:
     """Marks pixels behind depth edges: the region between foreground and background is unobserved."""
     place, inverse_z, distance = source
     for r in range(place.shape[0] - 1):
         for c in range(place.shape[1] - 1):
-            if not height_of_step(distance, r, c) > largest_step:
+            if not height_of_step(distance, r, c) > maximum_step:
                 continue
             n0, n1, n2, n3 = inverse_z[r, c], inverse_z[r, c + 1], inverse_z[r + 1, c], inverse_z[r + 1, c + 1]
             gap = lone_gap(n0, n1, n2, n3)

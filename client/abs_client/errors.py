@@ -6,7 +6,7 @@ class ClientError(Exception):
 
 
 class UnreachableError(ClientError, ConnectionError):
-    """Nothing answers at an endpoint, or it refuses this program."""
+    """Endpoint that does not answer, or refuses this program."""
 
 
 class UnknownNameError(ClientError, ValueError):

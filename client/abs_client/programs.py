@@ -9,7 +9,7 @@ from pathlib import Path
 from abs_client.connection.link import DEFAULT_ENDPOINT, Link
 from abs_client.connection.tls import Tls
 from abs_client.estimates import states
-from abs_client.rig import LARGEST_AGE_S
+from abs_client.rig import MAX_AGE_S
 
 #: Exit status for what the user can mend.
 USER_ERROR = 2
@@ -20,7 +20,7 @@ def add_rig(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--endpoint", default=DEFAULT_ENDPOINT, help="bus.endpoint of the rig [%(default)s]")
     parser.add_argument("--rig", default="demo", help="its name [%(default)s]")
     parser.add_argument(
-        "--largest-age", type=_age, default=LARGEST_AGE_S, metavar="S", help="of estimates, in seconds [%(default)s]"
+        "--maximum-age", type=_age, default=MAX_AGE_S, metavar="S", help="of estimates, in seconds [%(default)s]"
     )
     parser.add_argument(
         "--tls", type=Path, nargs=3, metavar=("AUTHORITY", "CERTIFICATE", "KEY"), help="for a rig with [bus.tls]"

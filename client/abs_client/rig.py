@@ -19,7 +19,7 @@ from abs_client.images import Image
 from abs_client.stream import NothingReceivedError, Stream
 
 #: Estimates that are older are left out [s].
-LARGEST_AGE_S = 0.5
+MAX_AGE_S = 0.5
 
 #: Fields of a control's value by its type.
 _FIELDS = {bool: "on", int: "whole", float: "number", str: "choice"}
@@ -33,29 +33,29 @@ def subscribe(
     endpoint: str = DEFAULT_ENDPOINT,
     rig: str = "demo",
     tracker: str = "sheet",
-    largest_age_s: float = LARGEST_AGE_S,
+    maximum_age_s: float = MAX_AGE_S,
     tls: Tls | None = None,
 ) -> Stream[State]:
     """The estimates of a tracker for `for` or `async for`: always the newest, and what belongs together.
 
-    A reader that is slow gets fewer, not older ones. When no estimate younger than `largest_age_s` came for so long, it
-    gets a STALE state, again after every `largest_age_s`, until there are new ones. Connecting may take some seconds.
+    A reader that is slow gets fewer, not older ones. When no estimate younger than `maximum_age_s` came for so long, it
+    gets a STALE state, again after every `maximum_age_s`, until there are new ones. Connecting may take some seconds.
 
     Args:
         endpoint: `bus.endpoint` of the rig.
         rig, tracker: their names.
-        largest_age_s: age beyond which an estimate is not given [s]; infinite: all are given, silence is not reported.
+        maximum_age_s: age beyond which an estimate is not given [s]; infinite: all are given, silence is not reported.
         tls: for a rig with `[bus.tls]`.
 
     Raises:
         UnknownNameError: `endpoint`, `rig` or `tracker` cannot be one.
-        RangeError: `largest_age_s` is not greater than 0.
+        RangeError: `maximum_age_s` is not greater than 0.
         UnreachableError: nothing answers at `endpoint`.
     """
     checked(tracker)
-    states.checked_age(largest_age_s)
+    states.checked_age(maximum_age_s)
     link = Link(endpoint, rig, tls)
-    return states.states(link, tracker, largest_age_s, link.close)
+    return states.states(link, tracker, maximum_age_s, link.close)
 
 
 class Rig:
@@ -73,17 +73,17 @@ class Rig:
         """Messages so far that could not be read, by key; they are left out."""
         return dict(self._link.malformed)
 
-    def states(self, tracker: str, largest_age_s: float = LARGEST_AGE_S) -> Stream[State]:
+    def states(self, tracker: str, maximum_age_s: float = MAX_AGE_S) -> Stream[State]:
         """The estimates of a tracker, see `subscribe`."""
-        return states.states(self._link, checked(tracker), largest_age_s)
+        return states.states(self._link, checked(tracker), maximum_age_s)
 
-    def compact_states(self, tracker: str, largest_age_s: float = LARGEST_AGE_S) -> Stream[State]:
+    def compact_states(self, tracker: str, maximum_age_s: float = MAX_AGE_S) -> Stream[State]:
         """The same over a slow link: only theta and status are sent, some hundred bytes for each estimate.
 
         Vertices are computed here, from a basis that is sent once for each mesh. Covariances and shares are unknown.
         Models without a basis, all but `nurbs`, have no vertices.
         """
-        return states.states(self._link, checked(tracker), largest_age_s, feed=feeds.compact)
+        return states.states(self._link, checked(tracker), maximum_age_s, feed=feeds.compact)
 
     def images(self, sensor: str, stream: str) -> Stream[Image]:
         """The images of a sensor's stream, for `for` or `async for`: always the newest."""

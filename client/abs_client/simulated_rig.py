@@ -117,9 +117,9 @@ class RunningRig:
     tracker: str
     process: subprocess.Popen
 
-    def states(self, largest_age_s: float = 0.5) -> Stream[State]:
+    def states(self, maximum_age_s: float = 0.5) -> Stream[State]:
         """The estimates of its tracker."""
-        return subscribe(self.endpoint, self.name, self.tracker, largest_age_s)
+        return subscribe(self.endpoint, self.name, self.tracker, maximum_age_s)
 
 
 @contextmanager

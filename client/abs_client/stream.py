@@ -16,7 +16,7 @@ T_co = TypeVar("T_co", covariant=True)
 
 
 class NothingReceivedError(ClientError, TimeoutError):
-    """Nothing came in time."""
+    """Timeout: no message came in time."""
 
 
 class Source(Protocol[T_co]):

@@ -49,8 +49,8 @@ def some_of(words: Iterable[str]) -> Callable[[str], tuple[str, ...]]:
     return read
 
 
-def numbers(most: int, low: float, high: float) -> Callable[[str], tuple[float, ...]]:
-    """Parser of up to `most` comma-separated numbers from `low` to `high`."""
+def numbers(maximum: int, low: float, high: float) -> Callable[[str], tuple[float, ...]]:
+    """Parser of up to `maximum` comma-separated numbers from `low` to `high`."""
     read_one = number(float, low, high)
 
     def read(text: str) -> tuple[float, ...]:
@@ -59,8 +59,8 @@ def numbers(most: int, low: float, high: float) -> Callable[[str], tuple[float, 
             found = tuple(map(read_one, parts))
         except ValueError:
             found = ()
-        if not 1 <= len(found) <= most:
-            raise ValueError(f"1 to {most} numbers from {low:g} to {high:g} with commas in between")
+        if not 1 <= len(found) <= maximum:
+            raise ValueError(f"1 to {maximum} numbers from {low:g} to {high:g} with commas in between")
         return found
 
     return read

@@ -57,7 +57,7 @@ class Mapped(Protocol):
 
     @property
     def gauges(self) -> Mapping[str, float]:
-        """Its measurements, by name."""
+        """Measurements of the clock, by name."""
         ...
 
 

@@ -50,7 +50,7 @@ class FrameError(ValueError):
 #: Exposures from the reference to the middle.
 _TO_MIDDLE: Mapping[Reference, float] = {Reference.START: 0.5, Reference.MIDDLE: 0.0, Reference.END: -0.5}
 #: Longest exposure that is believed [s].
-_LONGEST_S = 10.0
+_MAX_EXPOSURE_S = 10.0
 
 #: Default unit by kind; all other kinds are in device-specific digital numbers.
 _UNITS: Mapping[Kind, str] = {Kind.DEPTH: "m", Kind.DEVIATION: "m", Kind.BINARY: "1"}
@@ -163,7 +163,7 @@ class Frame:
 
     def at_middle(self) -> "Frame":
         """The frame with the times of the middle of its exposure; unchanged if the exposure is unknown."""
-        if self.t_reference is Reference.MIDDLE or not 0 <= self.exposure_s <= _LONGEST_S:
+        if self.t_reference is Reference.MIDDLE or not 0 <= self.exposure_s <= _MAX_EXPOSURE_S:
             return self
         after_s = _TO_MIDDLE[self.t_reference] * self.exposure_s
         return replace(

@@ -3,7 +3,7 @@
 import re
 
 #: Longest text [characters].
-LONGEST = 1 << 14
+MAX_LENGTH = 1 << 14
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
 _LINES = str.maketrans("\n\t", "  ")
@@ -14,9 +14,9 @@ def is_name(text: str) -> bool:
     return _NAME.fullmatch(text) is not None
 
 
-def is_printable(text: str, longest: int = LONGEST) -> bool:
+def is_printable(text: str, maximum: int = MAX_LENGTH) -> bool:
     """True if a text is not too long and moves no cursor: all characters can be printed, or end a line."""
-    return len(text) <= longest and text.translate(_LINES).isprintable()
+    return len(text) <= maximum and text.translate(_LINES).isprintable()
 
 
 def printable(text: str) -> str:
@@ -24,4 +24,4 @@ def printable(text: str) -> str:
     if is_printable(text):
         return text
     shown = (c if c in "\n\t" or c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
-    return "".join(shown)[:LONGEST]
+    return "".join(shown)[:MAX_LENGTH]

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from drivers.contract.frame import ENCODINGS
 from drivers.encoding import codec, image_size, pixel_filter, raw_image
-from drivers.encoding.message_check import LARGEST_IMAGE
+from drivers.encoding.message_check import MAX_IMAGE_BYTES
 from drivers.encoding.parsing import CodecError, parse_message, pixels_of, shape_of
 from drivers.encoding.pixel_filter import Filter, PixelFilterError, Predictor
 
@@ -141,7 +141,7 @@ def _pixels(message: EncodedImage) -> NDArray[Any]:
     if message.encoding not in ENCODINGS:
         raise CodecError(f"{name}: encoding {message.encoding!r} is none of {sorted(ENCODINGS)}")
     dtype, shape = ENCODINGS[message.encoding][0], shape_of(message)
-    if not 0 < math.prod(shape) * dtype.itemsize <= LARGEST_IMAGE:
+    if not 0 < math.prod(shape) * dtype.itemsize <= MAX_IMAGE_BYTES:
         raise CodecError(f"{name}: an image of {message.width} × {message.height} pixels is empty or too large")
     chosen = Filter(Predictor(message.predictor), message.green_subtracted)
     try:

@@ -8,10 +8,10 @@ from mcap.exceptions import McapError
 from mcap.records import Chunk, McapRecord
 from mcap.stream_reader import breakup_chunk
 
-from drivers.encoding.message_check import LARGEST_IMAGE
+from drivers.encoding.message_check import MAX_IMAGE_BYTES
 
 #: Largest chunk, decompressed: the recorder's hold a megabyte, or one image that is larger [bytes].
-LARGEST_CHUNK = LARGEST_IMAGE + (1 << 24)
+MAX_CHUNK_BYTES = MAX_IMAGE_BYTES + (1 << 24)
 
 
 class ChunkSizeError(McapError):
@@ -25,8 +25,8 @@ def records(chunk: Chunk) -> list[McapRecord]:
         ChunkSizeError: see there.
         Exception: whatever decompressors and the library make of damaged bytes; see `drivers.replay.contents.DAMAGE`.
     """
-    if chunk.uncompressed_size > LARGEST_CHUNK:
-        raise ChunkSizeError(f"a chunk of {chunk.uncompressed_size} bytes, {LARGEST_CHUNK} are allowed")
+    if chunk.uncompressed_size > MAX_CHUNK_BYTES:
+        raise ChunkSizeError(f"a chunk of {chunk.uncompressed_size} bytes, {MAX_CHUNK_BYTES} are allowed")
     data = _decompressed(chunk)
     if len(data) != chunk.uncompressed_size:
         raise ChunkSizeError(f"a chunk has other than the {chunk.uncompressed_size} bytes that it claims")
@@ -34,7 +34,7 @@ def records(chunk: Chunk) -> list[McapRecord]:
 
 
 def _decompressed(chunk: Chunk) -> bytes:
-    """At most one byte more than the chunk claims."""
+    """Content of a chunk, cut at one byte more than it claims."""
     size = chunk.uncompressed_size
     if chunk.compression == "zstd":
         if zstandard.frame_content_size(chunk.data) not in (size, -1):  # for which memory would be reserved

@@ -10,20 +10,20 @@ from typing import Any, TypeVar
 from google.protobuf.descriptor import FieldDescriptor
 from google.protobuf.message import Message
 
-from drivers.contract.text import LONGEST, is_printable
+from drivers.contract.text import MAX_LENGTH, is_printable
 from drivers.encoding.message_content import CONTENT, MAX_POINTS, MessageError
 from drivers.encoding.parsing import CodecError, parse_message
 
 #: Largest message of any type [bytes]; of an image: 8192 × 8192 pixels of four bytes.
-LARGEST, LARGEST_IMAGE = 1 << 24, 1 << 28
+MAX_BYTES, MAX_IMAGE_BYTES = 1 << 24, 1 << 28
 #: Longest text of a configuration [characters].
-LONGEST_FILE = 1 << 20
+MAX_FILE_LENGTH = 1 << 20
 #: Most entries of a map, and most texts or messages in a list.
 MAX_ENTRIES = 2000
 #: Largest image [pixels along a side].
-LARGEST_SIDE = 1 << 14
+MAX_SIDE_PX = 1 << 14
 #: A larger gap in sequence numbers is no loss: the numbers are not those of one publisher.
-LARGEST_GAP = 1_000_000
+MAX_GAP = 1_000_000
 
 _TIME_NS = 1 << 62  # differences of two times fit into 64 bits
 
@@ -36,14 +36,14 @@ _RANGES: Mapping[str, tuple[int, int]] = {
     "absmsg.v1.FrameInfo.seq": (0, 1 << 62),
     "absmsg.v1.FrameInfo.t_sigma_ns": (0, _TIME_NS),
     "absmsg.v1.FrameInfo.t_arrival_ns": (-_TIME_NS, _TIME_NS),
-    "absmsg.v1.Reinitialize.Pixel.column": (0, LARGEST_SIDE - 1),
-    "absmsg.v1.Reinitialize.Pixel.row": (0, LARGEST_SIDE - 1),
+    "absmsg.v1.Reinitialize.Pixel.column": (0, MAX_SIDE_PX - 1),
+    "absmsg.v1.Reinitialize.Pixel.row": (0, MAX_SIDE_PX - 1),
     "absmsg.v1.DeformationState.Sensor.t_host_ns": (-_TIME_NS, _TIME_NS),
     "absmsg.v1.DeformationState.Sensor.seq": (0, 1 << 62),
-    "absmsg.v1.SensorModel.width": (1, LARGEST_SIDE),
-    "absmsg.v1.SensorModel.height": (1, LARGEST_SIDE),
-    "foxglove.RawImage.width": (0, LARGEST_SIDE),
-    "foxglove.RawImage.height": (0, LARGEST_SIDE),
+    "absmsg.v1.SensorModel.width": (1, MAX_SIDE_PX),
+    "absmsg.v1.SensorModel.height": (1, MAX_SIDE_PX),
+    "foxglove.RawImage.width": (0, MAX_SIDE_PX),
+    "foxglove.RawImage.height": (0, MAX_SIDE_PX),
 }
 
 #: Lists of which only the length is checked: points and colours that only viewers read.
@@ -86,7 +86,7 @@ def check_size(message: str, payload: bytes) -> None:
     Raises:
         MessageError: it is too large.
     """
-    largest = LARGEST_IMAGE if message.endswith("Image") else LARGEST
+    largest = MAX_IMAGE_BYTES if message.endswith("Image") else MAX_BYTES
     if len(payload) > largest:
         raise MessageError("size", f"{message} of {len(payload)} bytes, {largest} are allowed")
 
@@ -126,7 +126,7 @@ def _check_values(field: FieldDescriptor, values: Iterable[Any]) -> None:
         for value in values:
             _check_fields(value)
     elif kind == FieldDescriptor.CPPTYPE_STRING and field.type != FieldDescriptor.TYPE_BYTES:
-        longest = LONGEST_FILE if name == "absmsg.v1.Config.toml" else LONGEST
+        longest = MAX_FILE_LENGTH if name == "absmsg.v1.Config.toml" else MAX_LENGTH
         odd = next((value for value in values if not is_printable(value, longest)), None)
         if odd is not None:
             raise MessageError("text", f"{name} = {odd[:40]!r} is too long or cannot be printed")
@@ -146,6 +146,6 @@ def _require_all(name: str, values: Iterable[Any], holds: Callable[[Any], bool],
         raise MessageError(cause, f"{name} = {odd} {rule}")
 
 
-def _check_count(name: str, number: int, most: int = MAX_ENTRIES) -> None:
-    if number > most:
-        raise MessageError("size", f"{name} has {number} entries, {most} are allowed")
+def _check_count(name: str, number: int, maximum: int = MAX_ENTRIES) -> None:
+    if number > maximum:
+        raise MessageError("size", f"{name} has {number} entries, {maximum} are allowed")

@@ -23,7 +23,7 @@ _FIXED = {1: 8, 5: 4}
 _MAX_FIELDS = 100
 
 #: Largest number of bytes of a varint: 64 bits, seven in each.
-_LONGEST = 10
+_MAX_BYTES = 10
 
 
 def serialize(image: RawImage, pixels: NDArray) -> bytes:
@@ -71,7 +71,7 @@ def _size(whole: memoryview, position: int, wire_type: int) -> tuple[int, int]:
 def _varint(whole: memoryview, position: int) -> tuple[int, int]:
     """A number of variable length, and where it ends."""
     value = 0
-    for shift in range(0, 7 * _LONGEST, 7):
+    for shift in range(0, 7 * _MAX_BYTES, 7):
         if position >= len(whole):
             break
         byte = whole[position]

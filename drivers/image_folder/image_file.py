@@ -12,7 +12,7 @@ from drivers.encoding import image_size
 from drivers.image_folder.listing import ImageFolderError
 
 #: Largest file [bytes].
-LARGEST = 1 << 28
+MAX_BYTES = 1 << 28
 #: Formats that can be read, for messages.
 READABLE = "PNG, TIFF, PGM, PPM, JPEG, WebP and BMP"
 #: Beginning of the text that stands in for a file of a repository with Git Large File Storage.
@@ -26,7 +26,7 @@ def read(path: Path) -> NDArray[Any]:
         ImageFolderError: it is no image, or a part of it is missing; names the file.
     """
     try:
-        content = limited.read(path, LARGEST)
+        content = limited.read(path, MAX_BYTES)
     except OSError as error:
         raise ImageFolderError(f"{path}: cannot be read: {error.strerror}") from error
     if content.startswith(_POINTER):

@@ -11,7 +11,7 @@ from pathlib import Path
 from calib.files import limited
 
 #: Largest list of images [bytes].
-LARGEST_LIST = 1 << 26
+MAX_LIST_BYTES = 1 << 26
 
 #: Names of images, and how many files are looked at and patterns are named where none matches.
 _SUFFIXES = {".bmp", ".jpeg", ".jpg", ".pgm", ".png", ".ppm", ".tif", ".tiff", ".webp"}
@@ -133,7 +133,7 @@ def time_problem(folder: Path, name: str) -> str:
 def _listed(folder: Path, name: str) -> dict[Path, int]:
     """Time [ns] of each file in a list, in the order of its lines; raises as `by_list`."""
     try:
-        lines = limited.read(folder / name, LARGEST_LIST).decode().splitlines()
+        lines = limited.read(folder / name, MAX_LIST_BYTES).decode().splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise ImageFolderError(f"{folder / name}: cannot be read: {getattr(error, 'strerror', 'not text')}") from error
     times: dict[Path, int] = {}

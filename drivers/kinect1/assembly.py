@@ -19,7 +19,7 @@ LOST, HEADER, SIZE, RESYNC = range(4)
 
 #: The most packets lost in a row that are bridged, as in libfreenect (src/cameras.c). Sequence numbers have eight bits,
 #: so the number of lost packets is not known after long gaps.
-LONGEST_GAP = 5
+MAX_GAP = 5
 
 # State of the assembler, an array modified by the kernel. PLACE is the index in the image of the next expected packet,
 # -1 while waiting for the start of an image; the causes count images, MISSING counts packets.
@@ -37,14 +37,14 @@ def fits(place: Count, flag: Count, count: Count) -> bool | np.bool_:
 
 
 @kernel
-def bridge(place: Count, lost: Count, flag: Count, gone: NDArray[np.uint8], longest_gap: int) -> Count:
+def bridge(place: Count, lost: Count, flag: Count, gone: NDArray[np.uint8], maximum_gap: int) -> Count:
     """Place of the packet that follows `lost` lost ones; marks these in `gone`.
 
     Returns:
         `gone.size` if the image ends in the gap; -1 if the gap is too long, or if the flag contradicts it.
     """
     after, count = place + lost, gone.size
-    if place < 0 or lost > longest_gap:
+    if place < 0 or lost > maximum_gap:
         return -1
     if place > 0 and after >= count and fits(after - count, flag, count):
         gone[place:] = 1
@@ -74,11 +74,11 @@ def cross_gap(
     flag: Count,
     state: NDArray[np.int64],
     gone: NDArray[np.uint8],
-    longest_gap: int,
+    maximum_gap: int,
 ) -> None:
     """Bridges the packets lost before this one, or gives up the image; completes it if it ended with them."""
     place, lost = state[PLACE], (np.int64(packet[5]) - state[SEQ]) & 255
-    after, count = bridge(place, lost, flag, gone, longest_gap), gone.size
+    after, count = bridge(place, lost, flag, gone, maximum_gap), gone.size
     if after == count:
         state[MISSING] += count - place
         state[SEQ] = (state[SEQ] + count - place) & 255
@@ -103,7 +103,7 @@ def assemble(
     gone: NDArray[np.uint8],
     base: int,
     payload: int,
-    longest_gap: int,
+    maximum_gap: int,
 ) -> int:
     """Copies payload into `image` until it is complete or all packets are consumed.
 
@@ -115,7 +115,7 @@ def assemble(
             earlier call.
         image: (bytes of an image,) uint8; places of lost packets keep what they had.
         gone: (packets of an image,) uint8, 1 for a lost packet.
-        base, payload, longest_gap: see `PacketFormat` and `Assembler`.
+        base, payload, maximum_gap: see `PacketFormat` and `Assembler`.
 
     Returns:
         The next row; COMPLETE of the state is 1 if an image is complete.
@@ -136,7 +136,7 @@ def assemble(
             continue
         seq = np.int64(packets[row, 5])
         if state[SEQ] >= 0 and seq != state[SEQ]:
-            cross_gap(packets[row], row, flag, state, gone, longest_gap)
+            cross_gap(packets[row], row, flag, state, gone, maximum_gap)
             if state[COMPLETE]:
                 return row  # to be looked at again, as a packet of the next image
             place = state[PLACE]
@@ -193,12 +193,12 @@ class Assembler:
 
     Args:
         form: packet format.
-        longest_gap: the most packets lost in a row that do not drop the image; 0 if images must be complete.
+        maximum_gap: the most packets lost in a row that do not drop the image; 0 if images must be complete.
     """
 
-    def __init__(self, form: PacketFormat, longest_gap: int = 0) -> None:
+    def __init__(self, form: PacketFormat, maximum_gap: int = 0) -> None:
         self._form = form
-        self._longest_gap = longest_gap
+        self._maximum_gap = maximum_gap
         self._gone = np.zeros(form.packets, np.uint8)
         self._image = np.zeros(form.image_bytes, np.uint8)
         self._state = np.zeros(STATE_SIZE, np.int64)
@@ -230,7 +230,7 @@ class Assembler:
         while row < len(packets):
             row = assemble(
                 packets, lengths, row, self._state, self._image, self._gone,
-                self._form.base, self._form.payload, self._longest_gap,
+                self._form.base, self._form.payload, self._maximum_gap,
             )  # fmt: skip
             if self._state[COMPLETE]:
                 yield self._complete()

@@ -40,7 +40,7 @@ _AUTO_EXPOSURE, _AUTO_WHITE_BALANCE = 1 << 14, 1 << 1
 LINE_S = 54.21e-6
 
 #: The longest exposure at 30 images per second, in lines.
-LONGEST_LINES = 614
+MAX_LINES = 614
 
 
 class KinectCamera:
@@ -78,7 +78,7 @@ class KinectCamera:
 
     def set_exposure_s(self, seconds: float) -> None:
         """Sets the exposure time to the nearest multiple of `LINE_S`; no effect during automatic exposure."""
-        lines = min(max(round(seconds / LINE_S), 1), LONGEST_LINES)
+        lines = min(max(round(seconds / LINE_S), 1), MAX_LINES)
         self._commands.write_color_sensor(_EXPOSURE, lines)
 
     def auto_exposure(self) -> bool:

@@ -11,7 +11,7 @@ from drivers.contract.controls import Control, ControlInfo, ControlKind, Control
 from drivers.contract.device import DeviceError, DeviceInfo, DeviceState, Sink
 from drivers.contract.frame_gate import FrameGate
 from drivers.kinect1.assembly import CAUSES
-from drivers.kinect1.camera import LINE_S, LONGEST_LINES, KinectCamera, Stream
+from drivers.kinect1.camera import LINE_S, MAX_LINES, KinectCamera, Stream
 from drivers.kinect1.color_settings import ColorSettings
 from drivers.kinect1.stream_decoder import StreamDecoder, camera_of, stream_info
 from drivers.kinect1.transport.commands import Commands
@@ -173,7 +173,7 @@ def _controls(camera: KinectCamera, streams: tuple[Stream, ...], changed: Callab
         )
     ]
     if Stream.COLOR in streams:
-        limits = {"unit": "s", "minimum": LINE_S, "maximum": LONGEST_LINES * LINE_S}
+        limits = {"unit": "s", "minimum": LINE_S, "maximum": MAX_LINES * LINE_S}
         controls += [
             Control(
                 ControlInfo("exposure_s", ControlKind.NUMBER, **limits),

@@ -11,7 +11,7 @@ from drivers.contract.capabilities import ClockInfo, StreamInfo
 from drivers.contract.clock import DeviceClock, Stamp, stream_gauges
 from drivers.contract.frame import Frame, Geometry, Kind, Reference
 from drivers.kinect1 import unpacking
-from drivers.kinect1.assembly import LONGEST_GAP, Assembler, RawImage
+from drivers.kinect1.assembly import MAX_GAP, Assembler, RawImage
 from drivers.kinect1.camera import Stream
 from drivers.kinect1.reference_plane import DEPTH_SCALE, ReferencePlane
 from drivers.kinect1.transport.packets import TICK_HZ
@@ -57,7 +57,7 @@ class StreamDecoder:
         self._table = plane.table()
         self._calib_id = camera_of(stream, plane).calib_id
         # Only depth has a value for pixels without a measurement.
-        self._assembler = Assembler(stream.form, LONGEST_GAP if stream == Stream.DEPTH else 0)
+        self._assembler = Assembler(stream.form, MAX_GAP if stream == Stream.DEPTH else 0)
         self._incomplete = 0
         self._clock = DeviceClock(self.info.clock)
 

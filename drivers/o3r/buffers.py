@@ -16,7 +16,7 @@ from drivers.o3r.chunks import Chunk, ChunkError, ChunkType, messages
 from drivers.o3r.exposure import SENSOR, Exposure
 
 #: Largest file, which is read as a whole [bytes].
-LARGEST = 1 << 32
+MAX_BYTES = 1 << 32
 
 #: Chunk of the images, by stream name.
 _STREAMS: Mapping[str, ChunkType] = {
@@ -39,7 +39,7 @@ class O3rBuffers:
     def __init__(self, path: Path) -> None:
         self._path = path
         try:
-            self._exposures = list(messages(limited.read(path, LARGEST)))
+            self._exposures = list(messages(limited.read(path, MAX_BYTES)))
             lacking = [kind.name for chunks in self._exposures for kind in _NEEDED if kind not in chunks]
             if lacking or not self._exposures:
                 raise ChunkError(f"there is no chunk {lacking[0] if lacking else 'at all'}")

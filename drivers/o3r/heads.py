@@ -31,10 +31,10 @@ class Head:
     rate_hz: float
 
     def found(self, unit: str, firmware: str) -> Found:
-        """Its identity, and what is in the way.
+        """Identity of the head, and what keeps it from being used.
 
         Args:
-            unit: address of the processing unit, with its TCP port unless that is the usual one.
+            unit: address of the processing unit, with its TCP port unless that is the default.
             firmware: version of the processing unit's firmware.
         """
         uri = f"o3r://{unit}?head={self.serial}"

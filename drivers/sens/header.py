@@ -19,7 +19,7 @@ from drivers.encoding.image_size import MAX_PIXELS
 #: The only version: those before are of files named .sensor, or were never published.
 VERSION = 4
 #: Longest name of a sensor [bytes].
-LONGEST_NAME = 1024
+MAX_NAME_LENGTH = 1024
 #: Most frames: six days at 30 Hz.
 MAX_FRAMES = 1 << 24
 #: Units of depth that a metre may have.
@@ -116,8 +116,8 @@ def read(stream: BinaryIO) -> Header:
     version, length = _BEGIN.unpack(_exactly(stream, _BEGIN.size))
     if version != VERSION:
         raise SensError(f"version = {version}: only {VERSION} can be read; or this is no .sens file")
-    if length > LONGEST_NAME:
-        raise SensError(f"the sensor's name has {length} bytes, {LONGEST_NAME} are allowed")
+    if length > MAX_NAME_LENGTH:
+        raise SensError(f"the sensor's name has {length} bytes, {MAX_NAME_LENGTH} are allowed")
     _exactly(stream, length)
     *numbers, color, depth, color_width, color_height, depth_width, depth_height, shift, count = _REST.unpack(
         _exactly(stream, _REST.size)

@@ -8,7 +8,7 @@ from typing import BinaryIO
 from drivers.sens.header import Header, SensError
 
 #: Largest image in a file, compressed or not [bytes].
-LARGEST = 1 << 28
+MAX_BYTES = 1 << 28
 
 #: Pose of the camera in the scene, time stamps of colour and depth [µs], their sizes [bytes].
 _FRAME = struct.Struct("<16f4Q")
@@ -57,8 +57,8 @@ def places(stream: BinaryIO, header: Header) -> Iterator[FramePlaces]:
             raise SensError(f"{named} is cut off: the file ends at byte {file_size}{whole}")
         *_, color_us, depth_us, color_size, depth_size = _FRAME.unpack(head)
         for name, size in (("color", color_size), ("depth", depth_size)):
-            if size > LARGEST:
-                raise SensError(f"{named}: {name}_size_bytes = {size}: {LARGEST} are allowed{whole}")
+            if size > MAX_BYTES:
+                raise SensError(f"{named}: {name}_size_bytes = {size}: {MAX_BYTES} are allowed{whole}")
         color = Place(color_us, position + _FRAME.size, color_size)
         depth = Place(depth_us, color.offset + color_size, depth_size)
         position = depth.offset + depth_size

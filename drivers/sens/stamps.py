@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from drivers.sens.places import FramePlaces
 
 #: Largest time stamp of which there are nanoseconds in 64 bits [µs].
-_LATEST_US = (2**63 - 1) // 1000
+_MAX_TIME_US = (2**63 - 1) // 1000
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +48,7 @@ class Stamps:
         """Takes the next frame."""
         for name, image in frame.images.items():
             last_us = self._last_us.get(name, -1)
-            if not last_us < image.time_us <= _LATEST_US:
+            if not last_us < image.time_us <= _MAX_TIME_US:
                 after = f" after {last_us} µs" if last_us >= 0 else ""
                 self._problems.setdefault(name, f"{name} of frame {frame.number} is of {image.time_us} µs{after}")
             self._last_us[name] = image.time_us

@@ -78,7 +78,7 @@ def test_per_frame_search_metric(benchmark):
 
 @pytest.mark.parametrize("vertices", [300, 1000])
 def test_whole_frame(benchmark, vertices):
-    """From a frame set to an estimate with the default plan, `hybrid`, while the sheet moves and bends."""
+    """Time from a frame set to an estimate with the default plan, `hybrid`, while the sheet moves and bends."""
     tracking = TrackingSession(RIG, default_plan(vertices=vertices))
     for k in APPROACH:
         tracking.track(frame_set(SIMULATION.expose(k)[0], k), lambda: True)

@@ -39,7 +39,7 @@ def deviations(solution: Solution, count: int, generator: np.random.Generator) -
 
 
 def ratios(solution: Solution, count: int, generator: np.random.Generator) -> dict[str, float]:
-    """Such deviations over those that the disagreement of the poses states, by the names of the parameters."""
+    """Ratios of `deviations` to those that the disagreement of the poses states, by the names of the parameters."""
     found = deviations(solution, count, generator)
     stated = np.sqrt(np.diag(solution.adjustment.between_poses))
     return {each.name: ratio for each, ratio in zip(solution.parameters, (found / stated).tolist(), strict=False)}

@@ -1,4 +1,4 @@
-"""Same corners and model for mrcal and for us: projections, and the uncertainty that both state."""
+"""Comparison with mrcal on the same corners and model: projections, and the uncertainty that both state."""
 
 import json
 import subprocess

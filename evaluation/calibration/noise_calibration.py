@@ -22,7 +22,7 @@ from abs_service.report.content import Cell, Column, Section, Table
 from calib.camera import Camera
 from calib.noise.base import pixels_where
 from calib.noise.per_pixel import PerPixel
-from calib.sequences import local
+from calib.sequences import plane_residuals
 from calib.sequences.static import Static, reduce
 from drivers.contract.frame import Frame, Kind
 from drivers.image_folder.images import DepthImages, ImageFolder
@@ -99,7 +99,7 @@ def petit(data: Path) -> tuple[Static, sequences.Sequence]:
 
 
 def by_distance(static: Static, one: sequences.Sequence) -> list[tuple[float, float, float, int]]:
-    """Of every bin: median deviation of the static pixels' z and of all [mm], share that is not static, pixels."""
+    """Rows by distance: median deviation of the static pixels' z and of all [mm], share not static, pixels."""
     z = np.sort(one.lengths, axis=0)
     middle = z[(np.isfinite(z).sum(axis=0) - 1).clip(0) // 2, *np.indices(z.shape[1:])] * 1e3
     always = np.isfinite(one.lengths).all(axis=0)
@@ -121,7 +121,7 @@ def o3r(data: Path) -> list[sigma_consistency.SigmaConsistency]:
     buffers = O3rBuffers(data / "tof_ifm_o3r" / "O3RBuffer.data")
     frames = {frame.kind: frame for frame in buffers.frames() if isinstance(frame, Frame)}
     distance, reported_sigma = (frames[kind].si().astype(np.float64) for kind in (Kind.DEPTH, Kind.DEVIATION))
-    z = local.normalized(distance, reported_sigma, buffers.cameras["depth"].rays())
+    z = plane_residuals.normalized(distance, reported_sigma, buffers.cameras["depth"].rays())
     found = [sigma_consistency.of_values("all", z)]
     for near, far in ((0.2, 0.5), (0.5, 1.0), (1.0, 1.5), (1.5, 2.0)):
         found.append(sigma_consistency.of_values(f"{near} to {far} m", z[(distance >= near) & (distance < far)]))

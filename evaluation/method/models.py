@@ -58,7 +58,7 @@ class Case:
 
     @property
     def texture_registration_px(self) -> float | None:
-        """That of the likelihood [px]."""
+        """Texture registration noise of the likelihood [px]."""
         return self.objective.texture_registration_px if isinstance(self.objective, likelihood.Settings) else None
 
 

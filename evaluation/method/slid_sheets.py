@@ -39,7 +39,7 @@ PLATE_AT_M, PLATE_RADIUS_M, PLATE_STEP = 0.6, 0.09, np.deg2rad(2)
 CURTAINS, CURTAIN_SIGMA = (0.0, 2.0, 4.0), 2e-3
 
 #: Distances beyond are no returns in the scene without a background [m].
-FARTHEST_M = 1.3
+MAX_DISTANCE_M = 1.3
 
 #: A sequence: its name, its scene, and what the sensor measures of a frame.
 SlidSheet = tuple[str, SheetScene, Callable[[SheetFrame], SheetFrame]]
@@ -123,7 +123,7 @@ def _as_it_is(frame: SheetFrame) -> SheetFrame:
 
 
 def _without_background(frame: SheetFrame) -> SheetFrame:
-    return replace(frame, distance=np.where(frame.distance > FARTHEST_M, np.float32(np.nan), frame.distance))
+    return replace(frame, distance=np.where(frame.distance > MAX_DISTANCE_M, np.float32(np.nan), frame.distance))
 
 
 def _without_last_columns(frame: SheetFrame) -> SheetFrame:
@@ -143,14 +143,14 @@ def _without_corners(frame: SheetFrame) -> SheetFrame:
 
 
 def _plate(frame: SheetFrame) -> SheetFrame:
-    """Without what is farther from the centre of the sheet than the plate's radius, on the line of sight."""
+    """Frame without what is farther from the line of sight to the sheet's centre than the plate's radius."""
     x, y, z = np.moveaxis(CAMERA.rays(), -1, 0)
     on = frame.sheet & (np.hypot(x, y) / z * PLATE_AT_M < PLATE_RADIUS_M)
     return replace(frame, distance=np.where(on, frame.distance, np.float32(np.nan)), sheet=on)
 
 
 def _striped(frame: SheetFrame) -> SheetFrame:
-    """Without the returns of the sheet in the stripes, as in the shadow of a projector."""
+    """Frame without the returns of the sheet in the stripes, as in the shadow of a projector."""
     sheet, distance = frame.sheet.copy(), frame.distance.copy()
     for first in STRIPES:
         stripe = (slice(None), slice(first, first + STRIPE_PX))

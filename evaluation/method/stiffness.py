@@ -63,7 +63,7 @@ class Trial:
 
     @property
     def error(self) -> float:
-        """Of the stiffness' logarithm, in its own standard deviations."""
+        """Error of the stiffness' logarithm, in its own standard deviations."""
         return float(np.log(self.found / self.true) / self.stiffness.deviation)
 
 

@@ -162,7 +162,7 @@ def _dropouts(share: float, shape: tuple[int, ...], generator: np.random.Generat
 
 
 def _eased(t: float, begin: float, duration: float) -> float:
-    """From 0 to 1 during an interval, smoothly."""
+    """Smooth step from 0 to 1 during an interval."""
     return float(0.5 - 0.5 * np.cos(np.pi * np.clip((t - begin) / duration, 0, 1)))
 
 
@@ -178,7 +178,7 @@ def spin(t: float) -> SheetState:
 
 
 class Leap:
-    """From the third frame on, the sheet is elsewhere: it was out of sight, or nobody looked.
+    """Jump of the sheet to another place in the third frame: it was out of sight, or nobody looked.
 
     It was moved by up to 20 cm, turned by up to 75° about the line of sight and tilted by up to 34°, and is bent by up
     to ±110° instead of up to ±40°.

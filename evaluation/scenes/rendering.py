@@ -76,7 +76,7 @@ class Renderer:
         with np.errstate(divide="ignore"):
             distance = (wall.depth - self.camera.center[2]) / along
         seen = np.zeros((*along.shape, splatting.CHANNELS))
-        seen[..., 0] = np.where(distance > 0, np.minimum(distance, splatting.FARTHEST_M), splatting.FARTHEST_M)
+        seen[..., 0] = np.where(distance > 0, np.minimum(distance, splatting.MAX_DISTANCE_M), splatting.MAX_DISTANCE_M)
         seen[..., 1] = wall.reflectivity * np.abs(along) / seen[..., 0] ** 2
         seen[..., 2:5] = wall.color
         return seen

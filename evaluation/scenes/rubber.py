@@ -27,13 +27,13 @@ def lengthened(material: NDArray[np.float64], share: float) -> NDArray[np.float6
 
 
 def sheared(material: NDArray[np.float64], share: float) -> NDArray[np.float64]:
-    """Its long sides shifted against each other by 15 % of its width."""
+    """Sheet whose long sides are shifted against each other by 15 % of its width."""
     x, y = np.moveaxis(material, -1, 0)
     return np.stack([x + 0.15 * share * y, y], axis=-1)
 
 
 def twisted(material: NDArray[np.float64], share: float) -> NDArray[np.float64]:
-    """Its middle turned by 30° within the sheet."""
+    """Sheet whose middle is turned by 30° within it."""
     x, y = np.moveaxis(material, -1, 0)
     turn = np.deg2rad(30) * share * np.exp(-np.sum(material**2, axis=-1) / 0.06**2)
     return np.stack([np.cos(turn) * x - np.sin(turn) * y, np.sin(turn) * x + np.cos(turn) * y], axis=-1)

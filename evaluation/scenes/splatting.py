@@ -9,7 +9,7 @@ from calib.jit import kernel
 CHANNELS = 6
 
 #: What is seen nowhere is so far away [m].
-FARTHEST_M = 1e6
+MAX_DISTANCE_M = 1e6
 
 #: A line of sight that meets a point's tangent plane farther from it than so many sub-pixels passes the surface by.
 #: A surface that is inclined by more than 83° is so stretched in the image that it is lost.
@@ -36,7 +36,7 @@ def splat(points: NDArray[np.float64], matrix: NDArray[np.float64], winner: NDAr
         winner: index of the nearest point (height, width), −1 before and where none falls.
     """
     height, width = winner.shape
-    nearest = np.full((height, width), FARTHEST_M)
+    nearest = np.full((height, width), MAX_DISTANCE_M)
     fx, fy, cx, cy = matrix
     for r in range(points.shape[0]):
         for c in range(points.shape[1]):

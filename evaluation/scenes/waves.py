@@ -85,6 +85,6 @@ class Waves:
 
 
 def _smooth_step(x: float) -> float:
-    """From 0 at x ≤ 0 to 1 at x ≥ 1, with continuous velocity and acceleration."""
+    """Smooth step from 0 at x ≤ 0 to 1 at x ≥ 1, with continuous velocity and acceleration."""
     x = np.clip(x, 0.0, 1.0)
     return float(x**3 * (10 - 15 * x + 6 * x**2))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from calib import pose
-from calib.calibration_check.kept import with_kept
+from calib.calibration_check.kept_intrinsics import with_kept
 from calib.solve.bundle.tasks import SensorTask, Task
 from calib.solve.calibrate import calibrate
 from calib.solve.validation.verdict import assess

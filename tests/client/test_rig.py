@@ -136,7 +136,7 @@ def test_a_command_that_nobody_answers_is_told(rig):
 
 
 def test_a_closed_connection_ends_its_streams_and_says_so(rig):
-    states = rig.states("sheet", largest_age_s=60.0)
+    states = rig.states("sheet", maximum_age_s=60.0)
     threading.Timer(0.2, rig.close).start()
     assert list(states) == []
     with pytest.raises(UnreachableError, match="was closed"):

@@ -20,7 +20,7 @@ from evaluation.experiment import Context, Findings, UnavailableError, at_least,
 
 @dataclass(frozen=True)
 class Settings:
-    """Of the experiment under test."""
+    """Settings of the experiment under test."""
 
     frames: int = 500
     duration_s: float = 20.0

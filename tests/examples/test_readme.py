@@ -15,7 +15,7 @@ from absmsg.v1.deformed_mesh_pb2 import DeformedMesh, MeshTopology
 README = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
 
 #: Most characters in what one turn of a loop prints: two lines of a terminal.
-LONGEST = 320
+MAX_LENGTH = 320
 
 
 def test_ten_lines_say_why_nothing_is_tracked(capsys):
@@ -24,7 +24,7 @@ def test_ten_lines_say_why_nothing_is_tracked(capsys):
     printed = capsys.readouterr().out
     assert "INITIALIZING" in printed
     assert re.search(r"\('.+'", printed)
-    assert len(printed) < LONGEST
+    assert len(printed) < MAX_LENGTH
 
 
 def test_the_subscriber_prints_numbers_one_can_read(capsys, monkeypatch):
@@ -33,7 +33,7 @@ def test_the_subscriber_prints_numbers_one_can_read(capsys, monkeypatch):
     stale, tracking = capsys.readouterr().out.split("TRACKING")
     assert "STALE ('nothing was received',)" in stale
     assert "(287, 3)" in tracking
-    assert len(tracking) < LONGEST
+    assert len(tracking) < MAX_LENGTH
 
 
 def run(section: str, **given: Any) -> None:
@@ -43,7 +43,7 @@ def run(section: str, **given: Any) -> None:
 
 
 def states() -> Iterator[State]:
-    """Before the first estimate, and an estimate of 287 vertices."""
+    """States before the first estimate, and an estimate of 287 vertices."""
     yield State(DeformationState(), DeformedMesh(), MeshTopology(), Status.STALE, ("nothing was received",), math.nan)
     vertices, covariance = np.zeros((287, 3), "<f4"), np.zeros((287, 6), "<f4")
     mesh = DeformedMesh(vertices_f32=vertices.tobytes(), covariance_f32=covariance.tobytes())

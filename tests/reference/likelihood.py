@@ -133,13 +133,13 @@ def rim_cost(  # one argument per symbol
     corner: np.ndarray,
     inwards: np.ndarray,
     deviation: float,
-    farthest: float,
+    maximum: float,
 ) -> float:
     """½ Σ min(d/σ, farthest)² of the rim, extrapolated from the inner vertices; d is unknown outside the image part."""
     total = 0.0
     for end, inside, share in zip(vertices[outer], vertices[inner], beyond):
         u, v = project(camera, end + share * (end - inside)) - corner
-        square = farthest**2
+        square = maximum**2
         if 0 <= u < inwards.shape[1] - 1 and 0 <= v < inwards.shape[0] - 1:
             (column, f), (row, g) = (int(u), u % 1), (int(v), v % 1)
             d = np.array([1 - g, g]) @ inwards[row : row + 2, column : column + 2].astype(float) @ np.array([1 - f, f])

@@ -14,7 +14,7 @@ from absmsg.v1.deformation_state_pb2 import DeformationState
 from mcap.reader import make_reader
 
 #: What the tracker promises for the simulated sheet: mean distance of the vertices from where they truly are [mm].
-LARGEST_ERROR_MM = 5.0
+MAX_ERROR_MM = 5.0
 
 
 def main(output: Path, recordings: Path) -> None:
@@ -25,7 +25,7 @@ def main(output: Path, recordings: Path) -> None:
     errors_mm = [estimate["error_mm"] for estimate in lines if estimate.get("error_mm") is not None]
     expect(bool(errors_mm), "no estimate was compared with the simulator's truth")
     error_mm = fmean(errors_mm)
-    expect(error_mm < LARGEST_ERROR_MM, f"the vertices are {error_mm:.2f} mm off, allowed are {LARGEST_ERROR_MM:g} mm")
+    expect(error_mm < MAX_ERROR_MM, f"the vertices are {error_mm:.2f} mm off, allowed are {MAX_ERROR_MM:g} mm")
 
     complete = sorted(recordings.glob("*.mcap"), key=lambda path: path.stat().st_mtime)
     expect(bool(complete), f"no finished recording in {recordings}: {sorted(recordings.iterdir())}")

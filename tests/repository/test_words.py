@@ -1,5 +1,6 @@
 """The house's language: docstrings that state, and a glossary whose rows are complete."""
 
+import ast
 import io
 import re
 import tokenize
@@ -9,6 +10,12 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 FOLDERS = ("abs_service", "calib", "client", "drivers", "evaluation", "examples", "tests")
+SUPERLATIVES = {"largest", "longest", "farthest", "fewest", "least", "most", "smallest", "shortest", "widest"}
+#: Beginnings of the middle of a sentence: the thing itself is missing.
+FRAGMENT = re.compile(
+    r"(After|Also|As|Both|But|Does|If|In|It|Its|Nothing|Of|Only|Or|So many|Such|That|Their|There|These|They|This|Those"
+    r"|To|Until|At|By|From|With|Without)\b"
+)
 QUESTION = re.compile(r'^ *"""(What|How|Where|Whether|Which|Why|When|Who)(ever|se)?\b.*', re.MULTILINE)
 
 
@@ -23,6 +30,30 @@ def test_a_docstring_says_what_a_thing_is_or_returns(folder):
 
 
 @pytest.mark.parametrize("folder", FOLDERS)
+def test_a_docstring_begins_with_its_thing(folder):
+    """Those of tests excepted: they continue the sentence that is the name."""
+    fragments = [
+        f"{path.relative_to(ROOT)}: {text}"
+        for path in sorted((ROOT / folder).rglob("*.py"))
+        for text in docstrings(ast.parse(path.read_text(encoding="utf-8")))
+        if FRAGMENT.match(text)
+    ]
+    assert fragments == []
+
+
+def docstrings(module):
+    """First lines of the docstrings of a module, its classes and functions, without tests."""
+    for node in ast.walk(module):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and not is_test(node):
+            yield (ast.get_docstring(node) or "-").splitlines()[0]
+
+
+def is_test(node):
+    """True for a test, whose name is a sentence."""
+    return getattr(node, "name", "").startswith("test_")
+
+
+@pytest.mark.parametrize("folder", FOLDERS)
 def test_names_use_the_standard_terms(folder):
     """Of the conventions: received, reported, typical and recent; the name of a test is a sentence."""
     found = {
@@ -34,6 +65,30 @@ def test_names_use_the_standard_terms(folder):
         and {"heard", "told", "usual", "lately"} & set(token.string.lower().split("_"))
     }
     assert found == set()
+
+
+@pytest.mark.parametrize("folder", FOLDERS)
+def test_bounds_are_named_minimum_and_maximum(folder):
+    """Constants, arguments and fields; results such as the longest gap of a recording keep their words."""
+    found = {
+        f"{path.relative_to(ROOT)}: {name}"
+        for path in sorted((ROOT / folder).rglob("*.py"))
+        for name in bounds(ast.parse(path.read_text(encoding="utf-8")))
+        if SUPERLATIVES & set(name.lower().split("_"))
+    }
+    assert found == set()
+
+
+def bounds(module):
+    """Names that may be bounds: of constants, arguments and fields of classes."""
+    for node in ast.walk(module):
+        match node:
+            case ast.arg(arg=name):
+                yield name
+            case ast.Name(id=name, ctx=ast.Store()) if name.isupper():
+                yield name
+            case ast.AnnAssign(target=ast.Name(id=name)):
+                yield name
 
 
 def test_every_row_of_the_glossary_has_all_columns():

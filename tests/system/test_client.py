@@ -32,7 +32,7 @@ def tracks(state):
 
 def test_a_mesh_that_is_made_anew_and_a_tracker_that_dies(run, endpoint):
     process, _ = run
-    with Rig(endpoint) as rig, rig.states("sheet", largest_age_s=0.5) as states:
+    with Rig(endpoint) as rig, rig.states("sheet", maximum_age_s=0.5) as states:
         before = until(states, tracks)[-1]
         region = rig.reinitialize("sheet", seed=(88, 72))
         assert "pixel = [88, 72]" in region
@@ -68,7 +68,7 @@ def test_a_slow_reader_gets_the_newest(run, endpoint):
 def test_a_rig_that_is_started_again_is_found_again(rig_file, endpoint, launch):
     first = launch("run", rig_file, "--no-record", "--json", stdout=-3)
     wait_until(lambda: _connects(endpoint), START_S, "the first rig")
-    with subscribe(endpoint, largest_age_s=0.5) as states:
+    with subscribe(endpoint, maximum_age_s=0.5) as states:
         until(states, tracks)
         first.send_signal(signal.SIGTERM)
         assert first.wait(10) == 0

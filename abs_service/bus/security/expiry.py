@@ -1,4 +1,4 @@
-"""The end of a certificate: a process may run for months, and cannot connect again afterwards."""
+"""Warns before a certificate ends: a process may run for months, and cannot connect again after that."""
 
 from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
@@ -15,7 +15,7 @@ RENEWED = "a new one is in its place, for which this process has to be started a
 
 
 def warning(own: Certificate | None) -> str:
-    """Says when a certificate ends, or has ended; "" if that is far away, or if there is none."""
+    """Warning that a certificate ends soon or has ended; "" if its end is far away, or if there is none."""
     left = own.ends - datetime.now(UTC) if own else ENDS
     if own is None or left >= ENDS:
         return ""
@@ -24,7 +24,7 @@ def warning(own: Certificate | None) -> str:
 
 
 class Expiry:
-    """`warning` of a process that runs.
+    """Repeats the check of a running process's certificate, and warns before it ends.
 
     zenoh reads the files of a client whenever it connects, so that new ones in their place are enough; those of a
     router only when it starts.

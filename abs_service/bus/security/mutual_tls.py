@@ -43,7 +43,7 @@ class NoSecurity:
     router: Mapping[str, Any] = field(default_factory=dict)
 
     def check(self, endpoint: str, listens: bool) -> None:
-        """Nothing can be wrong."""
+        """Accepts everything: there are no files to check."""
 
     def refusal(self, endpoint: str) -> str:
         """Reason for which a router refuses this process; "" if unknown."""

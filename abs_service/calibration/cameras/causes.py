@@ -10,10 +10,10 @@ from calib.calibration_check import mistakes
 from calib.calibration_check.comparison import Comparison, Explanation
 from calib.calibration_check.hypotheses import TERMS, Kind
 from calib.calibration_check.mistakes import Mistake
-from calib.calibration_check.stored import Views
+from calib.calibration_check.stored_calibration import Views
 from calib.solve.validation.board_shape import ShapeError
-from calib.solve.validation.unlike_shots.contradictions import Contradiction
-from calib.solve.validation.unlike_shots.foreign_distances import DistanceError
+from calib.solve.validation.inconsistent_shots.contradictions import Contradiction
+from calib.solve.validation.inconsistent_shots.foreign_distances import DistanceError
 
 #: Distance bias that is as good as any depth camera's, and that is unacceptable [m].
 UNNOTICED_M, WRONG_M = 0.002, 0.01

@@ -1,8 +1,8 @@
 """Verdict on a sensor by its own corners: does it still project as it was calibrated, and what would not show."""
 
 from abs_service.report.content import Level, Verdict
-from calib.calibration_check.alone import CornerFit
 from calib.calibration_check.optics import OpticsChange
+from calib.calibration_check.sensor_fits import CornerFit
 
 #: Ratios to the expected reprojection error that are doubtful and bad.
 DOUBTFUL_RATIO, BAD_RATIO = 1.5, 3.0

@@ -11,7 +11,7 @@ from abs_service.calibration.shots.corner_extraction import BoardObservations
 from abs_service.report.content import Level, Verdict
 from calib.board.distinct import distinct_poses
 from calib.board.views import PlaneView
-from calib.calibration_check.stored import Stored, Views
+from calib.calibration_check.stored_calibration import Stored, Views
 from calib.solve.bundle.parameters.state import SensorState
 
 #: Maximum number of shots, each of another pose of the board.
@@ -37,7 +37,7 @@ def of_known_sensors(seen: BoardObservations, stored: Stored) -> Views:
 
 
 def thinned(views: Views) -> Views:
-    """At most a fixed number of evenly spread shots: of each distinct pose the one that most sensors saw."""
+    """Views of a limited number of evenly spread shots: of each distinct pose the one that most sensors saw."""
     poses = distinct_poses(views.corners)
     seen = Counter(view.shot for view in views.corners)
     best = {poses[shot]: shot for shot in sorted(seen, key=lambda shot: seen[shot])}

@@ -14,15 +14,15 @@ from abs_service.calibration.shots.corner_extraction import BoardObservations
 from abs_service.report.content import Level, Report, Verdict
 from abs_service.report.provenance import Provenance
 from calib.calibration_check import mistakes
-from calib.calibration_check.alone import CornerFit, DistanceBias, corner_fit, distance_bias, distance_error
 from calib.calibration_check.board_size import gross_size
 from calib.calibration_check.changes import PairChange, contradicting, pair_changes
 from calib.calibration_check.comparison import NOT_COMPARED, Comparison, compare
 from calib.calibration_check.hypotheses import TERMS, Kind
 from calib.calibration_check.misprint import misprint
 from calib.calibration_check.optics import OpticsChange, optics_change
-from calib.calibration_check.stored import Stored, Views, usable
-from calib.solve.validation.unlike_shots.foreign_distances import DistanceError
+from calib.calibration_check.sensor_fits import CornerFit, DistanceBias, corner_fit, distance_bias, distance_error
+from calib.calibration_check.stored_calibration import Stored, Views, usable
+from calib.solve.validation.inconsistent_shots.foreign_distances import DistanceError
 
 #: Expected reprojection error if the calibration does not contain its own [px].
 BASELINE_PX = 0.5

@@ -10,10 +10,10 @@ from abs_service.calibration.files.rig_file import RigCalibration
 from abs_service.calibration.shots.corner_extraction import BoardObservations
 from abs_service.report import figures
 from abs_service.report.content import Column, Section, Table, drawing
-from calib.calibration_check.alone import CornerFit, DistanceBias
 from calib.calibration_check.changes import PairChange
 from calib.calibration_check.comparison import Comparison
 from calib.calibration_check.optics import OpticsChange
+from calib.calibration_check.sensor_fits import CornerFit, DistanceBias
 
 
 def sensors(

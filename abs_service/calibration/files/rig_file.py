@@ -124,7 +124,7 @@ def read_covariance(path: Path, sha256: str) -> Covariance:
         RigFileError: it cannot be read, or its hash differs.
     """
     try:
-        content = limited.read(path, limited.LARGEST_ARRAYS)
+        content = limited.read(path, limited.MAX_ARRAYS_BYTES)
     except OSError as error:
         raise RigFileError(f"{path}: the covariances cannot be read: {error.strerror}") from error
     if hashlib.sha256(content).hexdigest() != sha256:

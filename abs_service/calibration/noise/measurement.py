@@ -23,7 +23,7 @@ from calib.sequences.static_board import StaticBoard
 from calib.sequences.steps import Steps
 
 #: Maximum number of frames kept as samples per sequence, and of samples in total.
-_KEPT, _LARGEST = 30, 40_000_000
+_KEPT, _MAX_VALUES = 30, 40_000_000
 
 #: Minimum fraction of the static pixels that a plane must cover to be the target.
 _TARGET = 0.85
@@ -147,7 +147,7 @@ def _reduced(sequences: Sequence[recorded.Sequence], say: Callable[[str], None])
     shapes = {sequence.lengths.shape[1:] for sequence in sequences}
     if len(shapes) > 1:
         raise NoiseError(f"the sequences have images of different sizes: {sorted(shapes)}")
-    keep = min(_KEPT, _LARGEST // (len(sequences) * math.prod(shapes.pop())))
+    keep = min(_KEPT, _MAX_VALUES // (len(sequences) * math.prod(shapes.pop())))
     found = []
     for number, one in enumerate(sequences, start=1):
         say(f"{one.name}: what is static ({number} of {len(sequences)})")

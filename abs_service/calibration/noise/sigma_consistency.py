@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from abs_service.calibration.shots.sequences import Sequence
 from calib.noise.fit.fitting import MAD_TO_SIGMA
-from calib.sequences import local
+from calib.sequences import plane_residuals
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,4 +42,6 @@ def of_sequence(sequence: Sequence) -> tuple[SigmaConsistency, ...]:
     if not np.isfinite(sequence.reported_sigma).any():
         return ()
     distance = sequence.lengths[0] * sequence.along
-    return (of_values(sequence.name, local.normalized(distance, sequence.reported_sigma, sequence.camera.rays())),)
+    return (
+        of_values(sequence.name, plane_residuals.normalized(distance, sequence.reported_sigma, sequence.camera.rays())),
+    )

@@ -82,13 +82,13 @@ def with_cameras(sequence: Sequence, cameras: Mapping[str, Camera]) -> Sequence:
 def _ignore() -> None: ...
 
 
-def of_recording(path: Path, sensor: str, most: int, advance: Callable[[], None] = _ignore) -> list[Sequence]:
+def of_recording(path: Path, sensor: str, maximum: int, advance: Callable[[], None] = _ignore) -> list[Sequence]:
     """Sequences of one sensor in a recording of abs-service.
 
     Args:
         path: of the file.
         sensor: name; "" for the only depth sensor.
-        most: maximum number of frames; the first ones are read.
+        maximum: maximum number of frames; the first ones are read.
         advance: called with each depth image that is read.
 
     Raises:
@@ -97,11 +97,11 @@ def of_recording(path: Path, sensor: str, most: int, advance: Callable[[], None]
     """
     recording = Recording(path)
     frames = (item for item in recording.frames() if isinstance(item, Frame))
-    return of_frames(path.name, frames, recording.cameras, sensor, most, advance)
+    return of_frames(path.name, frames, recording.cameras, sensor, maximum, advance)
 
 
 def of_device(
-    uri: str, sensor: str, most: int, clock: Callable[[], int], advance: Callable[[], None] = _ignore
+    uri: str, sensor: str, maximum: int, clock: Callable[[], int], advance: Callable[[], None] = _ignore
 ) -> list[Sequence]:
     """Sequences of one sensor of a live device; arguments and errors as in `of_recording`.
 
@@ -111,7 +111,7 @@ def of_device(
     """
     device = open_device(uri, clock)
     try:
-        collected = _Collected(most * max(1, len(device.capabilities.streams)), advance)
+        collected = _Collected(maximum * max(1, len(device.capabilities.streams)), advance)
         device.start(collected)
         collected.wait()
         device.stop()
@@ -119,11 +119,11 @@ def of_device(
         device.close()
     if not collected.frames:
         raise SequenceError(f"{uri}: no frame came within {PATIENCE_S:g} s: {collected.reason or 'it gave no reason'}")
-    return of_frames(_short(device), collected.frames, device.cameras, sensor, most)
+    return of_frames(_short(device), collected.frames, device.cameras, sensor, maximum)
 
 
 def of_frames(
-    name: str, frames: Iterable[Frame], cameras: Mapping[str, Camera], sensor: str, most: int,
+    name: str, frames: Iterable[Frame], cameras: Mapping[str, Camera], sensor: str, maximum: int,
     advance: Callable[[], None] = _ignore,
 ) -> list[Sequence]:  # fmt: skip
     """Groups frames into sequences by exposure setting; arguments and errors as in `of_recording`."""
@@ -141,7 +141,7 @@ def of_frames(
                 advance()
         else:
             others.add(frame)
-        if sum(len(one.depth) for one in gathered.values()) > most:
+        if sum(len(one.depth) for one in gathered.values()) > maximum:
             break
     gathered = {setting: one for setting, one in gathered.items() if one.depth}
     if not gathered:
@@ -149,7 +149,7 @@ def of_frames(
     if chosen not in cameras:
         raise SequenceError(f"{name}: nothing says which camera sensor {chosen!r} has")
     seen = others.sensor_shots()
-    return [one.sequence(name, setting, cameras, seen, most) for setting, one in gathered.items()]
+    return [one.sequence(name, setting, cameras, seen, maximum) for setting, one in gathered.items()]
 
 
 @dataclass(eq=False)
@@ -168,10 +168,10 @@ class _Gathered:
         self.sensor_shots.add(frame)
 
     def sequence(
-        self, name: str, setting: str, cameras: Mapping[str, Camera], others: Mapping[str, SensorShot], most: int
+        self, name: str, setting: str, cameras: Mapping[str, Camera], others: Mapping[str, SensorShot], maximum: int
     ) -> Sequence:
         """Sequence of the first depth images; without amplitudes if one of them has none."""
-        numbers = list(self.depth)[:most]
+        numbers = list(self.depth)[:maximum]
         first = self.depth[numbers[0]]
         lengths = np.stack([self.depth[number].si() for number in numbers])
         nothing = np.full((1, *lengths.shape[1:]), np.nan, np.float32)
@@ -202,11 +202,11 @@ class _Gathered:
 class _Collected(Sink):
     """Frame sink with a maximum number of frames."""
 
-    def __init__(self, most: int, advance: Callable[[], None]) -> None:
+    def __init__(self, maximum: int, advance: Callable[[], None]) -> None:
         self.frames: list[Frame] = []
         self._advance = advance
         self.reason = ""
-        self._most = most
+        self._maximum = maximum
         self._more = threading.Semaphore(0)
 
     def on_frame(self, frame: Frame) -> None:
@@ -220,7 +220,7 @@ class _Collected(Sink):
 
     def wait(self) -> None:
         """Waits for the maximum number of frames, or a timeout."""
-        for _ in range(self._most):
+        for _ in range(self._maximum):
             if not self._more.acquire(timeout=PATIENCE_S):
                 return
 

@@ -52,7 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--limit-s",
         type=rig_process.seconds,
-        default=rig_process.LONGEST_S,
+        default=rig_process.MAX_DURATION_S,
         metavar="S",
         help="longest time (no limit)",
     )

@@ -50,7 +50,7 @@ from calib.camera import Camera
 from calib.noise.per_pixel import PerPixel
 from calib.sequences.static_board import StaticBoard
 from drivers.contract.frame import Geometry
-from drivers.encoding.message_check import LARGEST_SIDE
+from drivers.encoding.message_check import MAX_SIDE_PX
 from drivers.image_folder.images import DepthImages, ImageFolder
 from drivers.image_folder.listing import by_number
 
@@ -60,7 +60,7 @@ SEED = 0
 #: Metres per unit of the depth images of a folder whose camera file has no unit.
 DEPTH_SCALE = 0.001
 
-_PIXEL = whole(LARGEST_SIDE - 1, "a column or row of an image")
+_PIXEL = whole(MAX_SIDE_PX - 1, "a column or row of an image")
 _IMAGES = whole(1_000_000, "a number of images", 2)
 
 
@@ -193,7 +193,7 @@ def _write_model(found: measurement.NoiseCalibration, sensor: str, out: Path, le
             maps = out.with_suffix(".npz")
             model.save(maps)
             written.append(maps)
-            table = {"type": "per_pixel", "file": maps.name, "law": plugins.table(model.law)}
+            table = {"type": "per_pixel", "file": maps.name, "model": plugins.table(model.model)}
         else:
             table = plugins.table(model)
         text = toml_text.table(("sensors", sensor, "noise"), table, comment)

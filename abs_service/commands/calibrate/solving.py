@@ -20,7 +20,7 @@ from abs_service.config.problems import allowed_instead
 from abs_service.report import page, provenance
 from abs_service.report.content import Level, Report, Verdict
 from abs_service.supervision.exit_codes import Exit
-from calib.calibration_check.kept import with_kept
+from calib.calibration_check.kept_intrinsics import with_kept
 from calib.formats.plausibility import baselines
 from calib.solve.bundle.parameters.lens_parameters import KINDS, LensKind, kind_of
 from calib.solve.bundle.tasks import SensorTask, Task

@@ -36,7 +36,7 @@ from abs_service.report import page, provenance
 from abs_service.report.content import Level, Report, Verdict, to_json
 from calib.board.target import Target, has_two_ways_up
 from calib.camera import Camera
-from calib.solve.start.half_turns import numbered_alike
+from calib.solve.start.symmetric_boards import numbered_alike
 from drivers.replay import Recording
 
 

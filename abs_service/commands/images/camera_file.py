@@ -10,11 +10,11 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError,
 from abs_service.config.positions import located
 from abs_service.config.problems import Key, from_pydantic
 from abs_service.config.tables.camera import PoseTable
-from calib.camera import LARGEST_SIDE, Camera
+from calib.camera import MAX_SIDE_PX, Camera
 from calib.files import limited, nested
 from calib.lenses.by_name import LensName, lens_of
 
-Size = Annotated[int, Field(ge=1, le=LARGEST_SIDE)]
+Size = Annotated[int, Field(ge=1, le=MAX_SIDE_PX)]
 Focal = Annotated[FiniteFloat, Field(gt=0)]
 
 

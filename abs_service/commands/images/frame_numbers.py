@@ -67,6 +67,6 @@ def parse(text: str) -> FrameNumbers:
 
 
 def nearest(files: Sequence[ImageFile], others: Sequence[ImageFile]) -> list[ImageFile]:
-    """Those of `files` that are nearest in time to one of the others."""
+    """Files (of `files`) that are nearest in time to one of the others."""
     chosen = {min(files, key=lambda file: abs(file.t_ns - other.t_ns)) for other in others}
     return sorted(chosen, key=lambda file: file.t_ns)

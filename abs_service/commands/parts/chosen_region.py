@@ -56,7 +56,7 @@ def at_pixel(region: RegionSettings, pixel: Pixel) -> RegionSettings:
         case seed.Settings():
             return replace(region, pixel=pixel, color=None, motion_s=None, polygon=None)
         case nearest.Settings() | distance.Settings():
-            return seed.Settings(pixel, largest_step_m=region.largest_step_m, within=region.within)
+            return seed.Settings(pixel, maximum_step_m=region.maximum_step_m, within=region.within)
         case _:
             return seed.Settings(pixel)
 
@@ -76,7 +76,7 @@ def in_polygon(region: RegionSettings, polygon: tuple[Pixel, ...]) -> RegionSett
         case nearest.Settings():
             return replace(region, polygon=polygon)
         case seed.Settings() | distance.Settings():
-            kept = region.largest_step_m, region.minimum_pixels, region.within
+            kept = region.maximum_step_m, region.minimum_pixels, region.within
             return nearest.Settings(*kept, polygon)
         case _:
             return nearest.Settings(polygon=polygon)

@@ -12,7 +12,7 @@ from abs_service.supervision.exit_codes import is_for_user
 from abs_service.wire.commands import RefusedError
 
 #: Longest name that Linux lets a file in memory have [bytes].
-LONGEST_NAME = 249
+MAX_NAME_LENGTH = 249
 
 
 class RigInMemory:
@@ -78,5 +78,5 @@ def in_memory(rig: config.ServiceConfig, source: str) -> Iterator[RigInMemory]:
         rig: the configuration.
         source: the file that it comes from, for messages (`config.named`); of a long path, they have the end.
     """
-    with open(os.memfd_create(os.fsencode(source)[-LONGEST_NAME:].decode(errors="ignore")), "wb") as stream:
+    with open(os.memfd_create(os.fsencode(source)[-MAX_NAME_LENGTH:].decode(errors="ignore")), "wb") as stream:
         yield RigInMemory(rig, stream)

@@ -26,7 +26,7 @@ from abs_service.wire.checked_bus import CheckedBus
 #: Least time between two calls by SIGHUP [s].
 HANGUP_PERIOD_S = 1.0
 #: What longer times are taken for, which the interpreter could not wait for [s]: thirty years.
-LONGEST_S = 1e9
+MAX_DURATION_S = 1e9
 
 
 class SecurityError(Exception):
@@ -34,8 +34,8 @@ class SecurityError(Exception):
 
 
 def seconds(text: str) -> float:
-    """Type of an argument: a time of 0 or more, cut at `LONGEST_S` [s]."""
-    return min(number(0.0, math.inf, "a number of seconds, 0 or more")(text), LONGEST_S)
+    """Type of an argument: a time of 0 or more, cut at `MAX_DURATION_S` [s]."""
+    return min(number(0.0, math.inf, "a number of seconds, 0 or more")(text), MAX_DURATION_S)
 
 
 def add_config(parser: argparse.ArgumentParser, what: str = "TOML file of the rig") -> None:
@@ -127,7 +127,7 @@ def stop_on_signals() -> threading.Event:
 def on_hangup(act: Callable[[], object], stop: threading.Event) -> None:
     """Lets SIGHUP call a function, from a thread and once for all that have arrived, in a process without a terminal.
 
-    There it says nothing of a terminal, but is the usual wish that a service reads its configuration again. When `stop`
+    There it customarily asks a service to read its configuration again, and says nothing of a terminal. When `stop`
     is set, it has no effect any more.
     """
 

@@ -22,13 +22,13 @@ from abs_service.commands.parts import rig_process
 from abs_service.commands.parts.options import whole
 from abs_service.supervision.exit_codes import Exit
 from abs_service.wire import commands
-from drivers.encoding.message_check import LARGEST_SIDE
+from drivers.encoding.message_check import MAX_SIDE_PX
 from drivers.encoding.message_content import MAX_CORNERS, MIN_CORNERS
 
 #: Timeout of the detection [s].
 TIMEOUT_S = 10.0
 
-_PIXEL = whole(LARGEST_SIDE - 1, "a column or row of an image")
+_PIXEL = whole(MAX_SIDE_PX - 1, "a column or row of an image")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

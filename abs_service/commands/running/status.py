@@ -110,7 +110,7 @@ def _level(condition: str) -> str:
 
 
 def _running(components: Mapping[str, Health | None]) -> Iterator[str]:
-    """Those that run, by what `run` says: also what is no part of the rig's work, such as a page."""
+    """Names of the components that run, by what `run` reports; also those beside the rig's work, such as a page."""
     return (name for name, text in _processes(components) if text == ChildState.RUNNING)
 
 

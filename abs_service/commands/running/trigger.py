@@ -4,7 +4,7 @@
   abs-service trigger rig.toml         begins, with the last `record.pre_roll_s` seconds
   abs-service trigger rig.toml --stop  ends
 
-The rig needs `record.when = "asked"` or `"not_tracking"`.
+The rig needs `record.when = "requested"` or `"not_tracking"`.
 """
 
 import argparse

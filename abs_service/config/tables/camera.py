@@ -7,13 +7,13 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
 from calib import pose
-from calib.camera import LARGEST_SIDE, Camera
+from calib.camera import MAX_SIDE_PX, Camera
 from calib.lenses.by_name import LensName, lens_of
 from calib.lenses.lens import Lens
 from calib.pose import Pose
 
 Vector = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
-Size = Annotated[int, Field(ge=1, le=LARGEST_SIDE)]
+Size = Annotated[int, Field(ge=1, le=MAX_SIDE_PX)]
 Focal = Annotated[FiniteFloat, Field(gt=0)]
 
 #: A camera of which `applied_to` keeps nothing but the pose.

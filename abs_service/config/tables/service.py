@@ -10,7 +10,7 @@ from abs_service.config.tables.calibration import CalibrationOrigin, DepthTable
 from abs_service.config.tables.camera import CameraTable
 from abs_service.config.tables.table import Table
 from abs_service.config.tables.values import (
-    LONGEST_S,
+    MAX_DURATION_S,
     DeviceUri,
     Milliseconds,
     Name,
@@ -141,8 +141,8 @@ class RecordTable(Table):
         directory: folder of the recordings, created if it does not exist.
         begin: `start`: at once, and what is recorded before something is tracked is said to be; `tracking`: with
             the first TRACKING of any tracker, from whose next images on everything is kept.
-        when: `always`; `asked`: from `abs-service trigger` on until `abs-service trigger --stop`; `not_tracking`: then,
-            and when a tracker leaves TRACKING for DEGRADED or LOST. Each time with the last `pre_roll_s`.
+        when: `always`; `requested`: from `abs-service trigger` on until `abs-service trigger --stop`; `not_tracking`:
+            then, and when a tracker leaves TRACKING for DEGRADED or LOST. Each time with the last `pre_roll_s`.
         pre_roll_s: time before the trigger that is held in memory and recorded with it [s].
         pre_roll_bytes: size of the messages held in memory [bytes]; the oldest beyond it are dropped and counted.
         post_roll_s: time that is recorded after a tracker has left TRACKING for the last time [s].
@@ -167,8 +167,8 @@ class RecordTable(Table):
     enabled: bool = True
     directory: RelativePath = Path("recordings")
     begin: Literal["start", "tracking"] = "start"
-    when: Literal["always", "asked", "not_tracking"] = "always"
-    pre_roll_s: Annotated[float, Field(ge=0, le=LONGEST_S)] = 10.0
+    when: Literal["always", "requested", "not_tracking"] = "always"
+    pre_roll_s: Annotated[float, Field(ge=0, le=MAX_DURATION_S)] = 10.0
     pre_roll_bytes: Annotated[int, Field(ge=0)] = 1 << 30
     post_roll_s: Seconds = 10.0
     depth_codec: Literal["raw", "lossless"] = "raw"
@@ -205,7 +205,7 @@ class RunTable(Table):
     max_restarts: Annotated[int, Field(ge=0)] = 5
     restart_window_s: Seconds = 60.0
     startup_timeout_s: Seconds = 180.0
-    stall_timeout_s: Annotated[float, Field(ge=2, le=LONGEST_S)] = 10.0
+    stall_timeout_s: Annotated[float, Field(ge=2, le=MAX_DURATION_S)] = 10.0
     stop_timeout_s: Seconds = 4.0
     metrics_port: Annotated[int, Field(ge=0, le=65535)] = 0
 

@@ -18,11 +18,11 @@ from abs_service.config import plugins
 #: Drivers whose addresses name a file, which starts from the folder of the TOML file like every other path.
 FILE_SCHEMES = frozenset({"replay"})
 #: Longest name of a file or folder [bytes]: Linux allows no more.
-LONGEST_NAME = 255
+MAX_NAME_LENGTH = 255
 #: Longest path [bytes], likewise.
-LONGEST_PATH = 4095
+MAX_PATH_LENGTH = 4095
 #: Longest time [s], 31 years: clocks count nanoseconds in 64 bits, and threads wait no longer than that.
-LONGEST_S = 1_000_000_000
+MAX_DURATION_S = 1_000_000_000
 #: Pattern of every address of a device.
 URI = re.compile(r"[a-z][a-z0-9_]*:\S+")
 
@@ -53,10 +53,10 @@ def _from_file(value: Any, base: Path) -> Path:
     if not (isinstance(value, (str, Path)) and str(value)):
         raise ValueError("must be a path; a relative one starts from the folder of this file")
     path = base / value
-    if "\0" in str(path) or max(len(os.fsencode(part)) for part in path.parts) > LONGEST_NAME:
-        raise ValueError(f"must be a path whose names have no zero byte and at most {LONGEST_NAME} bytes")
-    if len(os.fsencode(path)) > LONGEST_PATH:
-        raise ValueError(f"must be a path of at most {LONGEST_PATH} bytes, this file's folder included")
+    if "\0" in str(path) or max(len(os.fsencode(part)) for part in path.parts) > MAX_NAME_LENGTH:
+        raise ValueError(f"must be a path whose names have no zero byte and at most {MAX_NAME_LENGTH} bytes")
+    if len(os.fsencode(path)) > MAX_PATH_LENGTH:
+        raise ValueError(f"must be a path of at most {MAX_PATH_LENGTH} bytes, this file's folder included")
     if str(value).startswith("~"):
         raise ValueError('must be a path; "~" is not replaced by a home folder, which differs from user to user')
     return path
@@ -103,9 +103,9 @@ def _plain(load: Callable[[Any, Path], Any], dump: Callable[[Any], Any]) -> Core
     )
 
 
-Seconds = Annotated[float, Field(gt=0, le=LONGEST_S)]
-Milliseconds = Annotated[float, Field(gt=0, le=LONGEST_S * 1000)]
-OffsetMs = Annotated[float, Field(ge=-LONGEST_S * 1000, le=LONGEST_S * 1000)]
+Seconds = Annotated[float, Field(gt=0, le=MAX_DURATION_S)]
+Milliseconds = Annotated[float, Field(gt=0, le=MAX_DURATION_S * 1000)]
+OffsetMs = Annotated[float, Field(ge=-MAX_DURATION_S * 1000, le=MAX_DURATION_S * 1000)]
 Name = Annotated[str, AfterValidator(keys.check_name)]
 Endpoint = Annotated[str, AfterValidator(_endpoint)]
 DeviceUri = Annotated[str, AfterValidator(_uri)]

@@ -245,6 +245,6 @@ class Page:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Without what viser prints: standard output is for estimates and notes."""
+    """Suppresses what viser prints: standard output is for estimates and notes."""
     with open(devnull, "w", encoding="utf-8") as nowhere, redirect_stdout(nowhere):
         yield

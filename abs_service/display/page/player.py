@@ -35,7 +35,7 @@ class Player:
         speed.on_update(lambda event: self._ask_speed(float(event.target.value.split()[0])))
 
     def tick(self) -> None:
-        """Does what was asked for, and delivers the messages of the present time."""
+        """Carries out requests of the page, and delivers the messages of the present time."""
         while True:
             try:
                 self._requests.get_nowait()()

@@ -56,7 +56,7 @@ DPI = 100
 SHOWN_PERCENT, SHOWN_BEYOND = (1, 98), 1.75
 
 #: Grey of the nearest and of the farthest distance: dark, so that mesh and outline of a near object stand out.
-NEAREST, FARTHEST = "0.3", "0.9"
+NEAR, FAR = "0.3", "0.9"
 
 #: Diameter of the rim's vertices, as a share of the mesh's edges in the picture, and its limits [px].
 DOT_SHARE, DOT_LIMITS = 0.8, (6.0, 9.0)
@@ -160,7 +160,7 @@ def _draw_depth(page: _Page, axes: "Axes", preview: Preview) -> None:
     from matplotlib.colors import LinearSegmentedColormap  # noqa: PLC0415  takes half a second, so only when drawing
 
     low, high = _shown_range(preview)
-    greys = LinearSegmentedColormap.from_list("distance", [NEAREST, FARTHEST]).with_extremes(bad=NO_RETURN)
+    greys = LinearSegmentedColormap.from_list("distance", [NEAR, FAR]).with_extremes(bad=NO_RETURN)
     masked = np.ma.masked_invalid(preview.distance)
     shown = axes.imshow(masked, cmap=greys, vmin=low, vmax=high, interpolation="nearest")
     farthest = np.nanmax(preview.distance, initial=low)

@@ -96,7 +96,7 @@ class Output(Background[str]):
         return len(text)
 
     def flush(self) -> None:
-        """Does nothing: the thread writes at once."""
+        """No operation: the thread writes at once."""
 
 
 def of(file: TextIO) -> Output:

@@ -56,7 +56,7 @@ class DiskMonitor:
         self._next_ns = 0
 
     def start(self, written: Callable[[], tuple[int, int]], stop: threading.Event) -> None:
-        """Checks again and again, in a thread: 100,000 recordings take seconds, and a disk may not answer.
+        """Starts a thread that checks periodically: 100,000 recordings take seconds, and a disk may not answer.
 
         Args:
             written: see `check`.
@@ -74,7 +74,7 @@ class DiskMonitor:
         threading.Thread(target=follow, name="disk monitor", daemon=True).start()
 
     def check(self, written: tuple[int, int]) -> None:
-        """Does both every ten seconds, less often where it takes long.
+        """Applies the retentions and updates the forecast every ten seconds, less often where that takes long.
 
         Args:
             written: bytes so far, to all recordings and to all files of estimates.

@@ -22,7 +22,7 @@ class DiskStall:
         self._alive_ns = 0
 
     def alive(self) -> None:
-        """To be called by the thread that writes, at least once a second."""
+        """Notes that the thread that writes is alive; it calls this at least once a second."""
         self._alive_ns = self._clock()
 
     def report(self) -> None:

@@ -36,11 +36,11 @@ class AlwaysTrigger:
     reason = "always"
 
     def ask(self, recording: bool) -> str:
-        """Refuses."""
+        """Refusal, with its reason."""
         return 'record.when = "always": it records as long as it runs'
 
     def watch(self, sample: Sample) -> None:
-        """Does nothing."""
+        """Ignores the message: everything is recorded."""
 
 
 ALWAYS = AlwaysTrigger()

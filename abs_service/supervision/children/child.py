@@ -26,7 +26,7 @@ class ChildState(StrEnum):
     RUNNING = "running"
     BACKOFF = "backoff"  # not started yet, or ended; starts when its backoff is over
     STALLED = "stalled"  # sent no health in time and was killed; will be restarted
-    RENEWED = "renewed"  # was told to end, and starts again as soon as it has
+    RENEWED = "renewed"  # was asked to end, and starts again as soon as it has
     FINISHED = "finished"  # there is nothing left for it to do
     FAILED = "failed"  # given up for a while
     STOPPED = "stopped"
@@ -48,8 +48,8 @@ class Child:
             is started, or sends health.
         process: the running one; `NO_PROCESS` if there is none.
         exit_code: of its last end.
-        worst_code: the highest with which it ended by itself or because it was told; 128 + N for signal N that ended it
-            after it was told. A crash counts as a restart only.
+        worst_code: the highest with which it ended by itself or on request; 128 + N for signal N that ended it after a
+            request. A crash counts as a restart only.
         overdue_ns, deadline_ns: without health until then it is said, and it is killed [ns].
         busy: it starts or compiles, and need not send health until `limit_ns` as long as it does anything.
     """
@@ -109,7 +109,7 @@ class Child:
         return True
 
     def end(self) -> None:
-        """Keeps the exit code of a process that was told to end, and kills it if it has not; no effect without one."""
+        """Keeps the exit code of a process that was asked to end, and kills it if it has not; no effect without one."""
         if self.process is NO_PROCESS:
             return
         self.process.kill()

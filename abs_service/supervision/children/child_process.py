@@ -32,7 +32,7 @@ class Process(Protocol):
 
     @property
     def pid(self) -> int:
-        """Its number; 0 if there is none."""
+        """Number of the process; 0 if there is none."""
         ...
 
     def poll(self) -> int | None:
@@ -66,7 +66,7 @@ class _NoProcess:
     pid = 0
 
     def poll(self) -> int:
-        """0: ended."""
+        """Exit code 0: there is no process."""
         return 0
 
     def threads(self) -> Mapping[int, ThreadTimes]:
@@ -74,13 +74,13 @@ class _NoProcess:
         return {}
 
     def terminate(self) -> None:
-        """Does nothing."""
+        """No operation: there is no process."""
 
     def kill(self) -> None:
-        """Does nothing."""
+        """No operation: there is no process."""
 
     def wake(self) -> None:
-        """Does nothing."""
+        """No operation: there is no process."""
 
     def output_tail(self) -> str:
         """Empty."""

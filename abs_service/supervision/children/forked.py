@@ -30,7 +30,7 @@ CONTEXT = multiprocessing.get_context("forkserver")
 FILES = 65_536
 #: Longest temporary folder in which the path of the fork server's socket, 39 bytes longer, has the 107 that unix(7)
 #: permits [bytes].
-LONGEST_PARENT = 64
+MAX_PARENT_LENGTH = 64
 
 _PR_SET_CHILD_SUBREAPER = 36
 #: Environment variable with the folder of the fork server's socket.
@@ -44,7 +44,7 @@ def preload(module: str) -> None:
     """
     standard_files.allow_files(FILES)
     ctypes.CDLL(None).prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
-    os.environ[_FOLDER] = folder = standard_files.temporary_folder("abs-service-", LONGEST_PARENT)
+    os.environ[_FOLDER] = folder = standard_files.temporary_folder("abs-service-", MAX_PARENT_LENGTH)
     # Of one that multiprocessing makes for itself, it complains when somebody else has deleted it.
     current_process()._config["tempdir"] = folder  # pyright: ignore # noqa: SLF001
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
@@ -72,7 +72,7 @@ def ensure_running() -> None:
 
 
 def detach() -> None:
-    """In the fork server: leaves the terminal and its reader to `run`.
+    """Detaches the fork server from the terminal, which is left to `run`.
 
     It ends when `run` has ended, and removes what `run` cannot if it was killed.
     """

@@ -21,7 +21,7 @@ GRACE_S = 3.0
 
 
 def start() -> threading.Event:
-    """If a supervisor started this process, ends it when the supervisor is gone: in order first, then by force.
+    """Ends this process when the supervisor that started it is gone: in order first, then by force.
 
     Returns:
         An event that is set whenever the supervisor says that the configuration has changed; it is for the caller to

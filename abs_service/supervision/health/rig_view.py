@@ -150,7 +150,7 @@ class RigView:
 
     @property
     def capture_silence(self) -> str:
-        """For how long nothing has come from the host that captures, in words; "" if it speaks, or is this one."""
+        """Silence of the host that captures, in words with its duration; "" if it sends, or is this one."""
         last_ns = self.live.received.get("capture", Received()).t_ns
         silent_s = min((self.now_ns - last_ns) * 1e-9, self.elapsed_s)
         if not self.rig.captured_at or silent_s * 1e9 < SILENT_NS:

@@ -11,7 +11,7 @@ import tempfile
 from contextlib import suppress
 
 #: Limits of open files: that a process asks for, and the least with which it begins.
-FILES, FEWEST_FILES = 1024, 64
+FILES, MIN_FILES = 1024, 64
 
 #: The three, by their descriptors, with the mode in which Python opens each.
 _FILES = (("stdin", "r"), ("stdout", "w"), ("stderr", "w"))
@@ -47,22 +47,22 @@ def allow_files(wanted: int = FILES) -> None:
         wanted: the limit; as much of it as is allowed.
 
     Raises:
-        StartError: it stays below `FEWEST_FILES`.
+        StartError: it stays below `MIN_FILES`.
     """
     limit, highest = resource.getrlimit(resource.RLIMIT_NOFILE)
     files = wanted if highest == resource.RLIM_INFINITY else min(wanted, highest)
     if limit != resource.RLIM_INFINITY and limit < files:
         resource.setrlimit(resource.RLIMIT_NOFILE, (files, highest))
-    if files < FEWEST_FILES:
-        raise StartError(f"the limit of open files is {files}, at least {FEWEST_FILES} are needed: ulimit -n {FILES}")
+    if files < MIN_FILES:
+        raise StartError(f"the limit of open files is {files}, at least {MIN_FILES} are needed: ulimit -n {FILES}")
 
 
-def temporary_folder(prefix: str, longest: int = 4096) -> str:
+def temporary_folder(prefix: str, maximum: int = 4096) -> str:
     """Makes a folder in the temporary one; if that is full, or its path too long, in /tmp or in memory.
 
     Args:
         prefix: of its name.
-        longest: path of the folder that it is in, at most [bytes].
+        maximum: path of the folder that it is in, at most [bytes].
 
     Raises:
         StartError: it can be made nowhere.
@@ -71,7 +71,7 @@ def temporary_folder(prefix: str, longest: int = 4096) -> str:
     with suppress(FileNotFoundError):  # no folder takes the file with which Python tries it
         parents.insert(0, tempfile.gettempdir())
     for parent in parents:
-        if len(os.fsencode(parent)) <= longest:
+        if len(os.fsencode(parent)) <= maximum:
             with suppress(OSError):
                 return tempfile.mkdtemp(prefix=prefix, dir=parent)
     raise StartError(f"no folder can be made in {', '.join(parents)}; make room, or set TMPDIR to another folder")

@@ -19,7 +19,7 @@ Step = Literal["auto"] | Annotated[float, Gt(0)]
 
 #: Smallest step between two surfaces where the noise does not matter [m]; steps up to so many standard deviations of
 #: the distances are noise. At 2.8 m, a structured light camera splits a person at 0.04 m, but not at 5 deviations.
-SMALLEST_STEP_M, NOISE_STEPS = 0.04, 5.0
+MIN_STEP_M, NOISE_STEPS = 0.04, 5.0
 
 #: Or up to so many widths of a pixel on the object: by so much does a surface that is slanted by 60° change across the
 #: three pixels that are compared. At 2 m, pixels of 22 mm split a person into pieces at 0.04 m.
@@ -88,11 +88,11 @@ class DepthView:
         colors = PixelColors(distance, camera, pictures)
         return cls(camera.unproject(distance), distance, camera, colors, t_ns, deviation)
 
-    def step(self, largest: Step) -> NDArray[np.float32] | float:
+    def step(self, maximum: Step) -> NDArray[np.float32] | float:
         """Largest difference in distance [m] between neighbours of one surface, (height, width) if it is "auto"."""
-        if largest != "auto":
-            return largest
-        noise = np.fmax(np.float32(SMALLEST_STEP_M), NOISE_STEPS * np.float32(self.deviation))
+        if maximum != "auto":
+            return maximum
+        noise = np.fmax(np.float32(MIN_STEP_M), NOISE_STEPS * np.float32(self.deviation))
         pixel = self.distance / np.float32(min(self.camera.fx, self.camera.fy))
         return np.asarray(np.fmax(noise, np.float32(SLANT_STEPS) * pixel))
 

@@ -22,15 +22,15 @@ MIN_RADIUS_PX = 1.5
 
 #: Distances around a grid point that deviate by more from their median belong to another surface [m]; or, where noise
 #: is more than this, by so many standard deviations of a distance.
-LARGEST_RELIEF_M, NOISY_RELIEF = 0.03, 3.0
+MAX_RELIEF_M, NOISY_RELIEF = 0.03, 3.0
 
 #: Or by more from a plane through all of them, if that is too steep for it: it shows no jump that it does not.
-LARGEST_BEND_M, NOISY_BEND = 0.01, 2.0
+MAX_BEND_M, NOISY_BEND = 0.01, 2.0
 
 #: A triangle with a side longer than this multiple of the typical side spans a jump between two surfaces. A vertex at a
 #: jump takes a mean of both surfaces, so one side shows only a part of it (decision 0007); a plane's sides are no
 #: longer than that, at any slant up to 70°.
-LONGEST_SIDE = 3.0
+MAX_SIDE = 3.0
 
 #: A connected component with a smaller share of the vertices is an island and removed: the rim of the region often
 #: shows background, which cannot be bound to a smooth surface.
@@ -113,13 +113,13 @@ def _local_planes(
     inside = np.all((around >= 0) & (around < distance.shape[::-1]), axis=2)
     column, row = np.moveaxis(np.where(inside[..., None], around, 0), -1, 0)
     values = np.where(within & inside, distance[row, column], np.nan).astype(np.float64)
-    near = np.abs(values - _row_medians(values)) < max(LARGEST_RELIEF_M, NOISY_RELIEF * noise)
+    near = np.abs(values - _row_medians(values)) < max(MAX_RELIEF_M, NOISY_RELIEF * noise)
     known = np.isfinite(values)
     area, seen = np.count_nonzero(within, axis=1), np.count_nonzero(known, axis=1)
     bridged = np.count_nonzero(within & inside & gaps[row, column], axis=1)
     minimum = np.max([MIN_COVER * area - bridged, MIN_COVER * seen, np.full(len(area), 3)], axis=0)
     steep = np.flatnonzero((np.count_nonzero(near, axis=1) < minimum) & (seen >= minimum))
-    bend = max(LARGEST_BEND_M, NOISY_BEND * noise)
+    bend = max(MAX_BEND_M, NOISY_BEND * noise)
     near[steep] = np.abs(values[steep] - _planes(values[steep], offset[steep], known[steep])[0]) < bend
     count = np.count_nonzero(near, axis=1)
     usable = np.flatnonzero(count >= minimum)
@@ -173,7 +173,7 @@ def _without_jumps(positions: NDArray[np.float64], faces: NDArray[np.int64]) -> 
     if not len(faces):
         return faces
     sides = np.linalg.norm(positions[faces] - positions[np.roll(faces, 1, axis=1)], axis=2)
-    return faces[sides.max(axis=1) < LONGEST_SIDE * np.median(sides)]
+    return faces[sides.max(axis=1) < MAX_SIDE * np.median(sides)]
 
 
 def _without_islands(faces: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -46,10 +46,10 @@ GAP = 1 / 40
 
 #: How many jumps are compared at most, cells along a row of the image, and least number of cells with jumps: those
 #: within one are no independent witnesses.
-MAX_JUMPS, CELLS, FEWEST = 800, 10, 8
+MAX_JUMPS, CELLS, MIN_CELLS = 800, 10, 8
 
 #: An edge counts by its strength over the typical one nearby, at most this, and weaker ones than a share of all less.
-STRONGEST, WEAK = 3.0, 0.2
+MAX_STRENGTH, WEAK = 3.0, 0.2
 
 #: Other focal lengths displace the edges of the image by so much at most [px of the reduced image].
 _MARGIN = round(0.13 * WIDTH / 2)
@@ -124,7 +124,7 @@ def displacement(detection: InitialDetection, image: ColorImage | ChannelImage, 
     size = pixels.shape[1] // factor, pixels.shape[0] // factor
     places, is_along_row = _seen(detection, camera, factor, size)
     _, cell, counts = np.unique(places * CELLS // size[0], axis=0, return_inverse=True, return_counts=True)
-    if len(counts) < FEWEST:
+    if len(counts) < MIN_CELLS:
         return None
     small = cv2.resize(np.ascontiguousarray(pixels), size, interpolation=cv2.INTER_AREA)
     edges = _edges(np.asarray(small, np.float32).reshape(*size[::-1], -1))
@@ -160,7 +160,7 @@ def _jumps(distance: NDArray[np.float32]) -> NDArray[np.intp]:
 
 
 def _beside(values: NDArray[np.float32], right: int, down: int) -> NDArray[np.float32]:
-    """Of every pixel (height, width), the value of the one so far to the right and down; 0 outside."""
+    """Image (height, width) shifted left by `right` and up by `down` pixels; 0 where it was outside."""
     move = np.array([[1.0, 0.0, right], [0.0, 1.0, down]])
     moved = cv2.warpAffine(values, move, values.shape[::-1], flags=cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP)
     return np.asarray(moved, np.float32)
@@ -202,7 +202,7 @@ def _edges(image: NDArray[np.float32]) -> list[NDArray[np.float32]]:
         square = np.sum(np.square(slope), axis=2)
         around = np.maximum(cv2.blur(square, (_SIDE, _SIDE)), np.finfo(np.float32).tiny)  # running sums err below 0
         typical = np.sqrt(around) + WEAK * np.sqrt(square.mean())
-        edge = np.minimum(np.sqrt(square) / typical, STRONGEST)
+        edge = np.minimum(np.sqrt(square) / typical, MAX_STRENGTH)
         found.append(np.pad(edge - cv2.blur(edge, (_SIDE, _SIDE)), _SIDE // 2))
     return found
 

@@ -13,10 +13,10 @@ from abs_service.tracker.mesh import Mesh, edge_lengths, pieces_of
 from calib.rig import Rig
 
 #: Range of the extent of an object [m]; outside, the distances have the wrong unit.
-SMALLEST_M, LARGEST_M = 0.005, 20.0
+MIN_M, MAX_M = 0.005, 20.0
 
 #: The same for everything in sight, which is checked first: with the wrong unit, no region finds anything sensible.
-LARGEST_SCENE_M = 200.0
+MAX_SCENE_M = 200.0
 
 #: Percentiles of the coordinates between which the extent is measured, because some pixels at the rim are wrong.
 EXTENT_PERCENT = (2, 98)
@@ -44,20 +44,20 @@ LEFT_OUT = 0.05
 
 #: A principal point that is farther from the middle than this share of the image's width or height is that of another
 #: image size: lenses are centred to a few per cent, and half or twice the size moves it by 25 or 50 %.
-LARGEST_DECENTRING = 0.2
+MAX_DECENTRING = 0.2
 
 
 class ExtentError(DetectionError):
     """Impossible extent of the object or of all in sight: the distances have the wrong unit, or the region is wrong."""
 
 
-def check_extent(points: NDArray[np.float64], what: str, largest: float, sensor: str) -> None:
+def check_extent(points: NDArray[np.float64], what: str, maximum: float, sensor: str) -> None:
     """Checks the diagonal of the bounding box of points (k, 3) [m], without the outermost ones.
 
     Args:
         points: the points; none is in order, because then the region has more to say.
         what: name in the message.
-        largest: largest possible diagonal [m].
+        maximum: largest possible diagonal [m].
         sensor: name of the sensor that measured them.
 
     Raises:
@@ -67,7 +67,7 @@ def check_extent(points: NDArray[np.float64], what: str, largest: float, sensor:
         return
     low, high = np.percentile(points[:: len(points) // MAX_POINTS + 1], EXTENT_PERCENT, axis=0)
     extent = float(np.linalg.norm(high - low))
-    if not SMALLEST_M <= extent <= largest:
+    if not MIN_M <= extent <= maximum:
         wide = f"{extent * 1e3:.2g} mm" if extent < 1 else f"{extent:.0f} m"
         raise ExtentError(
             f"{what} would be {wide} wide: is the depth scale right? The device, depth_scale of imported images or "
@@ -133,7 +133,7 @@ def camera_warnings(rig: Rig) -> tuple[str, ...]:
         f"the principal point of {name}, ({camera.cx:.0f}, {camera.cy:.0f}) px, is far from the middle of its images "
         f"of {camera.width} × {camera.height} pixels: are its intrinsics those of images of this size?"
         for name, camera in cameras.items()
-        if max(abs(camera.cx / camera.width - 0.5), abs(camera.cy / camera.height - 0.5)) > LARGEST_DECENTRING
+        if max(abs(camera.cx / camera.width - 0.5), abs(camera.cy / camera.height - 0.5)) > MAX_DECENTRING
     )
 
 

@@ -9,7 +9,7 @@ from abs_service.tracker import resolution
 from abs_service.tracker.detection.depth_view import DepthView
 from abs_service.tracker.detection.dropouts import fill_gaps
 from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection
-from abs_service.tracker.detection.plausibility import LARGEST_M, LARGEST_SCENE_M, MAX_POINTS, check_extent
+from abs_service.tracker.detection.plausibility import MAX_M, MAX_POINTS, MAX_SCENE_M, check_extent
 from abs_service.tracker.detection.regions.base import Region
 from calib.noise.base import DepthNoise, Pixels, pixels_where, subtract_mean_offset
 from calib.noise.fit.scatter import scatter
@@ -41,9 +41,9 @@ def detect_object(
     pictures = [(rig.sensors[n].camera, i.rgb) for n, i in observation.images.items() if isinstance(i, ColorImage)]
     deviations = _deviations(sensor.noise, image)
     view = DepthView.of(fill_gaps(distance), sensor.camera, pictures, observation.t_host_ns, deviations)
-    check_extent(view.points_r[view.measured], "everything in sight", LARGEST_SCENE_M, sensor.head)
+    check_extent(view.points_r[view.measured], "everything in sight", MAX_SCENE_M, sensor.head)
     inside = region.select(view)
-    check_extent(view.points_r[inside], "the object", LARGEST_M, sensor.head)
+    check_extent(view.points_r[inside], "the object", MAX_M, sensor.head)
     own = np.where(inside, distance, np.nan).astype(np.float32)
     deviation = _median_deviation(sensor.noise, image, inside)
     count = resolution.vertices(int(np.isfinite(own).sum())) if vertices == "auto" else vertices

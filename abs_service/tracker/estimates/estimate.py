@@ -46,7 +46,7 @@ class SearchReport:
 
     @classmethod
     def of(cls, outcome: Outcome, spent: Budget) -> "SearchReport":
-        """That of a search with a budget."""
+        """Report of a search with a budget."""
         found = outcome.cost, outcome.deviation, outcome.searcher, outcome.stop
         return cls(*found, spent.generations, spent.evaluations, spent.limit)
 

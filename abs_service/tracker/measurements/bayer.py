@@ -30,7 +30,7 @@ class Measurement:
     color_rank = 1
 
     def decoder(self, sensor: Sensor) -> Decoder:
-        """From bayer_rggb8 and its other orders."""
+        """Decoder of bayer_rggb8 and its other orders."""
         return _decode
 
     def term(self, sensor: Sensor, mesh: Mesh, synthesizer: Synthesizer, comparison: Comparison) -> ChannelTerm:

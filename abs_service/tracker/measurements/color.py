@@ -25,7 +25,7 @@ class Measurement:
     color_rank = 0
 
     def decoder(self, sensor: Sensor) -> Decoder:
-        """From rgb8 or bgr8."""
+        """Decoder of rgb8 and bgr8."""
         return _decode
 
     def term(self, sensor: Sensor, mesh: Mesh, synthesizer: Synthesizer, comparison: Comparison) -> ColorTerm:

@@ -53,7 +53,7 @@ def _auxiliary(noise: DepthNoise) -> tuple[Kind, ...]:
     """Kinds of frames that a depth noise model needs besides the distance."""
     match noise:
         case PerPixel() | Scaled():
-            return _auxiliary(noise.law)
+            return _auxiliary(noise.model)
         case Measured():
             return (Kind.DEVIATION,)
     return (Kind.AMPLITUDE,) if noise.uses_amplitude else ()

@@ -28,7 +28,7 @@ class Measurement:
     color_rank = 2
 
     def decoder(self, sensor: Sensor) -> Decoder:
-        """From mono8, mono16, rgb8 or bgr8, in 0…255."""
+        """Decoder of mono8, mono16, rgb8 and bgr8, to 0…255."""
         return _decode
 
     def term(self, sensor: Sensor, mesh: Mesh, synthesizer: Synthesizer, comparison: Comparison) -> ChannelTerm:

@@ -35,7 +35,7 @@ class Measurement:
         return (Kind(self.noise.stream),)
 
     def decoder(self, sensor: Sensor) -> Decoder:
-        """In units of the stream."""
+        """Decoder to values in the units of the stream."""
         kind = self.frames[0]
         return lambda frames: ChannelImage(frames[kind].si(), ONE_CHANNEL)
 

@@ -79,7 +79,7 @@ class HasDerived(Protocol):
 
     @property
     def derived(self) -> Mapping[str, tuple[float, ...]]:
-        """These numbers, as they are in use, by key."""
+        """Derived numbers by key, as they are in use."""
         ...
 
 

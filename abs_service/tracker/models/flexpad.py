@@ -48,7 +48,7 @@ class Settings:
         bend_deviation: prior standard deviation of a bend. Opposite bends of neighbouring directions nearly cancel, so
             measurements alone do not determine their common magnitude.
         minimum_pixels: minimum number of pixels of the sheet in the first depth image; no effect with a template.
-        largest_bow_m: largest height by which the sheet may arch over its plane in the first depth image [m]; no effect
+        maximum_bow_m: largest height by which the sheet may arch over its plane in the first depth image [m]; no effect
             with a template.
         minimum_gap_m: distance from the sheet's plane up to which a pixel belongs to it in the first depth image, or
             four deviations if that is more [m]; no effect with a template.
@@ -62,7 +62,7 @@ class Settings:
     minimum_radius_m: Annotated[float, Gt(0)] = 0.1
     bend_deviation: Annotated[float, Gt(0)] = 1.0
     minimum_pixels: Annotated[int, Interval(ge=50)] = Limits.minimum_pixels
-    largest_bow_m: Annotated[float, Interval(gt=0, le=1)] = Limits.largest_bow_m
+    maximum_bow_m: Annotated[float, Interval(gt=0, le=1)] = Limits.maximum_bow_m
     minimum_gap_m: Annotated[float, Interval(gt=0, le=0.1)] = Limits.minimum_gap_m
     minimum_overlap: Annotated[float, Interval(ge=0.5, lt=1)] = Limits.minimum_overlap
 
@@ -83,7 +83,7 @@ class Settings:
             DetectionError: the object is not a flat rectangle, or not of the given size.
             ModelError: the sheet is too large for the least radius.
         """
-        limits = Limits(self.minimum_pixels, self.largest_bow_m, self.minimum_gap_m, self.minimum_overlap)
+        limits = Limits(self.minimum_pixels, self.maximum_bow_m, self.minimum_gap_m, self.minimum_overlap)
         sheet = find_sheet(detection, limits)
         if self.width_m:
             sheet = sheet.of_size(self.width_m, self.height_m, self.size_tolerance)

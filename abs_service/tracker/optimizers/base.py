@@ -20,7 +20,7 @@ from abs_service.tracker.terms.sensor_fit import SensorFit
 Costs = NDArray[np.float64]
 
 
-class Problem(Protocol):
+class FrameProblem(Protocol):
     """The cost of one frame near a theta: derivatives and outliers for the searches that use them."""
 
     @property
@@ -100,7 +100,7 @@ class Outcome:
     linearized: LinearizedCost | None = None
     fits: tuple[SensorFit, ...] = ()
 
-    def compared(self, problem: Problem) -> "Outcome":
+    def compared(self, problem: FrameProblem) -> "Outcome":
         """The same with the agreement of the sensors."""
         return self if self.fits else replace(self, fits=problem.fits(self.theta))
 
@@ -137,16 +137,16 @@ class RunningSearch:
 
 
 #: Starts a search of a problem at parameters (dim,).
-StartSearch = Callable[[Problem, NDArray[np.float64], Budget], Search]
+StartSearch = Callable[[FrameProblem, NDArray[np.float64], Budget], Search]
 
 
 class Optimizer(Protocol):
     """A search for every frame; its state in one frame starts the next."""
 
-    def follow(self, problem: Problem, start: NDArray[np.float64], budget: Budget) -> Search:
+    def follow(self, problem: FrameProblem, start: NDArray[np.float64], budget: Budget) -> Search:
         """Warm start: searches near the predicted parameters (dim,)."""
         ...
 
-    def explore(self, problem: Problem, start: NDArray[np.float64], budget: Budget) -> Search:
+    def explore(self, problem: FrameProblem, start: NDArray[np.float64], budget: Budget) -> Search:
         """Cold start: searches wherever the priors allow around start (dim,)."""
         ...

@@ -8,7 +8,7 @@ import numpy as np
 from annotated_types import Ge, Gt, Interval
 from numpy.typing import NDArray
 
-from abs_service.tracker.optimizers.base import Budget, Outcome, Problem, Search
+from abs_service.tracker.optimizers.base import Budget, FrameProblem, Outcome, Search
 from abs_service.tracker.optimizers.cma_es import CmaEsSampler
 from abs_service.tracker.optimizers.search.ask_and_tell import (
     SIGNIFICANT,
@@ -29,7 +29,7 @@ MIN_STEP = 0.5
 MEMORY = 0.03
 
 #: So many tries of CMA-ES in a row that find nothing better than the descent begin a pause; most frames of a pause.
-PATIENCE, LONGEST_PAUSE = 4, 7
+PATIENCE, MAX_PAUSE = 4, 7
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class Hybrid:
         self._in_fallback = False
         self._pauses = Pauses(settings.fallback_above)
 
-    def follow(self, problem: Problem, start: NDArray[np.float64], budget: Budget) -> Search:
+    def follow(self, problem: FrameProblem, start: NDArray[np.float64], budget: Budget) -> Search:
         """Descends; with too many outliers, samples the priors and descends from the result."""
         found = (yield from self._descend(problem, start, budget)).compared(problem)
         limit = self._settings.fallback_until if self._in_fallback else self._settings.fallback_above
@@ -91,7 +91,7 @@ class Hybrid:
         self._update_mean(outlier_share(found.fits))
         return found
 
-    def explore(self, problem: Problem, start: NDArray[np.float64], budget: Budget) -> Search:
+    def explore(self, problem: FrameProblem, start: NDArray[np.float64], budget: Budget) -> Search:
         """Descends, then samples the priors with growing populations."""
         restarts = self._settings.restarts
         search = explore(problem, start, self._descend, self._make, self._population, restarts, budget)
@@ -99,11 +99,13 @@ class Hybrid:
         self._mean_outliers = outlier_share(found.fits)
         return found
 
-    def _descend(self, problem: Problem, start: NDArray[np.float64], budget: Budget) -> Search:
+    def _descend(self, problem: FrameProblem, start: NDArray[np.float64], budget: Budget) -> Search:
         tolerance = self._settings.tolerance * problem.dimension
         return descend(problem, start, self._settings.steps, tolerance, budget)
 
-    def _fall_back(self, problem: Problem, start: NDArray[np.float64], descended: Outcome, budget: Budget) -> Search:
+    def _fall_back(
+        self, problem: FrameProblem, start: NDArray[np.float64], descended: Outcome, budget: Budget
+    ) -> Search:
         """The better of the descent and of CMA-ES followed by a descent."""
         if not self._in_fallback:
             self._sampler = self._make(self._population, self._settings.step)
@@ -121,7 +123,7 @@ class Hybrid:
 
 
 class Pauses:
-    """Frames without CMA-ES after it has found nothing better `PATIENCE` times: one, three, `LONGEST_PAUSE`.
+    """Frames without CMA-ES after it has found nothing better `PATIENCE` times: one, three, `MAX_PAUSE`.
 
     Something may hide measurements for seconds, such as a hand that takes hold of the object: the descent explains all
     others, and samples cost several times as much as it does.
@@ -145,4 +147,4 @@ class Pauses:
         """CMA-ES was tried in a frame with this outlier share after the descent."""
         self._in_vain = 0 if is_better else self._in_vain + 1
         length = 2 ** (self._in_vain - PATIENCE + 1) - 1 if self._in_vain >= PATIENCE else 0
-        self._left, self._share = min(length, LONGEST_PAUSE), share
+        self._left, self._share = min(length, MAX_PAUSE), share

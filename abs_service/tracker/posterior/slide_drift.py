@@ -14,10 +14,10 @@ from abs_service.tracker.posterior.covariance.slides import Slides
 from abs_service.tracker.posterior.priors.motion_prediction import MotionPrediction
 
 #: Smaller variances are not added: a tenth of a millimetre [m²].
-LEAST = 1e-8
+MIN_VARIANCE = 1e-8
 
 #: A slide is no longer than the object: larger variances are those of a surface that is anywhere, in squares of `size`.
-_FARTHEST = 4.0
+_MAX_VARIANCE = 4.0
 
 
 class SlideDrift:
@@ -44,8 +44,8 @@ class SlideDrift:
             return np.zeros((1, 1, 1))
         order = np.argsort(slides.held)
         moved = self._variance + prediction.wandered_m2
-        self._variance = np.minimum(moved / (1 + slides.held[order] * moved) ** 2, _FARTHEST * slides.size**2)
-        large = self._variance > LEAST
+        self._variance = np.minimum(moved / (1 + slides.held[order] * moved) ** 2, _MAX_VARIANCE * slides.size**2)
+        large = self._variance > MIN_VARIANCE
         if not large.any():
             return np.zeros((1, 1, 1))
         drift = slides.displacements(order[large]) * np.sqrt(self._variance[large])

@@ -105,7 +105,7 @@ class DenseView:
         return self._raster.render(surface.vertices[0])
 
     def observe_rendered(self, predicted: Surface) -> tuple["ObservedDenseView", NDArray[np.float32]]:
-        """Both; what is rendered for a population has the faces as well."""
+        """View of one frame and its rendered distances; see `observe` and `render`."""
         return self.observe(predicted), self.render(predicted)
 
     def _painted(self, samples: Samples, share: NDArray[np.float64], expected: float) -> Synthesis:

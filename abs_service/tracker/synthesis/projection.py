@@ -31,7 +31,7 @@ class Optics(NamedTuple):
 
     @classmethod
     def of(cls, camera: Camera) -> "Optics":
-        """Those of a camera, in single precision."""
+        """Optics of a camera, in single precision."""
         pose = np.ascontiguousarray(camera.T_sr[:3], np.float32)
         matrix = np.array([camera.fx, camera.fy, camera.cx, camera.cy], np.float32)
         lens = camera.lens.coefficients.astype(np.float32)

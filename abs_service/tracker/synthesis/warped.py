@@ -17,8 +17,7 @@ from calib.camera import Camera
 from calib.noise.base import DepthNoise, subtract_mean_offset
 from calib.rig import Rig
 from calib.warp.errors import WarpError
-from calib.warp.mesh import MeshWarp
-from calib.warp.mesh import Warped as WarpedDepth
+from calib.warp.mesh import MeshWarp, WarpedDepth
 from calib.warp.pictures import PictureLookup
 from calib.warp.pinhole import pinhole_of
 
@@ -34,7 +33,7 @@ class Settings:
 
     sensor: str = ""
 
-    def build(self, rig: Rig, mesh: Mesh) -> "Warped":
+    def build(self, rig: Rig, mesh: Mesh) -> "WarpedSynthesis":
         """The synthesis of a mesh for the sensors of a rig.
 
         Raises:
@@ -45,10 +44,10 @@ class Settings:
             raise ModelError(
                 f'synthesis.sensor = "{self.sensor}" must be a depth sensor of the tracker, one of {depth}'
             )
-        return Warped(rig, mesh, self.sensor or depth[0])
+        return WarpedSynthesis(rig, mesh, self.sensor or depth[0])
 
 
-class Warped:
+class WarpedSynthesis:
     """One common projection for all sensors."""
 
     resamples = True
@@ -148,7 +147,7 @@ class _SharedView:
         return _ObservedSharedView(self.camera, self._common.observe(predicted), self._attributes)
 
     def observe_rendered(self, predicted: Surface) -> tuple["_ObservedSharedView", NDArray[np.float32]]:
-        """Both; the view is that of all sensors."""
+        """View of one frame and its rendered distances; the view is that of all sensors."""
         return self.observe(predicted), self.render(predicted)
 
 

@@ -11,7 +11,7 @@ MIN_JUDGED = 20
 
 #: A vertex beside its place has a colour that agrees by chance, every third one on a print. So half of a mesh may be
 #: elsewhere if fewer than this share of a sensor's colours agree …
-LEAST_COLORS = 2 / 3
+MIN_COLORS = 2 / 3
 #: … and more than this share of the distances disagree: those stay as they were when a lamp goes out. Without a free
 #: edge in sight, distances do not tell.
 UNLIT_DISTANCES = 0.05
@@ -104,7 +104,7 @@ def contradicting(fits: Sequence[SensorFit]) -> list[tuple[str, str, float]]:
     moved = any(fit.counts.disagreeing > UNLIT_DISTANCES * _judged(fit) or not rims(fits) for fit in distances)
     result = []
     for fit in fits:
-        what, least = ("distances", 1 / 2) if fit in distances else ("colours", LEAST_COLORS if moved else 0.0)
+        what, least = ("distances", 1 / 2) if fit in distances else ("colours", MIN_COLORS if moved else 0.0)
         if _judged(fit) >= MIN_JUDGED and fit.counts.agreeing < least * _judged(fit):
             result.append((fit.sensor, what, fit.counts.agreeing / _judged(fit)))
     return result

@@ -109,7 +109,7 @@ class PointLinearization:
 
     @classmethod
     def empty(cls, sparse_jacobian: SparseJacobian) -> "PointLinearization":
-        """That of no measurement."""
+        """Linearization without measurements."""
         return cls(np.zeros(0), np.zeros((0, 3)), np.zeros(0, np.int64), sparse_jacobian, np.zeros((0, 3)))
 
     @property

@@ -12,7 +12,7 @@ from abs_service.tracker.terms.linearization import PointLinearization
 from calib.camera import Camera
 
 #: Number of vertices of a patch, about, and the largest number of patches.
-SIZE, MOST = 30, 16
+SIZE, MAX_PATCHES = 30, 16
 
 #: Standard deviation of a place that was found in the image [px].
 SIGMA_PX = 0.5
@@ -27,7 +27,7 @@ Patches = NDArray[np.intp]
 def patches_of(mesh: Mesh) -> Patches:
     """Patch of every vertex (n,), 0…: of the nearest of some vertices that are far from one another."""
     vertices = mesh.vertices
-    count = min(max(len(vertices) // SIZE, 1), MOST)
+    count = min(max(len(vertices) // SIZE, 1), MAX_PATCHES)
     away = np.linalg.norm(vertices - vertices.mean(axis=0), axis=1)
     result, center = np.zeros(len(vertices), np.intp), int(np.argmin(away))
     away[:] = np.inf

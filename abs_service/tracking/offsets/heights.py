@@ -18,7 +18,7 @@ from calib.noise.base import DepthNoise
 MIN_COSINE = 0.3
 
 #: Pixels farther away from a vertex are another vertex's, or too many for their use [px].
-LARGEST_RADIUS_PX = 2.5
+MAX_RADIUS_PX = 2.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +96,7 @@ class HeightSensor:
         self._camera, self._noise = camera, noise
         one, other = camera.project(mesh.vertices)[mesh.edges].transpose(1, 0, 2)
         spacing = float(np.nanmedian(np.linalg.norm(one - other, axis=1)))
-        radius = min(spacing / np.sqrt(np.pi), LARGEST_RADIUS_PX)  # a disc as large as a cell
+        radius = min(spacing / np.sqrt(np.pi), MAX_RADIUS_PX)  # a disc as large as a cell
         self._reach = int(radius)
         rows, columns = np.mgrid[-self._reach : self._reach + 1, -self._reach : self._reach + 1].reshape(2, -1)
         self._steps = np.stack([rows, columns], axis=1)[np.hypot(rows, columns) <= radius]

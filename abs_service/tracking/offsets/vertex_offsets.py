@@ -36,13 +36,13 @@ REST_S = 5.0
 TILT = 0.2
 
 #: An offset changes by no more than this share of the edges around it.
-LARGEST_CHANGE = 0.5
+MAX_CHANGE = 0.5
 
 #: A face is folded if the cosine of its angle to the surface is below this; its vertices are not measured.
 MIN_FACING = 0.3
 
 #: The longest time step of the random walk [s], and the least σ of a first offset [m].
-LONGEST_INTERVAL_S, MIN_DEVIATION_M = 0.5, 1e-5
+MAX_INTERVAL_S, MIN_DEVIATION_M = 0.5, 1e-5
 
 
 @dataclass(frozen=True)
@@ -136,7 +136,7 @@ class LearntOffsets:
             self._begin()
             return
         elapsed_s, self._t_ns = max(t_ns - self._t_ns, 0) * 1e-9, t_ns
-        faded = self._random_walk**2 * min(elapsed_s, LONGEST_INTERVAL_S)
+        faded = self._random_walk**2 * min(elapsed_s, MAX_INTERVAL_S)
         self._precision = self._precision / (1 + self._precision * faded)
         if isinstance(image, DepthImage):
             self._observe(image, surface)
@@ -168,7 +168,7 @@ class LearntOffsets:
     def _infer(self) -> None:
         """The most probable offsets, bounded by the lengths of their vertices' edges."""
         offset = self._field.solve(self._mean, self._precision, self._prior, self._offset)
-        most = LARGEST_CHANGE * self._around
+        most = MAX_CHANGE * self._around
         self._offset = np.clip(offset, self._first - most, self._first + most)
         self.variance = self._field.variance(self._precision, self._prior)
         self._model.set_offsets(self._offset, np.sqrt(self.variance))

@@ -17,13 +17,13 @@ from calib.board.target import DICTIONARIES, Charuco, Target
 MIN_MARKERS, MIN_PLACED = 4, 6
 
 #: Images are searched at this size at most [px]; markers need not be exact.
-_LARGEST = 1600
+_MAX_SIDE = 1600
 
 #: Largest number of columns that is tried.
 _MAX_COLUMNS = 30
 
 #: Percentile of the markers that have to stand so; a few may be misread.
-_MOST = 80
+_PERCENTILE = 80
 
 #: Markers stand as on a board if they are off by less than this share of a square, and three times less than otherwise.
 _OFF, _CLEARLY = 0.3, 3.0
@@ -142,7 +142,7 @@ def _tags(points: NDArray[np.float64]) -> _Markers:
 
 
 def _smaller(levels: Grey) -> Grey:
-    scale = _LARGEST / max(levels.shape)
+    scale = _MAX_SIDE / max(levels.shape)
     if scale >= 1:
         return levels
     return np.asarray(cv2.resize(levels, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA), np.uint8)
@@ -244,4 +244,4 @@ def _off(places: NDArray[np.float64], centers: NDArray[np.float64]) -> float:
     if H is None or np.linalg.det(H) * H[2, 2] <= 0:
         return np.inf
     off = np.linalg.norm(cv2.perspectiveTransform(centers[:, None], H)[:, 0] - places, axis=1)
-    return float(np.percentile(off, _MOST))
+    return float(np.percentile(off, _PERCENTILE))

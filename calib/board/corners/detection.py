@@ -67,13 +67,13 @@ class Detection:
         return CornerView(sensor, shot, t_s, target.points()[self.ids], self.pixels, self.sigma_px)
 
 
-def detect(target: Target, image: Image, largest_saturated: float = MAX_SATURATED) -> Detection:
+def detect(target: Target, image: Image, maximum_saturated: float = MAX_SATURATED) -> Detection:
     """Detects a board in an image (height, width) or (height, width, 3) of any type.
 
     Args:
         target: the board.
         image: as delivered by the sensor.
-        largest_saturated: largest saturated fraction of the board, 0 to 1.
+        maximum_saturated: largest saturated fraction of the board, 0 to 1.
 
     Raises:
         BoardError: unusable image; the subclass is the reason, see `calib.board.corners.errors`.
@@ -96,7 +96,7 @@ def detect(target: Target, image: Image, largest_saturated: float = MAX_SATURATE
             f"the board is too small: its points are {spacing:.1f} pixels apart, at least {MIN_SPACING_PX:g} are "
             "needed. Come closer, or use a board with larger squares"
         )
-    _check_saturation(quality.saturated_fraction(target, ids, pixels, image), largest_saturated)
+    _check_saturation(quality.saturated_fraction(target, ids, pixels, image), maximum_saturated)
     _check_sharp(edge, narrow, spacing, has_markers=isinstance(target, Charuco | AprilGrid))
     if isinstance(target, Circles | AsymmetricCircles):
         pixels = ellipse.centers(target, ids, pixels, levels)
@@ -169,8 +169,8 @@ def _check_sharp(edge: float, narrow: float, spacing: float, has_markers: bool) 
         )
 
 
-def _check_saturation(share: float, largest: float) -> None:
-    if share > largest:
+def _check_saturation(share: float, maximum: float) -> None:
+    if share > maximum:
         raise errors.SaturatedError(
             f"{share:.0%} of the board is as bright as the sensor can tell, so edges appear in the wrong place. Use a "
             "shorter exposure, less light, or stand further away"

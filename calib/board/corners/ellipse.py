@@ -25,7 +25,7 @@ _LARGE_PX = 6.0
 
 #: Darkness from which on a pixel counts, in deviations on black and white, and its range; as much below 1, it counts
 #: fully.
-_NOISE, _LEAST = 4.0, (0.1, 0.35)
+_NOISE, _MIN_DARKNESS = 4.0, (0.1, 0.35)
 
 #: Largest tone of a disc, as part of the white around it, and largest distance of its centre from the one found, in
 #: radii.
@@ -53,7 +53,7 @@ def centers(target: Circles | AsymmetricCircles, ids: NDArray[np.intp], pixels: 
 
 
 def _center(levels: Grey, start: Array, axes: Array, white: float, around: float) -> Array:
-    """Centre of one disc (2,), whose radii along the board are `axes` (2, 2) [px]; `start` where it cannot be told."""
+    """Centre of one disc (2,), whose radii along the board are `axes` (2, 2) [px]; `start` if unknown."""
     if np.linalg.svd(axes, compute_uv=False)[-1] < _LARGE_PX:
         return start
     reach = np.ceil(around * np.linalg.norm(axes, axis=1)) + 1
@@ -73,8 +73,8 @@ def _center(levels: Grey, start: Array, axes: Array, white: float, around: float
         return start
     darkness = (1 - tones / bright) / (1 - dark)
     noise = max(np.std(darkness[is_white]), np.std(darkness[away < _BLACK]))
-    least = float(np.clip(_NOISE * noise, *_LEAST))
-    shares = np.clip((darkness - least) / (1 - 2 * least), 0, 1) * (away < around)
+    minimum = float(np.clip(_NOISE * noise, *_MIN_DARKNESS))
+    shares = np.clip((darkness - minimum) / (1 - 2 * minimum), 0, 1) * (away < around)
     moved = shares @ places / shares.sum()
     return start + moved if np.linalg.norm(np.linalg.solve(axes, moved)) < _MOVED else start
 

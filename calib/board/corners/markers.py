@@ -11,7 +11,7 @@ from calib.board.corners.to_8bit import Grey
 from calib.board.target import Charuco
 
 #: Least number of markers that are seen twice; single ones may be misread.
-_LEAST = 3
+_MIN_REPEATED = 3
 
 
 def find_markers(
@@ -33,7 +33,7 @@ def require_one_board(target: Charuco | AprilGrid, levels: Grey) -> None:
     """
     kind = (TAGS, BORDER) if isinstance(target, AprilGrid) else (target.markers(), 1)
     _, counts = np.unique(find_markers(levels, *kind)[0], return_counts=True)
-    if np.sum(counts > 1) >= _LEAST:
+    if np.sum(counts > 1) >= _MIN_REPEATED:
         raise OtherBoardError(
             "more than one board with these markers is in the image: put the others away, such as a second print or a "
             "screen that shows it"

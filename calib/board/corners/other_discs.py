@@ -17,7 +17,7 @@ _OFF = 0.1
 
 #: Share of the places beyond the outermost row at which there have to be discs, to make a row of them, and their least
 #: number in the image.
-_ROW, _LEAST = 0.9, 3
+_ROW, _MIN_DISCS = 0.9, 3
 
 
 def require_end(points: NDArray[np.float64], levels: Grey) -> None:
@@ -33,7 +33,7 @@ def require_end(points: NDArray[np.float64], levels: Grey) -> None:
             beyond = (side[0] + side[1] - side[2])[None]  # in a grid with shifted rows as well
             dark, bright = _brightness(beyond, levels) < middle, _brightness(_between(beyond), levels) > middle
             inside = np.all((beyond >= 0) & (beyond <= np.array(levels.shape[::-1]) - 1), axis=-1)
-            if inside.sum() >= _LEAST and dark[inside].mean() >= _ROW and bright[inside[:, 1:]].mean() >= _ROW:
+            if inside.sum() >= _MIN_DISCS and dark[inside].mean() >= _ROW and bright[inside[:, 1:]].mean() >= _ROW:
                 rows, columns = points.shape[:2]
                 raise OtherBoardError(
                     f"the grid of discs has more {words} than the {columns} × {rows} of the description, so that other "

@@ -10,7 +10,7 @@ from calib.board.corners.to_8bit import Grey
 _STEPS = 5
 #: Least curvature of a corner, relative to the median of all. Noise on a blank is a saddle, too: at most 0.05 of a
 #: corner's curvature at a noise of 8 grey levels.
-_LEAST_CURVATURE = 0.15
+_MIN_CURVATURE = 0.15
 
 
 def refine(levels: Grey, pixels: NDArray[np.float64], radius: int) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
@@ -46,7 +46,7 @@ def refine(levels: Grey, pixels: NDArray[np.float64], radius: int) -> tuple[NDAr
     last = np.array(levels.shape[::-1]) - 1
     is_inside = np.all((corners >= radius) & (corners <= last - radius), axis=1)
     strength = np.sqrt(np.maximum(-curvature, 0))
-    is_strong = strength > _LEAST_CURVATURE * np.median(strength)
+    is_strong = strength > _MIN_CURVATURE * np.median(strength)
     return corners, is_strong & is_inside & (np.linalg.norm(moved, axis=1) < radius)
 
 

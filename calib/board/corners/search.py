@@ -16,11 +16,11 @@ from calib.board.target import AsymmetricCircles, Charuco, Chessboard, Circles, 
 Found = tuple[NDArray[np.intp], NDArray[np.float64]]
 
 #: Images above this size are searched at an integer fraction of their size [px]; corners are refined later.
-_LARGEST = 2000
+_MAX_SIDE = 2000
 #: The same of the first searches for a chessboard, which take long in large images with clutter or noise and no board.
-_LARGEST_AT_FIRST = 1000
+_MAX_SIDE_AT_FIRST = 1000
 #: Images below this size are enlarged if nothing is found, because squares and discs need about ten pixels [px].
-_SMALLEST, _SMALLEST_OF_DISCS = 400, 1000
+_MIN_SIDE, _MIN_SIDE_OF_DISCS = 400, 1000
 
 #: Largest number of blobs per disc; the grid search takes minutes above it.
 _MAX_BLOBS = 3
@@ -64,25 +64,25 @@ def _attempts(target: Target, levels: Grey) -> Iterator[tuple[Grey, float, Calla
         for scale in _scales(target, levels):
             yield image, scale, _find
     if isinstance(target, Chessboard):
-        is_small = max(levels.shape) <= _LARGEST_AT_FIRST
-        yield (levels, 2, _by_sectors) if is_small else (levels, _reduction(levels, _LARGEST), _find)
+        is_small = max(levels.shape) <= _MAX_SIDE_AT_FIRST
+        yield (levels, 2, _by_sectors) if is_small else (levels, _reduction(levels, _MAX_SIDE), _find)
 
 
 def _scales(target: Target, levels: Grey) -> Iterator[float]:
     size = max(levels.shape)
-    largest = _LARGEST_AT_FIRST if isinstance(target, Chessboard) else _LARGEST
-    if size > largest and not isinstance(target, Charuco | AprilGrid):
-        yield _reduction(levels, largest)
+    maximum = _MAX_SIDE_AT_FIRST if isinstance(target, Chessboard) else _MAX_SIDE
+    if size > maximum and not isinstance(target, Charuco | AprilGrid):
+        yield _reduction(levels, maximum)
         return
     yield 1
-    if size < (_SMALLEST_OF_DISCS if isinstance(target, Circles | AsymmetricCircles) else _SMALLEST):
+    if size < (_MIN_SIDE_OF_DISCS if isinstance(target, Circles | AsymmetricCircles) else _MIN_SIDE):
         yield 2
         yield 4
 
 
-def _reduction(levels: Grey, largest: int) -> float:
+def _reduction(levels: Grey, maximum: int) -> float:
     """Integer fraction that makes an image at most this large [px]."""
-    return 1 / int(np.ceil(max(levels.shape) / largest))
+    return 1 / int(np.ceil(max(levels.shape) / maximum))
 
 
 def _scaled(levels: Grey, scale: float) -> Grey:
@@ -129,7 +129,7 @@ def _find_chessboard(target: Chessboard, levels: Grey) -> Found:
 
 def _by_sectors(target: Chessboard, levels: Grey) -> Found:
     """Corners by sectors; `CALIB_CB_ACCURACY`, which takes four times as long, gives only small images better ones."""
-    accuracy = cv2.CALIB_CB_ACCURACY if max(levels.shape) < _SMALLEST else 0
+    accuracy = cv2.CALIB_CB_ACCURACY if max(levels.shape) < _MIN_SIDE else 0
     found, corners = cv2.findChessboardCornersSB(levels, target.grid, flags=cv2.CALIB_CB_NORMALIZE_IMAGE | accuracy)
     return _complete(corners) if found else _NOTHING
 

@@ -13,7 +13,7 @@ from calib.noise.fit.polynomial import Polynomials, Table
 from calib.noise.fit.samples import Samples, domain
 
 #: Samples beyond this number are subsampled at random.
-LARGEST = 200_000
+MAX_SAMPLES = 200_000
 
 #: Distances over which an outlier is uniform [m].
 RANGE_M = 5.0
@@ -69,7 +69,7 @@ def maximize_likelihood(
     power: int = 1,
     pseudo_samples: Design = NO_PSEUDO_SAMPLES,
     span: float = RANGE_M,
-    least: float | NDArray[np.floating] = 0.0,
+    minimum: float | NDArray[np.floating] = 0.0,
 ) -> FittedNoise:
     """Fits (1 − ε) N(μ, σ²) + ε uniform to residuals, with μ = columns.mean @ m and σᵖᵒʷᵉʳ = columns.spread @ s.
 
@@ -80,7 +80,7 @@ def maximize_likelihood(
         pseudo_samples: design matrices of conditions that may lack real samples. Each counts as one sample of median
             mean and spread: negligible beside thousands of real ones, but enough to bound the extrapolation.
         span: range over which an outlier is uniform, in the unit of the residuals.
-        least: lower bound of the deviation of every sample, in the unit of the residuals: values that come in steps
+        minimum: lower bound of the deviation of every sample, in the unit of the residuals: values that come in steps
             may repeat exactly, which would make the likelihood of no deviation unbounded.
 
     Raises:
@@ -92,7 +92,7 @@ def maximize_likelihood(
     q_mean, r_mean = np.linalg.qr(columns.mean)  # orthogonal columns: powers of x and a differ by orders of magnitude
     q_spread, r_spread = np.linalg.qr(columns.spread)
     k = q_mean.shape[1]
-    bound = np.maximum(least / unit, _MIN_SPREAD)
+    bound = np.maximum(minimum / unit, _MIN_SPREAD)
     samples = ResidualSamples(residual / unit, Design(q_mean, q_spread), power, unit / span, bound)
     turned = Design(_solved(pseudo_samples.mean, r_mean), _solved(pseudo_samples.spread, r_spread))
     regularization = PseudoSamples(center / unit, turned, power)
@@ -123,19 +123,19 @@ class ResidualSamples:
         columns: design matrices.
         power: of the deviation that is linear in its parameters.
         uniform: density of an outlier.
-        least: lower bound of the deviation, a number or (n,).
+        minimum: lower bound of the deviation, a number or (n,).
     """
 
     residual: NDArray[np.floating]
     columns: Design
     power: int
     uniform: float
-    least: float | NDArray[np.floating] = _MIN_SPREAD
+    minimum: float | NDArray[np.floating] = _MIN_SPREAD
 
     def cost(self, m: NDArray[np.float64], s: NDArray[np.float64], logit: float) -> tuple[float, NDArray[np.floating]]:
         """Negative log-likelihood, and its gradient with respect to m, s and the logit of ε."""
         share = scipy.special.expit(logit)
-        v, inside = _bounded(self.columns.spread @ s, self.least**self.power)
+        v, inside = _bounded(self.columns.spread @ s, self.minimum**self.power)
         sigma = v ** (1 / self.power)
         z = (self.residual - self.columns.mean @ m) / sigma
         normal = np.exp(-0.5 * z**2 - LOG_SQRT_2PI) / sigma
@@ -187,18 +187,18 @@ def polynomials(samples: Samples, sigma_degrees: tuple[int, int], mu_degrees: tu
         part.ravel() for part in np.meshgrid(*(np.linspace(*span, _PSEUDO_SAMPLES) for span in (distances, amplitudes)))
     )
     pseudo_samples = Design(polyvander2d(x, a, mu_degrees), polyvander2d(x, a, sigma_degrees))
-    law = maximize_likelihood(samples.residual, columns, pseudo_samples=pseudo_samples, least=samples.minimum_sigma)
+    law = maximize_likelihood(samples.residual, columns, pseudo_samples=pseudo_samples, minimum=samples.minimum_sigma)
     sigma = law.spread.reshape(sigma_degrees[0] + 1, sigma_degrees[1] + 1, 1)
     mu = law.mean.reshape(mu_degrees[0] + 1, mu_degrees[1] + 1, 1)
-    least = minimum_sigma(np.maximum(columns.spread @ law.spread, samples.minimum_sigma))
-    return Polynomials(sigma, mu, distances, amplitudes, least)
+    minimum = minimum_sigma(np.maximum(columns.spread @ law.spread, samples.minimum_sigma))
+    return Polynomials(sigma, mu, distances, amplitudes, minimum)
 
 
 def subsampled(samples: Samples) -> Samples:
-    """At most `LARGEST` of the samples, drawn at random with a fixed seed."""
-    if len(samples) <= LARGEST:
+    """Samples, at most `MAX_SAMPLES` of them, drawn at random with a fixed seed."""
+    if len(samples) <= MAX_SAMPLES:
         return samples
-    return samples.take(np.random.default_rng(0).choice(len(samples), LARGEST, replace=False))
+    return samples.take(np.random.default_rng(0).choice(len(samples), MAX_SAMPLES, replace=False))
 
 
 def minimum_sigma(sigma: NDArray[np.floating]) -> float:
@@ -232,10 +232,10 @@ def _solved(columns: NDArray[np.floating], triangle: NDArray[np.floating]) -> ND
 
 
 def _bounded(
-    v: NDArray[np.floating], least: float | NDArray[np.floating]
+    v: NDArray[np.floating], minimum: float | NDArray[np.floating]
 ) -> tuple[NDArray[np.floating], NDArray[np.bool_]]:
     """Clamped power of the deviation, and the mask of values that were not clamped."""
-    return np.maximum(v, least), v > least
+    return np.maximum(v, minimum), v > minimum
 
 
 def _start(samples: ResidualSamples) -> tuple[NDArray[np.floating], NDArray[np.floating]]:
@@ -244,7 +244,7 @@ def _start(samples: ResidualSamples) -> tuple[NDArray[np.floating], NDArray[np.f
     middle = np.median(r) if mean.shape[1] else 0.0
     offset = mean.T @ np.clip(r, middle - 5, middle + 5)
     size = np.minimum(np.abs(r - mean @ offset) * np.sqrt(np.pi / 2), 5)
-    size = np.maximum(size, 1.5 * samples.least) ** power  # where bounds hold, likelihood has no slope
+    size = np.maximum(size, 1.5 * samples.minimum) ** power  # where bounds hold, likelihood has no slope
     linear = spread.T @ size
     constant = spread.T @ np.full(len(r), size.mean())
     return offset, linear if (spread @ linear).min() > _MIN_SPREAD**power else constant

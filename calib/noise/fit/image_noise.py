@@ -58,7 +58,7 @@ def from_static_scene(
 
 
 def residuals(measured: ArrayLike, real: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Residuals (n,) and true values where both are finite; subsampled to at most `fitting.LARGEST`.
+    """Residuals (n,) and true values where both are finite; subsampled to at most `fitting.MAX_SAMPLES`.
 
     Raises:
         NoiseError: there are none.
@@ -67,8 +67,8 @@ def residuals(measured: ArrayLike, real: ArrayLike) -> tuple[NDArray[np.float64]
     known = np.flatnonzero(np.isfinite(values) & np.isfinite(truth))
     if not known.size:
         raise NoiseError(f"none of {values.size} measured numbers comes with a real one")
-    if known.size > fitting.LARGEST:
-        known = np.random.default_rng(0).choice(known, fitting.LARGEST, replace=False)
+    if known.size > fitting.MAX_SAMPLES:
+        known = np.random.default_rng(0).choice(known, fitting.MAX_SAMPLES, replace=False)
     truth = truth.ravel()[known]
     return values.ravel()[known] - truth, truth
 

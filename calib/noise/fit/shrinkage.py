@@ -57,7 +57,7 @@ class _Groups:
         of: index of the group of every sample (n,).
         number: number of groups.
         repeats: replicates of the samples.
-        least: lower bound of the factor on the deviation (groups,).
+        minimum: lower bound of the factor on the deviation (groups,).
     """
 
     residual: NDArray[np.float64]
@@ -66,7 +66,7 @@ class _Groups:
     of: NDArray[np.int64]
     number: int
     repeats: Repeats
-    least: NDArray[np.float64]
+    minimum: NDArray[np.float64]
 
     def sum(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Sums (groups,) of values (n,)."""
@@ -102,14 +102,14 @@ def refine(
     near, far = parent.distances
     middle, half = (near + far) / 2, (far - near) / 2
     basis = basis_of(samples.true, parent.distances, degree)
-    offsets, factors = shrink(residual, deviation, basis, place, len(parent_of), least=samples.minimum_sigma)
+    offsets, factors = shrink(residual, deviation, basis, place, len(parent_of), minimum=samples.minimum_sigma)
     mu = np.zeros((max(parent.mu.shape[0], degree + 1), parent.mu.shape[1], len(parent_of)))
     mu[: parent.mu.shape[0]] = parent.mu[..., parent_of]
     for power in range(degree + 1):
         raw = polypow([-middle / half, 1 / half], power)  # ((x − middle) / half)ᵖᵒʷᵉʳ as a polynomial in x
         mu[: power + 1, 0] += np.outer(raw, offsets[:, power])
-    least = parent.minimum_sigma * float(factors.min())
-    return Polynomials(parent.sigma[..., parent_of] * factors, mu, parent.distances, parent.amplitudes, least)
+    minimum = parent.minimum_sigma * float(factors.min())
+    return Polynomials(parent.sigma[..., parent_of] * factors, mu, parent.distances, parent.amplitudes, minimum)
 
 
 def basis_of(x: NDArray[np.floating], distances: Span, degree: int) -> NDArray[np.floating]:
@@ -125,7 +125,7 @@ def shrink(
     place: NDArray[np.integer],
     places: int,
     repeats: Repeats = ONCE,
-    least: float | NDArray[np.float64] = 0.0,
+    minimum: float | NDArray[np.float64] = 0.0,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Offsets and deviation factors of places relative to their parent, by expectation–maximisation.
 
@@ -136,14 +136,14 @@ def shrink(
         place: index of the place of every sample (n,).
         places: number of places.
         repeats: replicates of the samples.
-        least: deviation of the quantisation error [m], a number or (n,): a place that repeats one value does not show
+        minimum: deviation of the quantisation error [m], a number or (n,): a place that repeats one value does not show
             it, and own offsets make up for it.
 
     Returns:
         Coefficients of the own mean offsets (places, k), and factors on the deviation (places,).
     """
     of = place.astype(np.int64)
-    mean_square = np.bincount(of, np.square(least / deviation), places) / np.bincount(of, minlength=places).clip(1)
+    mean_square = np.bincount(of, np.square(minimum / deviation), places) / np.bincount(of, minlength=places).clip(1)
     floor = np.maximum(np.sqrt(mean_square), MIN_FACTOR)
     groups = _Groups(residual, deviation, basis, of, places, repeats, floor)
     offsets = np.zeros((groups.number, groups.basis.shape[1]))
@@ -198,9 +198,9 @@ def _factors(
     rest = groups.residual - np.einsum("nk,nk->n", groups.basis, offsets[groups.of])
     squares = groups.sum(weight * (rest**2 + groups.repeats.variance) / groups.deviation**2)
     freedom = np.maximum(groups.sum(weight) - used, 0)
-    squares = np.maximum(squares, freedom * groups.least**2)
+    squares = np.maximum(squares, freedom * groups.minimum**2)
     common, confidence = _common_variance(squares, freedom)
-    return np.maximum(np.sqrt((confidence * common + squares) / (confidence + freedom)), groups.least)
+    return np.maximum(np.sqrt((confidence * common + squares) / (confidence + freedom)), groups.minimum)
 
 
 def _common_variance(squares: NDArray[np.float64], freedom: NDArray[np.float64]) -> tuple[float, float]:

@@ -7,7 +7,7 @@ import scipy  # its parts are imported when they are first used
 from numpy.typing import NDArray
 
 #: Upper bound of the deviation, in units of the cut; the truncated distribution of a larger one is nearly uniform.
-_LARGEST = 1.5
+_MAX_DEVIATION = 1.5
 
 
 def deviation_within(mean_square: float, cut: float, channels: int = 1) -> float:
@@ -29,7 +29,7 @@ def deviation_within(mean_square: float, cut: float, channels: int = 1) -> float
 @functools.cache
 def _table(channels: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Mean squares within a cut of 1, in ascending order, and the corresponding deviations."""
-    deviations = np.linspace(1e-3, _LARGEST, 1500)
+    deviations = np.linspace(1e-3, _MAX_DEVIATION, 1500)
     half_q = channels / (2 * deviations**2)
     cut_off = scipy.special.gammainc(channels / 2 + 1, half_q) / scipy.special.gammainc(channels / 2, half_q)
     return np.append(0.0, deviations**2 * cut_off), np.append(0.0, deviations)

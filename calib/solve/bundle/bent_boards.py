@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from calib.solve.bundle.additional_parameters import further
 from calib.solve.bundle.blocks import Corners
 from calib.solve.bundle.equations import Equations
-from calib.solve.bundle.further import further
 
 #: Powers of x and y of the bends: along both sides, and twisted.
 _POWERS = ((2, 0), (1, 1), (0, 2))

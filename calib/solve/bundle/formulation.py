@@ -42,7 +42,7 @@ class Formulation:
         times = np.array([view.t_s for view in views])
         if self.task.sensors[sensor].free_running:
             on_rig = times + state.sensors[sensor].time_offset
-            rows = motion.neighbours(on_rig, self.shot_times, self.task.longest_gap)
+            rows = motion.neighbours(on_rig, self.shot_times, self.task.maximum_gap)
             for index in np.flatnonzero(rows[:, 0] < 0):
                 rows[index] = self._still(shots[index], on_rig[index])
         else:
@@ -91,7 +91,7 @@ def _shot_times(task: Task) -> Mapping[int, float]:
         times.setdefault(view.shot, []).append(view.t_s)
     means = {shot: float(np.mean(times)) for shot, times in synchronised.items()}
     lonely = {shot: float(np.mean(times)) for shot, times in free.items() if shot not in synchronised}
-    around = motion.neighbours(np.array([*lonely.values()]), np.sort([*means.values()]), task.longest_gap)
+    around = motion.neighbours(np.array([*lonely.values()]), np.sort([*means.values()]), task.maximum_gap)
     return means | {shot: time for (shot, time), rows in zip(lonely.items(), around, strict=True) if rows[0] < 0}
 
 

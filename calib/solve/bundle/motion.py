@@ -88,20 +88,20 @@ def between_shots(boards: ShotPoses, pairs: NDArray[np.intp], times: NDArray[np.
     return ViewPoses(placed, boards.translations[first] + share * run, pairs, blocks, speed)
 
 
-def neighbours(times: NDArray[np.float64], shots: NDArray[np.float64], longest_gap: float) -> NDArray[np.intp]:
+def neighbours(times: NDArray[np.float64], shots: NDArray[np.float64], maximum_gap: float) -> NDArray[np.intp]:
     """Rows (views, 2) of the shots around or next to each view; (-1, -1) for a view without two such shots.
 
     Args:
         times: of the views (views,) [s].
         shots: of the shots, ascending (shots,) [s].
-        longest_gap: largest gap between two shots of one motion [s].
+        maximum_gap: largest gap between two shots of one motion [s].
     """
-    gaps = np.flatnonzero(np.diff(shots) <= longest_gap)
+    gaps = np.flatnonzero(np.diff(shots) <= maximum_gap)
     found = np.full((len(times), 2), -1, np.intp)
     if gaps.size:
         middles = (shots[gaps] + shots[gaps + 1]) / 2
         nearest = gaps[np.abs(times[:, None] - middles).argmin(axis=1)]
-        near = (times > shots[nearest] - longest_gap) & (times < shots[nearest + 1] + longest_gap)
+        near = (times > shots[nearest] - maximum_gap) & (times < shots[nearest + 1] + maximum_gap)
         found[near] = np.stack([nearest, nearest + 1], axis=1)[near]
     return found
 

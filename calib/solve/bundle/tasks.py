@@ -80,7 +80,7 @@ class Task:
         sensors: by name.
         corners, planes: observations.
         reference: sensor with a fixed pose: the rig's frame, or its `factory` pose in the rig.
-        longest_gap: largest gap between two shots of one motion of the board [s]; for free-running sensors.
+        maximum_gap: largest gap between two shots of one motion of the board [s]; for free-running sensors.
         min_views_fixed: minimum number of views of a sensor with fixed intrinsics.
         two_ways_up: True if the board looks the same upside down, so that sensors may number it from different ends.
     """
@@ -89,7 +89,7 @@ class Task:
     corners: Sequence[CornerView]
     planes: Sequence[PlaneView]
     reference: str
-    longest_gap: float = 0.5
+    maximum_gap: float = 0.5
     min_views_fixed: int = 3
     two_ways_up: bool = False
 

@@ -15,7 +15,7 @@ from calib.solve.bundle.formulation import formulate
 from calib.solve.bundle.parameters.lens_parameters import FISHEYE
 from calib.solve.bundle.parameters.state import SensorState, State
 from calib.solve.bundle.tasks import SensorTask, Task
-from calib.solve.start import extrinsics_graph, half_turns, registration
+from calib.solve.start import extrinsics_graph, registration, symmetric_boards
 from calib.solve.start.board_poses import PoseCandidate, initial_camera, plain_camera, pose_candidates
 
 #: Reprojection errors are clipped here [px] when board poses are compared.
@@ -116,9 +116,9 @@ def _numbered_alike(
     task: Task, cameras: Mapping[str, Camera], seen: Mapping[str, Mapping[int, list[PoseCandidate]]]
 ) -> tuple[Task, dict[str, dict[int, list[PoseCandidate]]]]:
     """Task and pose candidates with corners numbered from the same end of the board in all sensors of a shot."""
-    poses = extrinsics_graph.poses(half_turns.both_ways(seen, task.corners), next(iter(seen)))
+    poses = extrinsics_graph.poses(symmetric_boards.both_ways(seen, task.corners), next(iter(seen)))
     placed = {name: replace(cameras[name], T_rs=T_0s) for name, T_0s in poses.items()}
-    corners = half_turns.numbered_alike(task.corners, placed)
+    corners = symmetric_boards.numbered_alike(task.corners, placed)
     found: dict[str, dict[int, list[PoseCandidate]]] = {name: {} for name in seen}
     for view in corners:
         if candidates := pose_candidates(cameras[view.sensor], view):

@@ -13,8 +13,8 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
+from calib.solve.bundle.additional_parameters import further
 from calib.solve.bundle.bent_boards import shape_columns
-from calib.solve.bundle.further import further
 from calib.solve.solution import Solution
 from calib.solve.validation import projection_uncertainty
 from calib.solve.validation.support import supported

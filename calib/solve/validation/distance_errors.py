@@ -12,9 +12,9 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from calib.solve.bundle.additional_parameters import further
 from calib.solve.bundle.blocks import Planes
 from calib.solve.bundle.equations import Equations
-from calib.solve.bundle.further import further
 from calib.solve.solution import Solution
 
 #: Mistakes are named from this many deviations on.

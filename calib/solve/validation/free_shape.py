@@ -29,7 +29,7 @@ _OUT, _IN, _IMAGE = 4, 3, 5
 _OF_BOARD, _OF_IMAGE = 0.03, 0.01
 
 #: With more parameters than this share of the measurements the shapes stay as they are.
-_MOST = 0.4
+_MAX_SHARE = 0.4
 
 _STEPS = 4
 
@@ -65,7 +65,7 @@ def free_shape(solution: Solution) -> FreeShape:
     jacobian = equations.jacobian(np.zeros(equations.layout.size))
     residuals, measured, count = solution.adjustment.residuals, int(equations.ends[-1]), equations.layout.board_start
     added = np.hstack([shape_columns(equations, jacobian, _of_board), _of_lenses(equations, residuals)])
-    if equations.layout.size + added.shape[1] > _MOST * measured:
+    if equations.layout.size + added.shape[1] > _MAX_SHARE * measured:
         added = added[:, :0]
     size = equations.layout.size
     below = np.zeros((len(residuals) - measured, added.shape[1]))

@@ -13,8 +13,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from calib.solve.bundle.additional_parameters import further
 from calib.solve.bundle.bent_boards import ByPlaces, by_places, shape_columns
-from calib.solve.bundle.further import further
 from calib.solve.solution import Solution
 from calib.solve.validation.board_shape import CERTAIN, bends, effect_px
 
@@ -68,7 +68,7 @@ def motions(solution: Solution, distance: float) -> list[Motion]:
 
 
 def noticed(found: Sequence[Motion], needed_px: float) -> list[Motion]:
-    """Those that matter where projections are needed to `needed_px` [px]."""
+    """Motions that matter where projections are needed to `needed_px` [px]."""
     return [one for one in found if one.effect_px > NOTICED * needed_px]
 
 

@@ -11,14 +11,14 @@ from calib.solve.validation import projection_uncertainty
 from calib.solve.validation.board_shape import shape_errors
 from calib.solve.validation.cross_validation import Agreement, TooFewToSplitError, cross_validate
 from calib.solve.validation.free_shape import free_shape
+from calib.solve.validation.inconsistent_shots.changes import unseen
+from calib.solve.validation.inconsistent_shots.contradictions import Contradiction, outliers
+from calib.solve.validation.inconsistent_shots.findings import inconsistent_shots
+from calib.solve.validation.inconsistent_shots.steadiness import unseen_change
 from calib.solve.validation.other_lens import other_lenses, undescribed
 from calib.solve.validation.projection_uncertainty import UncertaintyMap
 from calib.solve.validation.rolling_shutter import Motion, motions, noticed
 from calib.solve.validation.square_pixels import doubts, not_square, remarks
-from calib.solve.validation.unlike_shots.changes import unseen
-from calib.solve.validation.unlike_shots.contradictions import Contradiction, outliers
-from calib.solve.validation.unlike_shots.findings import unlike_shots
-from calib.solve.validation.unlike_shots.steadiness import unseen_change
 from calib.solve.validation.weak_directions import weak_directions
 
 #: Largest ratio of observed to predicted difference of the halves; exceeded by chance in about 1 % of the cases.
@@ -87,7 +87,7 @@ def assess(
     }
     moved, pixels, free = motions(solution, distance), not_square(solution, distance), free_shape(solution)
     shared = [*shape_errors(solution, distance, needed_px), *noticed(moved, needed_px)]
-    unlike = unlike_shots(free, shared, needed_px)
+    unlike = inconsistent_shots(free, shared, needed_px)
     reasons, contradicting = [*unlike.reasons], unlike.contradicting
     reasons += exchanged(solution.cameras)
     reasons += weak_directions(solution, distance)

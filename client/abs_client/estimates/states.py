@@ -30,7 +30,7 @@ _NOTHING = State(DeformationState(), DeformedMesh(), MeshTopology(), Status.STAL
 def states(
     link: Link,
     tracker: str,
-    largest_age_s: float,
+    maximum_age_s: float,
     close: Callable[[], None] | None = None,
     feed: Feed = feeds.whole,
 ) -> Stream[State]:
@@ -39,46 +39,46 @@ def states(
     Args:
         link: to the rig.
         tracker: its name.
-        largest_age_s: older estimates are left out; when there are no others for so long, a STALE one is given.
+        maximum_age_s: older estimates are left out; when there are no others for so long, a STALE one is given.
         close: what ends the link, if the stream is all that uses it.
         feed: what is received of the tracker.
 
     Raises:
-        RangeError: `largest_age_s` is not greater than 0.
+        RangeError: `maximum_age_s` is not greater than 0.
     """
     wake = Wake()
-    source = StateSource(link, tracker, checked_age(largest_age_s), feed, wake, monotonic_ns)
+    source = StateSource(link, tracker, checked_age(maximum_age_s), feed, wake, monotonic_ns)
     return Stream(source, wake, link, close or source.close)
 
 
-def checked_age(largest_age_s: float) -> float:
+def checked_age(maximum_age_s: float) -> float:
     """Returns the largest age of estimates [s] if it can be one.
 
     Raises:
         RangeError: it cannot.
     """
-    if not largest_age_s > 0.0:  # NaN is not
-        raise RangeError(f"largest_age_s is {largest_age_s:g}: it must be greater than 0")
-    return largest_age_s
+    if not maximum_age_s > 0.0:  # NaN is not
+        raise RangeError(f"maximum_age_s is {maximum_age_s:g}: it must be greater than 0")
+    return maximum_age_s
 
 
 class StateSource:
     """Joins what arrives of a tracker and judges its age; see `stream.Source`.
 
     Args:
-        link, tracker, largest_age_s, feed: see `states`.
+        link, tracker, maximum_age_s, feed: see `states`.
         wake: signalled when there may be a state.
         clock: this host's monotonic clock [ns].
     """
 
     def __init__(
-        self, link: Link, tracker: str, largest_age_s: float, feed: Feed, wake: Wake, clock: Callable[[], int]
+        self, link: Link, tracker: str, maximum_age_s: float, feed: Feed, wake: Wake, clock: Callable[[], int]
     ) -> None:
         self._link = link
         self._tracker = tracker
         self._wake = wake
         self._clock = clock
-        self._largest_age_s = largest_age_s
+        self._maximum_age_s = maximum_age_s
         self._assembly = Assembly(clock)
         self._ages = Ages(clock, self._ask_clock)
         self._last, self._arrived_ns = _NOTHING, 0
@@ -99,14 +99,14 @@ class StateSource:
         return self._skipped
 
     def take(self) -> State | None:
-        """The newest estimate, or a STALE one after every `largest_age_s` without."""
+        """The newest estimate, or a STALE one after every `maximum_age_s` without."""
         self._ask_for_topology()
         if (whole := self._assembly.take()) is not None:
             age_s = self._ages.age_s(whole.state, whole.arrived_ns)
             newest, self._arrived_ns = received(whole.state, whole.mesh, whole.topology, age_s), whole.arrived_ns
             self._count_between(self._last.message.header, newest.message.header)
             self._last = newest
-            if age_s <= self._largest_age_s:
+            if age_s <= self._maximum_age_s:
                 self._stale_ns = self._silent_at_ns()
                 return self._last
             self._skipped += 1
@@ -125,7 +125,7 @@ class StateSource:
             end()
 
     def _silent_at_ns(self) -> int:
-        return self._clock() + round(min(self._largest_age_s, FOREVER_S) * 1e9)
+        return self._clock() + round(min(self._maximum_age_s, FOREVER_S) * 1e9)
 
     def _count_between(self, before: Header, newest: Header) -> None:
         if before.boot_id == newest.boot_id:

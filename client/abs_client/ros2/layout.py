@@ -32,7 +32,7 @@ class Qos:
     transient_local: bool = False
 
     def text(self) -> str:
-        """Its part of a token: what differs from the defaults, see `qos_to_keyexpr`."""
+        """Part of a token that states this quality: what differs from the defaults, see `qos_to_keyexpr`."""
         return f":{'1' if self.transient_local else ''}:,{self.depth}:,:,:,,"
 
 

@@ -22,7 +22,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         with node.RosNode(given.router, name, given.domain) as ros_node, programs.link(given) as link:
             print(f"rig {given.rig} at {given.endpoint}: to ROS domain {given.domain} at {given.router}", flush=True)
-            republisher.Republisher(link, ros_node, given.largest_age).run(end)
+            republisher.Republisher(link, ros_node, given.maximum_age).run(end)
     except ClientError as error:
         return programs.complain(error)
     return 0

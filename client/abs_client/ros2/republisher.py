@@ -38,16 +38,16 @@ class Republisher:
     Args:
         link: to the rig.
         node: in the ROS graph.
-        largest_age_s: estimates that are older are left out.
+        maximum_age_s: estimates that are older are left out.
 
     Attributes:
         left_out: what was received and not published, or not received at all, by cause.
     """
 
-    def __init__(self, link: Link, node: RosNode, largest_age_s: float) -> None:
+    def __init__(self, link: Link, node: RosNode, maximum_age_s: float) -> None:
         self._link = link
         self._node = node
-        self._largest_age_s = largest_age_s
+        self._maximum_age_s = maximum_age_s
         self._prefix = f"/{ros_name(link.rig)}"
         self._cameras: Mapping[str, Camera] = {}
         self._models: dict[str, bytes] = {}
@@ -70,7 +70,7 @@ class Republisher:
         """Searches for trackers, and publishes its own counters, once a second until `end`; then closes the link."""
         while not end.wait(POLL_S):
             for tracker in self._link.trackers() - self._trackers.keys():
-                stream = states.states(self._link, tracker, self._largest_age_s)
+                stream = states.states(self._link, tracker, self._maximum_age_s)
                 self._trackers[tracker] = threading.Thread(target=self._follow, args=(tracker, stream), daemon=True)
                 self._trackers[tracker].start()
             self._tell()

@@ -16,7 +16,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         with (
             programs.link(given) as link,
-            EstimateServer((given.host, given.port), link, given.largest_age, given.origin) as server,
+            EstimateServer((given.host, given.port), link, given.maximum_age, given.origin) as server,
         ):
             threading.Thread(target=server.serve_forever, daemon=True).start()
             print(f"rig {given.rig} at {given.endpoint}: http://{given.host}:{server.server_port}/", flush=True)

@@ -20,15 +20,15 @@ class EstimateServer(ThreadingHTTPServer):
     Args:
         address: host and port; port 0 for a free one.
         link: to the rig.
-        largest_age_s: older estimates are left out; after as long without one, readers get a STALE one.
+        maximum_age_s: older estimates are left out; after as long without one, readers get a STALE one.
         origin: of pages elsewhere that may read, such as `http://localhost:3000`; "" for none.
     """
 
     daemon_threads = True
 
-    def __init__(self, address: tuple[str, int], link: Link, largest_age_s: float, origin: str = "") -> None:
+    def __init__(self, address: tuple[str, int], link: Link, maximum_age_s: float, origin: str = "") -> None:
         self._link = link
-        self._largest_age_s = largest_age_s
+        self._maximum_age_s = maximum_age_s
         self.origin = origin
         super().__init__(address, _Reader)
 
@@ -42,7 +42,7 @@ class EstimateServer(ThreadingHTTPServer):
         Raises:
             OSError: the reader is gone.
         """
-        with states.states(self._link, tracker, self._largest_age_s) as stream:
+        with states.states(self._link, tracker, self._maximum_age_s) as stream:
             for event in events(stream):
                 write(event)
 
@@ -61,7 +61,7 @@ class _Reader(BaseHTTPRequestHandler):
             self.close_connection = True  # the reader is gone
 
     def log_message(self, format: str, *args: object) -> None:  # noqa: A002 the name in the base class
-        """Nothing: a page is no event."""
+        """Suppresses the log of requests."""
 
     def _answer(self) -> None:
         if self.path == "/":

@@ -81,7 +81,7 @@ def poses(path: Path) -> Poses:
     file = (path if path.is_dir() else path.parent) / CALIBRATION
     try:
         if file.is_file():
-            return eeprom.parse(limited.read(file, limited.LARGEST_TEXT))
+            return eeprom.parse(limited.read(file, limited.MAX_TEXT_BYTES))
     except OSError as error:
         raise ForeignRecordingError(f"{file}: cannot be read: {error.strerror}") from error
     messages = map(_first, files(path))

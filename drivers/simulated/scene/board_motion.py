@@ -13,7 +13,7 @@ from drivers.simulated.scene.motion import Placement, smooth_step
 #: Duration of the move from one pose to the next [s].
 MOVE_S = 1.0
 #: Range of distances from the rig's origin [m], and maximum tilt and roll [rad].
-NEAREST, FARTHEST = 0.55, 0.95
+MIN_DISTANCE_M, MAX_DISTANCE_M = 0.55, 0.95
 TILT, ROLL = np.deg2rad(40), np.deg2rad(20)
 #: Half width and height of the time-of-flight head's view at 1 m, less a margin [m].
 _SEEN = (0.37, 0.29)
@@ -57,7 +57,7 @@ def _held(board_motion: BoardMotion, number: int) -> Pose:
     if number == 0:
         return pose.from_rotation_vector((0, 0, 0), (0, 0, 0.7))
     generator = np.random.default_rng([board_motion.seed, 5, number])
-    distance = generator.uniform(NEAREST, FARTHEST)
+    distance = generator.uniform(MIN_DISTANCE_M, MAX_DISTANCE_M)
     axis, angle = generator.uniform(0, 2 * np.pi), TILT * np.sqrt(generator.uniform(0.05, 1))
     roll = Rotation.from_rotvec([0, 0, generator.uniform(-ROLL, ROLL)])
     turned = Rotation.from_rotvec(angle * np.array([np.cos(axis), np.sin(axis), 0])) * roll

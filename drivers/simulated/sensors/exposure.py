@@ -83,7 +83,7 @@ class Head(Protocol):
 
     @property
     def camera(self) -> Camera:
-        """Its true camera model, which is also its factory calibration."""
+        """True camera model, which is also the factory calibration."""
         ...
 
     @property

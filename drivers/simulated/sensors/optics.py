@@ -39,7 +39,7 @@ class Beam:
 
     @property
     def length_m(self) -> float:
-        """From the lamp to the receiver [m]."""
+        """Distance from the lamp to the receiver [m]."""
         return math.dist(self.lamp, self.receiver)
 
 

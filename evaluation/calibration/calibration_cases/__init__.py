@@ -56,7 +56,7 @@ _COLUMNS = (
 
 
 def run(settings: Settings, context: Context) -> Findings:
-    """Does every case again."""
+    """Runs every case again."""
     rows: list[tuple[Cell, ...]] = []
     goals: list[Goal] = []
     for case in (each for each in all_cases(settings) if each.brief or not settings.brief):

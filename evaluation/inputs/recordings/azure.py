@@ -46,7 +46,7 @@ class AzureExposure:
 
     @property
     def amplitude(self) -> NDArray[np.float32]:
-        """Its amplitudes (height, width): infra-red with its own light."""
+        """Amplitudes (height, width): infra-red with the camera's own light."""
         return self.frames[Kind.AMPLITUDE].si()
 
     @property

@@ -52,7 +52,7 @@ class Cell:
 
     @property
     def name(self) -> str:
-        """In words."""
+        """Name in words."""
         return f"{'colour + depth' if self.color else 'depth only'}, {'wall' if self.wall else 'no wall'}, {self.model}"
 
     def tracker(self) -> a.Tracker:
@@ -80,7 +80,7 @@ class MaterialErrors:
     Attributes:
         number: of the frame.
         status: of the estimate.
-        median_mm, p95_mm, largest_mm: distance of the points from the measured ones [mm].
+        median_mm, p95_mm, maximum_mm: distance of the points from the measured ones [mm].
         across_mm: median distance along the normal of the mesh [mm]: what is not sliding.
         claimed_mm: σ of a coordinate by the estimate's covariances, root mean square [mm]; NaN while LOST.
         inside: share of the points in their own 95 % region, by the claimed covariance and the truth's σ.
@@ -91,7 +91,7 @@ class MaterialErrors:
     status: a.Status
     median_mm: float
     p95_mm: float
-    largest_mm: float
+    maximum_mm: float
     across_mm: float
     claimed_mm: float
     inside: float
@@ -222,7 +222,7 @@ def _errors(number: int, binding: Binding, estimate: a.Estimate, points: Points,
         status=estimate.status,
         median_mm=float(np.median(size)),
         p95_mm=float(np.quantile(size, 0.95)),
-        largest_mm=float(size.max()),
+        maximum_mm=float(size.max()),
         across_mm=float(np.median(np.abs(across)) * 1e3),
         claimed_mm=float(np.sqrt(np.trace(covariance, axis1=1, axis2=2).mean() / 3) * 1e3),
         inside=share_inside(error, covariance + sigma**2 * np.eye(3)),

@@ -25,13 +25,13 @@ from calib.noise.fit import quality
 from calib.noise.fit.quality import Quality
 from calib.noise.fit.samples import Samples, from_images
 from calib.rig import Rig, Sensor
-from calib.sequences import local
+from calib.sequences import plane_residuals
 from drivers.contract.frame import Frame, FrameSet, Kind
 from drivers.o3r.buffers import SENSOR, O3rBuffers
 from evaluation.sequences import demo_plan
 
 #: Neighbouring pixels whose distances differ by more show different surfaces [m].
-LARGEST_STEP_M = 0.015
+MAX_STEP_M = 0.015
 #: Surfaces with fewer pixels are left out.
 MIN_PIXELS = 700
 #: One pixel in so many is hidden.
@@ -117,7 +117,7 @@ def _row(name: str, results: list[tuple[DepthNoise, Samples]]) -> Row:
 def noises(exposure: O3rExposure) -> dict[str, DepthNoise]:
     """The noise models, fitted to how pixels deviate from planes through their neighbours."""
     distance, own = exposure.image(Kind.DEPTH), exposure.image(Kind.DEVIATION)
-    aside = local.normalized(distance, np.ones_like(distance), exposure.camera.rays())
+    aside = plane_residuals.normalized(distance, np.ones_like(distance), exposure.camera.rays())
     samples = from_images(distance, distance - aside, own)
     fitted = measured.fit(samples)
     return {CLAIMED: measured.Measured(), ONE: replace(constant.fit(samples), offset=0.0), FITTED: fitted}
@@ -130,8 +130,8 @@ def _without(exposure: O3rExposure, hidden: NDArray[np.bool_]) -> O3rExposure:
 
 
 def _hidden(seen: O3rExposure, noise: DepthNoise, whole: O3rExposure) -> Iterator[Samples]:
-    """Of every surface the pixels that the tracker did not see, with the mesh that it found as the true surface."""
-    labels = connected_surfaces(seen.frames[Kind.DEPTH].si(), LARGEST_STEP_M).labels
+    """Pixels of every surface that the tracker did not see, with its mesh as the true surface."""
+    labels = connected_surfaces(seen.frames[Kind.DEPTH].si(), MAX_STEP_M).labels
     sizes = np.bincount(labels.ravel())
     distance, own = whole.image(Kind.DEPTH), whole.image(Kind.DEVIATION)
     unseen = ~np.isfinite(seen.image(Kind.DEPTH)) & np.isfinite(distance) & np.isfinite(own)

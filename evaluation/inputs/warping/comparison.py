@@ -39,7 +39,7 @@ Method = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
 @dataclass(frozen=True)
 class Row:
-    """Of one method on one scene: share of what the source sees that has a distance [%], error [mm], time [ms]."""
+    """Figures of a method on a scene: share of what the source sees that has a distance [%], error [mm], time [ms]."""
 
     scene: str
     method: str

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from calib.camera import Camera
 from calib.jit import kernel
 from calib.warp import errors
-from calib.warp.mesh import LARGEST_STEP_M
+from calib.warp.mesh import MAX_STEP_M
 from calib.warp.points import Geometry, Points
 
 #: Width of a splat relative to its source pixel, so that rotated and slanted surfaces have no gaps.
@@ -25,9 +25,9 @@ class SplatWarp:
     dilated and isolated measurements are kept, but slopes are averaged instead of interpolated.
     """
 
-    def __init__(self, source: Camera, target: Camera, largest_step_m: float = LARGEST_STEP_M):
+    def __init__(self, source: Camera, target: Camera, maximum_step_m: float = MAX_STEP_M):
         self.geometry = Geometry(source, target)
-        self._largest_step_m = largest_step_m
+        self._maximum_step_m = maximum_step_m
         self._ray_length = target.lookup.ray_length.astype(np.float32)
         # Half a splat's size in the view for a distance of 1 and a 1/z of 1.
         lengths = source.lookup.ray_length
@@ -45,7 +45,7 @@ class SplatWarp:
         half = (self._size * (points.distance * points.inverse_z)[..., None]).astype(np.float32)
         front, shape = np.zeros(self._ray_length.shape, np.float32), self._ray_length.shape
         _advance(points.place, points.inverse_z, half, front)
-        splats = Splats(np.full(shape, np.nan, np.float32), points, half, front, self._largest_step_m)
+        splats = Splats(np.full(shape, np.nan, np.float32), points, half, front, self._maximum_step_m)
         sums = splats.sums(np.zeros_like(points.distance))
         known = sums[..., 0] > 0
         if not known.any():
@@ -63,14 +63,14 @@ class Splats:
         points: the source's points in the view.
         half: half the size of every splat (h, w, 2) [px].
         front: 1/z of the nearest surface (height, width) [1/m], 0 without one.
-        largest_step_m: measurements farther behind the nearest one belong to another surface [m].
+        maximum_step_m: measurements farther behind the nearest one belong to another surface [m].
     """
 
     distance: NDArray[np.float32]
     points: Points
     half: NDArray[np.float32]
     front: NDArray[np.float32]
-    largest_step_m: float
+    maximum_step_m: float
 
     def deviation(self, sigma: NDArray[np.floating]) -> NDArray[np.float32]:
         """Deviation of the warped distances (height, width) [m], for deviations of the source's (h, w) [m].
@@ -88,7 +88,7 @@ class Splats:
         """Sums per pixel (height, width, 4) of the weights w, of w/z, of w/z² and of w² σ²."""
         result = np.zeros((*self.front.shape, 4), np.float32)
         given = np.ascontiguousarray(sigma, np.float32)
-        _gather(self.points.place, self.points.inverse_z, self.half, given, self.largest_step_m, self.front, result)
+        _gather(self.points.place, self.points.inverse_z, self.half, given, self.maximum_step_m, self.front, result)
         return result
 
 
@@ -118,13 +118,13 @@ def _gather(
     inverse_z: NDArray[np.float32],
     half: NDArray[np.float32],
     sigma: NDArray[np.float32],
-    largest_step: float,
+    maximum_step: float,
     front: NDArray[np.float32],
     sums: NDArray[np.float32],
 ) -> None:
     """Accumulates the splats of the nearest surface with tent weights."""
     height, width = front.shape
-    one, step = np.float32(1), np.float32(largest_step)
+    one, step = np.float32(1), np.float32(maximum_step)
     for r in range(place.shape[0]):
         for c in range(place.shape[1]):
             near = inverse_z[r, c]

@@ -45,7 +45,7 @@ class Recorded:
 
 @dataclass(frozen=True)
 class Row:
-    """Of one synthesis: mean vertex error [mm] of every sequence, and means over them.
+    """Figures of a synthesis: mean vertex error [mm] of every sequence, and means over them.
 
     Attributes:
         frame_ms: processor time of a frame [ms].

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.optimizers.base import Budget, Optimizer, Problem, Search
+from abs_service.tracker.optimizers.base import Budget, FrameProblem, Optimizer, Search
 from abs_service.tracking.plan import OptimizerSettings
 
 
@@ -47,11 +47,11 @@ class FromPrediction:
     def __init__(self, make: Callable[[], Optimizer]):
         self._make = make
 
-    def follow(self, problem: Problem, start: NDArray[np.float64], budget: Budget) -> Search:
+    def follow(self, problem: FrameProblem, start: NDArray[np.float64], budget: Budget) -> Search:
         """Searches near start with a search that is made for it."""
         return self._make().follow(problem, start, budget)
 
-    def explore(self, problem: Problem, start: NDArray[np.float64], budget: Budget) -> Search:
+    def explore(self, problem: FrameProblem, start: NDArray[np.float64], budget: Budget) -> Search:
         """Explores with a search that is made for it."""
         return self._make().explore(problem, start, budget)
 
@@ -63,11 +63,11 @@ class FromRest:
         self._make = make
         self._rest: list[NDArray[np.float64]] = []
 
-    def follow(self, problem: Problem, start: NDArray[np.float64], budget: Budget) -> Search:
+    def follow(self, problem: FrameProblem, start: NDArray[np.float64], budget: Budget) -> Search:
         """Searches near where the first frame began."""
         return self._make().follow(problem, self._rest[0], budget)
 
-    def explore(self, problem: Problem, start: NDArray[np.float64], budget: Budget) -> Search:
+    def explore(self, problem: FrameProblem, start: NDArray[np.float64], budget: Budget) -> Search:
         """Explores around start, which is where all frames begin from then on."""
         self._rest = [start]
         return self._make().explore(problem, start, budget)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.optimizers import cma, cma_es, hybrid
-from abs_service.tracker.optimizers.base import Budget, Optimizer, Problem, Search
+from abs_service.tracker.optimizers.base import Budget, FrameProblem, Optimizer, Search
 from abs_service.tracker.optimizers.cma import PycmaSampler
 from abs_service.tracker.optimizers.search.ask_and_tell import MakeSampler, Schedule, default_population, sample
 from abs_service.tracker.posterior.curvature import newton_step, search_metric
@@ -22,7 +22,7 @@ from abs_service.tracking.plan import OptimizerSettings
 Array = NDArray[np.float64]
 
 #: Θ at which a search may start (k, dim), and its metric (dim, dim), of a problem and a start (dim,).
-Begin = Callable[[Problem, Array], tuple[Array, Array]]
+Begin = Callable[[FrameProblem, Array], tuple[Array, Array]]
 
 #: Deviation of a control point's first candidates in plain Θ [m]: of 2 to 20 mm, the best with 20 generations.
 SCALE_M = 0.01
@@ -35,20 +35,20 @@ PLAIN_MIN = 0.0
 WIDE = 0.5
 
 
-def in_theta(problem: Problem, start: Array) -> tuple[Array, Array]:
+def in_theta(problem: FrameProblem, start: Array) -> tuple[Array, Array]:
     """Plain: at the start, all parameters alike."""
     return start[None], SCALE_M * np.eye(len(start))
 
 
-def after_newton(problem: Problem, start: Array) -> tuple[Array, Array]:
-    """At the best of none, half and all of a Newton step, all parameters alike."""
+def after_newton(problem: FrameProblem, start: Array) -> tuple[Array, Array]:
+    """Start at the best of none, half and all of a Newton step, all parameters alike."""
     quadratic = problem.linearize(start).quadratic
     shares = np.outer([0.0, 0.5, 1.0], newton_step(quadratic, search_metric(quadratic)))
     return start + shares, SCALE_M * np.eye(len(start))
 
 
-def in_metric(problem: Problem, start: Array) -> tuple[Array, Array]:
-    """At the start, in the metric of the curvature."""
+def in_metric(problem: FrameProblem, start: Array) -> tuple[Array, Array]:
+    """Given start, in the metric of the curvature."""
     return start[None], search_metric(problem.linearize(start).quadratic)
 
 
@@ -83,14 +83,14 @@ class CmaFrom:
         self._make = partial(make, population, 1.0)
         self._sampler = self._make()
 
-    def follow(self, problem: Problem, start: Array, budget: Budget) -> Search:
+    def follow(self, problem: FrameProblem, start: Array, budget: Budget) -> Search:
         """Continues with the step size and covariance of the last frame."""
         origins, metric = self._begin(problem, start)
         costs = yield origins
         best = int(np.argmin(costs))
         return (yield from sample(origins[best], float(costs[best]), metric, self._sampler, self._schedule, budget))
 
-    def explore(self, problem: Problem, start: Array, budget: Budget) -> Search:
+    def explore(self, problem: FrameProblem, start: Array, budget: Budget) -> Search:
         """Begins anew."""
         self._sampler = self._make()
         return self.follow(problem, start, budget)
@@ -118,11 +118,11 @@ class FromSolution:
         self._search = search
         self._last: list[Array] = []
 
-    def follow(self, problem: Problem, start: Array, budget: Budget) -> Search:
+    def follow(self, problem: FrameProblem, start: Array, budget: Budget) -> Search:
         """Searches near the solution of the last frame."""
         return self._kept(self._search.follow(problem, self._last[0], budget))
 
-    def explore(self, problem: Problem, start: Array, budget: Budget) -> Search:
+    def explore(self, problem: FrameProblem, start: Array, budget: Budget) -> Search:
         """Explores around start."""
         return self._kept(self._search.explore(problem, start, budget))
 

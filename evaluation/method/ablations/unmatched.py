@@ -50,5 +50,5 @@ class ObservedUnmatched:
         self.learn = observed.learn
 
     def match(self, surface: Surface, sparse_jacobian: SparseJacobian, patches: Patches) -> list[PointLinearization]:
-        """Nothing."""
+        """No matches."""
         return []

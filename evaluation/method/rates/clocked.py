@@ -8,7 +8,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.optimizers.base import Budget, Optimizer, Problem, RunningSearch, Search
+from abs_service.tracker.optimizers.base import Budget, FrameProblem, Optimizer, RunningSearch, Search
 from abs_service.tracker.posterior.curvature import Quadratic
 from abs_service.tracker.posterior.linearized_cost import LinearizedCost
 from abs_service.tracker.terms.sensor_fit import SensorFit
@@ -21,20 +21,20 @@ Answer = TypeVar("Answer")
 class Clocked:
     """A problem, and the processor time of its answers [s]."""
 
-    problem: Problem
+    problem: FrameProblem
     dimension: int
     spent_s: float = 0.0
 
     def linearize(self, theta: NDArray[np.float64]) -> LinearizedCost:
-        """See `Problem`."""
+        """See `FrameProblem`."""
         return self._clocked(lambda: self.problem.linearize(theta))
 
     def prior(self, theta: NDArray[np.float64]) -> Quadratic:
-        """See `Problem`."""
+        """See `FrameProblem`."""
         return self._clocked(lambda: self.problem.prior(theta))
 
     def fits(self, theta: NDArray[np.float64]) -> tuple[SensorFit, ...]:
-        """See `Problem`."""
+        """See `FrameProblem`."""
         return self._clocked(lambda: self.problem.fits(theta))
 
     def _clocked(self, ask: Callable[[], Answer]) -> Answer:
@@ -63,7 +63,7 @@ class WatchedSearch:
     search: Optimizer
     watched: Watched
 
-    def follow(self, problem: Problem, start: NDArray[np.float64], budget: Budget) -> Search:
+    def follow(self, problem: FrameProblem, start: NDArray[np.float64], budget: Budget) -> Search:
         """See `Optimizer`."""
         clocked, own_s = Clocked(problem, problem.dimension), 0.0
         begin = time.thread_time()
@@ -77,6 +77,6 @@ class WatchedSearch:
         self.watched.took_s.append(own_s + time.thread_time() - begin - clocked.spent_s)
         return running.outcome
 
-    def explore(self, problem: Problem, start: NDArray[np.float64], budget: Budget) -> Search:
+    def explore(self, problem: FrameProblem, start: NDArray[np.float64], budget: Budget) -> Search:
         """See `Optimizer`."""
         return self.search.explore(problem, start, budget)

@@ -218,7 +218,7 @@ def _sequence(board: Board, bias: float, settings: Settings, context: Context, n
 
 
 def _of_bias(board: Board, bias: float, settings: Settings, context: Context) -> list[Comparison]:
-    """Both models with another bias, on frames of the first sequence in which the board moves."""
+    """Comparisons of both models with another bias, on frames of the first sequence in which the board moves."""
     exposures = _sequence(board, bias, replace(settings, frames=50), context, 0)
     exposures = [exposures[0], *exposures[14:]]
     noise = _calibrated(bias, settings, context)

@@ -6,7 +6,7 @@ four and the cylinder touches the sheet's centre, both sides of that direction a
 Statistic: ratio of a sequence's error to that of the likelihood without the outline, which the Euclidean fitness does
 not have either; mean over eight sequences, with its standard deviation and smallest; errors of the surface (mean of the
 frames) and of the eight bends (root mean square).
-Goals: below as `LEAST_…` and `MOST_…`. Until 2026-11-23 they were ratios of 1, which hardly can be missed; the present
+Goals: below as `MIN_…` and `MAX_…`. Until 2026-11-23 they were ratios of 1, which hardly can be missed; the present
 ones were set before they were first run, by one who knew the earlier figures, so another seed is reported as well.
 Seeds: two motions of each direction, drawn from the context's seed; docs/results/experiments.md has seeds 0 and 2 (1
 shares half of them with 0).
@@ -133,7 +133,7 @@ class Bent:
 
     @cached_property
     def moves(self) -> OneDirection:
-        """Its motion."""
+        """Motion of the sheet."""
         rotation, bend = (np.deg2rad(13), np.deg2rad(13), np.deg2rad(10)), np.deg2rad(self.bend)
         motion = Motion(self.seed, (0.0, 0.0, REST_Z), (0.04, 0.03, 0.05), rotation, bend, WIDTH, HEIGHT, 0.0, 0.0)
         return OneDirection(motion, self.degrees)

@@ -3,7 +3,7 @@
 Statistic: error of the control points (root mean square over 16 points) of every frame but the first; the ratio
 Euclidean / likelihood of its means, one ratio a geometry; mean and standard deviation over the geometries.
 Goals: ratio ≥ 1.92, the paper's; likelihood's error over the bound ≤ 1.3, from the pixels that vertices read and from
-all pixels; ratio ≥ 1.92 with all that makes it easier undone (`undone`), which was added on 2026-11-23 before that was
+all pixels; ratio ≥ 1.92 with all that makes it easier undone (`assumptions`), added on 2026-11-23 before that was
 run for the first time.
 Seeds: one sequence of every geometry is judged, two further ones of 20 frames are reported.
 """
@@ -17,7 +17,7 @@ import numpy as np
 
 from abs_service.tracker.objectives.likelihood import OUTLINE_PX
 from evaluation.experiment import Context, Findings
-from evaluation.paper.geometries import findings, undone
+from evaluation.paper.geometries import assumptions, findings
 from evaluation.paper.geometries.bound import Priors
 from evaluation.paper.geometries.known_sheet import KnownSheet
 from evaluation.paper.geometries.measuring import (
@@ -126,7 +126,7 @@ def _variants(settings: Settings, number: int) -> dict[str, Variant]:
         variants[f"{kind}, no stretch prior"] = Variant(likelihood, n, Priors(OFF, BOTH.speed))
         variants[f"{kind}, no motion prior"] = Variant(likelihood, n, Priors(BOTH.stretch, OFF))
         variants[f"{kind}, neither prior"] = Variant(likelihood, n, Priors(OFF, OFF))
-        for condition in undone.CONDITIONS:
+        for condition in assumptions.CONDITIONS:
             variants[f"{kind}, {condition.name}"] = Variant(
                 likelihood, settings.undone_frames, noise=condition.noise, rest=condition.rest
             )

@@ -73,7 +73,7 @@ class Derivatives:
 
 
 def derivatives(scene: PrintedSheet, control: Array) -> Derivatives:
-    """By differences of renderings around true control points (4, 4, 3)."""
+    """Derivatives by differences of renderings around true control points (4, 4, 3)."""
     view = scene.view(control)
     inner = view.share > COVERED
     distance, grey = [], []

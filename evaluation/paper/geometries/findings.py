@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from abs_service.report.content import Cell, Column, Section, Table
 from evaluation.experiment import Findings, Goal, at_least, at_most
-from evaluation.paper.geometries import pictures, undone
+from evaluation.paper.geometries import assumptions, pictures
 from evaluation.paper.geometries.bound import Bound
 from evaluation.paper.geometries.measuring import EUCLIDEAN, LIKELIHOOD, SequenceResult
 
@@ -22,11 +22,11 @@ PAPER_RATIO, NEAR = 1.92, 1.3
 
 
 def findings(first: Sequence[SequenceResult], repeats: Sequence[SequenceResult]) -> Findings:
-    """Of the first sequence of every geometry, and of further ones with other seeds."""
+    """Findings of the first sequence of every geometry, and of further ones with other seeds."""
     ratios = np.array([_ratio(one, "control") for one in first])
     to_bound = np.array([_to_bound(one, LIKELIHOOD, "posterior") for one in first])
     every = np.array([_to_bound(one, EVERY_PIXEL, "full") for one in first])
-    hard = undone.ratios(first, undone.ALL)
+    hard = assumptions.ratios(first, assumptions.ALL)
     goals: tuple[Goal, ...] = (
         at_least(
             "Error of the control points, Euclidean / likelihood, mean over geometries", ratios.mean(), PAPER_RATIO
@@ -37,7 +37,7 @@ def findings(first: Sequence[SequenceResult], repeats: Sequence[SequenceResult])
     )
     sections = (
         Section("Geometries", (*_said(ratios, first), _geometries(first, repeats))),
-        undone.section(first),
+        assumptions.section(first),
         Section("The bound", (_BOUND, _bounds(first))),
         Section("What each prior contributes", (_PRIORS, _variants(first, "prior"))),
         Section(
@@ -50,7 +50,7 @@ def findings(first: Sequence[SequenceResult], repeats: Sequence[SequenceResult])
         "ratio": ratios.tolist(), "ratio_mean": float(ratios.mean()), "ratio_sd": _sd(ratios),
         "ratio_surface": [_ratio(one, "surface") for one in first], "to_bound": to_bound.tolist(),
         "to_bound_every_pixel": every.tolist(),
-        "ratio_undone": {one.name: undone.ratios(first, one).tolist() for one in undone.CONDITIONS},
+        "ratio_undone": {one.name: assumptions.ratios(first, one).tolist() for one in assumptions.CONDITIONS},
         "geometries": [one.job.name for one in first],
         "tracked": [one.followed[LIKELIHOOD].tracked for one in first],
     }  # fmt: skip

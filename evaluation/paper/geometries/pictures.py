@@ -19,7 +19,7 @@ SHOWN = 30
 
 
 def pictures(first: Sequence[SequenceResult]) -> tuple[Picture, ...]:
-    """Of the last geometry's camera, and of all geometries' errors."""
+    """Pictures of the last geometry's camera, and of all geometries' errors."""
     one = first[-1]
     scene = PrintedSheet(one.job.sheet, one.job.sensor, one.job.texture)
     view = scene.view(scene.control(SHOWN))

@@ -22,7 +22,7 @@ DISTANCES, MATERIALS = (0.753, 1.185, 1.606, 2.193, 2.652), (0.9, 0.5, 0.17)
 CORNER = 0.3
 
 #: Frames of a sequence whose single measurements tell the law of the image, and how many of all of these.
-FEW, LARGEST = 2, 20_000
+FEW, MAX_SAMPLES = 2, 20_000
 
 #: Sides of the regions [px] by which the image differs from its law.
 REGION_PX = 8
@@ -59,7 +59,7 @@ def calibrated(sensor: TimeOfFlight, frames: int, generator: np.random.Generator
     """
     walls = [(depth, material) for depth in DISTANCES for material in MATERIALS]
     found = together([_static(sensor, Wall(depth, material), frames, generator) for depth, material in walls])
-    few, labels = thinned(found.samples, LARGEST, generator), blocks(SR4000.height, SR4000.width, REGION_PX)
+    few, labels = thinned(found.samples, MAX_SAMPLES, generator), blocks(SR4000.height, SR4000.width, REGION_PX)
     true_form, polynomial = (
         per_pixel.fit(found.means, law, labels, repeats=found.repeats)
         for law in (tof_amplitude.fit(few), gaussian_polynomial.fit(few, DEGREES, DEGREES))

@@ -27,8 +27,8 @@ def passing(rig: RunningRig) -> Made:
     return Made(begin_ns, rig.await_new_frame(lambda seq, _: seq >= BEGIN + PASSING, PATIENCE_S))
 
 
-def _lasting(name: str, promise: str, kind: str, longest_s: float) -> Fault:
-    return Fault(name, promise, lasting, estimates_s=longest_s, recording_s=longest_s, device=f"&fault={kind}@{BEGIN}")
+def _lasting(name: str, promise: str, kind: str, maximum_s: float) -> Fault:
+    return Fault(name, promise, lasting, estimates_s=maximum_s, recording_s=maximum_s, device=f"&fault={kind}@{BEGIN}")
 
 
 def _passing(name: str, promise: str, kind: str, recording_s: float) -> Fault:

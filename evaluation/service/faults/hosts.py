@@ -132,7 +132,7 @@ def start_hosts(folder: Path, device: str, _: int) -> Iterator[RunningRig]:
 
 @contextmanager
 def start_networked_hosts(folder: Path, device: str, _: int) -> Iterator[RunningRig]:
-    """As `start_hosts`, with a network between cameras and recorder on one side and the tracker on the other.
+    """Starts hosts with a network between cameras and recorder on one side and the tracker on the other.
 
     Raises:
         UnavailableError: this user may make neither network namespaces nor time namespaces.

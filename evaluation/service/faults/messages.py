@@ -78,7 +78,7 @@ def forged_epoch(rig: RunningRig) -> Made:
 
 
 def stopped_subscribers(rig: RunningRig, number: int, stop_s: float) -> Made:
-    """So many subscribers of everything are stopped, and killed in the end."""
+    """Stops `number` subscribers of everything, and kills them in the end."""
     arguments = [sys.executable, "-c", SUBSCRIBERS, rig.endpoint, NAME, str(number)]
     with subprocess.Popen(arguments) as subscribers:
         time.sleep(STOP_S)  # until they have subscribed

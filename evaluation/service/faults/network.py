@@ -21,7 +21,7 @@ ADDRESS = "10.213.7.1"
 
 @contextmanager
 def two_hosts() -> Iterator[None]:
-    """`CAMERAS` and `TRACKING` exist, linked to each other and to this host; afterwards nothing is left of them.
+    """Creates the hosts `CAMERAS` and `TRACKING`, linked to each other and to this one, and removes them afterwards.
 
     Raises:
         UnavailableError: the user or the kernel does not permit it; says what was refused.
@@ -32,7 +32,7 @@ def two_hosts() -> Iterator[None]:
 
 @contextmanager
 def linked(first: str, *others: str, delay_s: float = 0.0, loss: float = 0.0) -> Iterator[None]:
-    """These hosts exist, linked to each other and to this one; afterwards nothing is left of them.
+    """Creates hosts, linked to each other and to this one, and removes them afterwards.
 
     Args:
         first: host with `ADDRESS`.

@@ -33,8 +33,8 @@ def asked(component: str, rig: RunningRig) -> Made:
     return Made(begin_ns, _await_end(process, rig, begin_ns, END_S))
 
 
-def _await_end(process: int, rig: RunningRig, begin_ns: int, longest_s: float) -> int:
-    while is_running(process) and rig.now_ns() < begin_ns + longest_s * 1e9:
+def _await_end(process: int, rig: RunningRig, begin_ns: int, maximum_s: float) -> int:
+    while is_running(process) and rig.now_ns() < begin_ns + maximum_s * 1e9:
         time.sleep(0.01)
     return rig.now_ns()
 

@@ -35,7 +35,7 @@ class Row:
     said: str = ""
 
     def values(self) -> dict[str, Any]:
-        """For the JSON report; `from_values` is its inverse."""
+        """Values for the JSON report; `from_values` is the inverse."""
         return asdict(self)
 
     @classmethod

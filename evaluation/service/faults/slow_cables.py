@@ -23,7 +23,7 @@ from contextlib import contextmanager, suppress
 #: linux/if_tun.h: sets name and kind of an interface; Ethernet, without a header of its own.
 _TUNSETIFF, _TAP = 0x400454CA, 0x1002
 #: More than any packet, since the kernel joins none for an interface that cannot cut them.
-_LARGEST = 4096
+_MAX_BYTES = 4096
 #: The same packets are lost in every run, as far as the same are sent.
 _SEED = 1
 
@@ -65,7 +65,7 @@ def carry(across: Mapping[int, int], delay_s: float, loss: float, stop: int) -> 
         for one in ready:
             # One that is down says so; that is a cut.
             with suppress(OSError):
-                packet = os.read(one, _LARGEST)
+                packet = os.read(one, _MAX_BYTES)
                 if chance.random() >= loss:
                     under_way.append((time.monotonic() + delay_s, across[one], packet))
         while under_way and under_way[0][0] <= time.monotonic():

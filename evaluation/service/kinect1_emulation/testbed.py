@@ -50,7 +50,7 @@ def run(program: Sequence[str], timeout_s: float = 120.0, cameras: int = 1) -> s
 
 
 def describe(cameras: int) -> str:
-    """So many cameras in umockdev's own format."""
+    """Description of cameras in umockdev's own format."""
     device, configuration = usb_descriptors.device(0x02AE), usb_descriptors.configuration()
     content = (device + configuration).hex().upper()
     parts = [
@@ -113,7 +113,7 @@ class Server:
         self._listen()
 
     def send(self, command: str) -> str:
-        """Does what `evaluation.service.kinect1_emulation.server` understands; returns its answer."""
+        """Sends a command to `evaluation.service.kinect1_emulation.server`; returns its answer."""
         assert self._process.stdin is not None
         self._process.stdin.write(command + "\n")
         self._process.stdin.flush()

@@ -113,7 +113,7 @@ class Connection:
         }
 
     def serve(self) -> None:
-        """Until the program closes the file."""
+        """Serves ioctls until the program closes the file."""
         for request, argument in self._program.ioctls():
             self._program.done(self._ioctl(request, argument))
         self._device.claimed -= self._claimed

@@ -10,13 +10,13 @@ import abs_client
 import numpy as np
 
 #: Beyond this σ the sheet is not gripped [m].
-LARGEST_SIGMA = 0.005
+MAX_SIGMA = 0.005
 
 
 def targets(states: Iterable[abs_client.State]) -> Iterator[np.ndarray | None]:
     """Middle (3,) of the sheet in the rig's frame [m] for each estimate; None: hold still."""
     for state in states:
-        if state.usable and np.median(state.sigma) < LARGEST_SIGMA:
+        if state.usable and np.median(state.sigma) < MAX_SIGMA:
             yield state.vertices.mean(axis=0)
         else:
             yield None

@@ -18,7 +18,7 @@ EXPOSURE = ControlInfo("exposure_s", ControlKind.NUMBER, "s", 0.001, 0.033)
 
 
 class FakeDevice:
-    """Does what it is told."""
+    """Device that follows a script."""
 
     capabilities = Capabilities((StreamInfo("head", "image", Kind.COLOR, "mono8", 4, 3, 30.0),))
     controls = Controls()

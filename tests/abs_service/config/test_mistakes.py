@@ -167,7 +167,7 @@ def test_a_recording_that_begins_with_tracking_needs_a_tracker():
     (found,) = mistakes(SENSORS + '[record]\nbegin = "tracking"\n')
     assert found == 'record.begin = "tracking": the rig has no tracker to wait for; allowed is "start"'
     (found,) = mistakes(SENSORS + '[record]\nwhen = "not_tracking"\n')
-    assert found == 'record.when = "not_tracking": the rig has no tracker; allowed are "always" and "asked"'
+    assert found == 'record.when = "not_tracking": the rig has no tracker; allowed are "always" and "requested"'
 
 
 def test_the_view_into_which_images_are_warped_is_that_of_a_sensor_of_the_tracker():

@@ -1,4 +1,4 @@
-"""From the configuration to what a tracker is made of: mistakes that only show when cameras are known."""
+"""Parts of a tracker from its configuration: mistakes that only show when cameras are known."""
 
 import re
 from importlib import resources

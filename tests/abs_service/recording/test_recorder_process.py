@@ -156,7 +156,7 @@ def test_estimates_of_deleted_recordings_are_kept_as_the_configuration_says(rig,
 
 
 def test_it_records_with_what_was_before_when_it_is_asked_and_goes_on_after_a_kill(rig, endpoint, launch):
-    rig.write_text(rig.read_text() + 'when = "asked"\npre_roll_s = 0.5\n')
+    rig.write_text(rig.read_text() + 'when = "requested"\npre_roll_s = 0.5\n')
     with Stream(endpoint) as stream:
         recorder = launch("record", rig)
         stream.wait_for(lambda health: health.labels["trigger"] == "waits, and holds the last 1 s")

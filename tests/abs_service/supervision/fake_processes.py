@@ -86,7 +86,7 @@ def ends(world, supervisor, component, code):
 
 
 def passes(world, supervisor, seconds):
-    """So much time, in which the supervisor works."""
+    """Advances the clock, in steps in which the supervisor works."""
     for _ in range(2 * seconds):
         world.now_ns += S // 2
         supervisor.poll()

@@ -81,7 +81,7 @@ def seen(camera: Camera, surface: Surface) -> Synthesis:
 
 
 def in_sight(camera: Camera, count: int) -> Surface:
-    """So many vertices before a camera that face it: a prediction that hides nothing."""
+    """Prediction of vertices before a camera that all face it: it hides nothing."""
     axis = camera.T_rs[:3, 2]
     return as_surface((np.tile(camera.center + axis, (count, 1)), np.tile(-axis, (count, 1))))
 

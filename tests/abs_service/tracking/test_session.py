@@ -1,4 +1,4 @@
-"""From frames to estimates: the object is found, followed, lost and said so; the same frames give the same Θ."""
+"""Tracking sessions: the object is found, tracked, lost and reported so; the same frames give the same Θ."""
 
 import dataclasses
 

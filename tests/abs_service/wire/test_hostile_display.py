@@ -1,4 +1,4 @@
-"""Nothing that comes from the bus ends `abs-service run` or reaches the terminal as more than text."""
+"""Hostile messages: none ends `abs-service run` or reaches the terminal as more than text."""
 
 import io
 import itertools
@@ -49,7 +49,7 @@ class Everything(Display):
         return self
 
     def __exit__(self, *error):
-        """Nothing to restore."""
+        """No operation."""
 
     def update(self, view):
         self._console.print(draw(view, Text("")))

@@ -1,4 +1,4 @@
-"""Nothing that comes from the bus ends a process: recorder and tracker behind the edge."""
+"""Hostile messages: none ends a process, recorder and tracker behind the edge."""
 
 import threading
 import time

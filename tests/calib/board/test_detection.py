@@ -177,7 +177,7 @@ def test_a_mirrored_board_is_refused() -> None:
 def test_a_saturated_amplitude_is_refused(top: int) -> None:
     image = photograph(CHESSBOARD, VGA, centered(CHESSBOARD, TILTED, 0.6), black=0.2, white=1.2, noise=0.01)
     amplitude = np.clip(top * image, 0, top).astype(np.uint16)
-    reason, message = refused(CHESSBOARD, amplitude, largest_saturated=0.1)
+    reason, message = refused(CHESSBOARD, amplitude, maximum_saturated=0.1)
     assert reason is errors.SaturatedError
     assert "shorter exposure" in message
     assert len(detect(CHESSBOARD, amplitude).ids) == 54, "corners themselves survive that white is saturated"

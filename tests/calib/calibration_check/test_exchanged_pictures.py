@@ -6,10 +6,10 @@ import pytest
 from calib.calibration_check import changes
 from calib.calibration_check.board_poses import solve
 from calib.calibration_check.changes import PairChange, pair_changes
-from calib.calibration_check.stored import Stored, Views
+from calib.calibration_check.stored_calibration import Stored, Views
 from calib.solve.bundle.adjustment import NotSolvedError
 from calib.solve.bundle.parameters.state import SensorState
-from calib.solve.validation.unlike_shots.contradictions import Contradiction, contradictions
+from calib.solve.validation.inconsistent_shots.contradictions import Contradiction, contradictions
 from evaluation.scenes.boards.board_views import look, random_boards, three_heads
 
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from calib import pose
-from calib.calibration_check.alone import corner_fit, distance_bias
 from calib.calibration_check.changes import pair_changes
 from calib.calibration_check.comparison import Comparison, compare
 from calib.calibration_check.hypotheses import Kind
-from calib.calibration_check.stored import CalibrationCheckError, Stored, Views, usable
+from calib.calibration_check.sensor_fits import corner_fit, distance_bias
+from calib.calibration_check.stored_calibration import CalibrationCheckError, Stored, Views, usable
 from calib.camera import Camera
 from calib.solve.bundle.parameters.layout import POSE
 from calib.solve.bundle.parameters.state import SensorState

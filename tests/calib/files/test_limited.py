@@ -36,7 +36,7 @@ def test_arrays_come_back(tmp_path: Path) -> None:
 def test_arrays_that_are_too_large_are_refused_before_they_are_unpacked() -> None:
     stream = io.BytesIO()
     with ZipFile(stream, "w", ZIP_DEFLATED) as file, file.open("a.npy", "w", force_zip64=True) as part:
-        for _ in range(limited.LARGEST_ARRAYS // (1 << 24) + 1):
+        for _ in range(limited.MAX_ARRAYS_BYTES // (1 << 24) + 1):
             part.write(bytes(1 << 24))
     assert len(stream.getvalue()) < 1 << 20
     with pytest.raises(ValueError, match="are allowed"):

@@ -107,7 +107,7 @@ def test_mrcal_keeps_all(camera: Camera) -> None:
 
 
 def _origin(joint: Any) -> np.ndarray:
-    """As URDF says it: fixed axes, roll about x first."""
+    """Pose of a URDF origin: fixed axes, roll about x first."""
     origin = joint.find("origin")
     xyz, rpy = ([float(number) for number in origin.get(key).split()] for key in ("xyz", "rpy"))
     T = np.eye(4)

@@ -190,7 +190,7 @@ def test_where_the_domain_s_corner_holds_no_sample_no_offset_is_trusted(seed):
 def test_more_samples_than_needed_are_thinned_and_tell_the_same(monkeypatch):
     samples = noise_laws.time_of_flight(5)
     everything = tof_amplitude.fit(samples)
-    monkeypatch.setattr(fitting, "LARGEST", 5000)
+    monkeypatch.setattr(fitting, "MAX_SAMPLES", 5000)
     assert len(fitting.subsampled(samples)) == 5000
     everywhere = *noise_laws.grid(), noise_laws.somewhere(400)
     ratio = tof_amplitude.fit(samples).deviation(*everywhere) / everything.deviation(*everywhere)

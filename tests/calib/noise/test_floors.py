@@ -1,4 +1,4 @@
-"""No pixel, region or image is better than the steps of its values, even where it repeats one of them for ever."""
+"""Floors of σ: none is below the steps of its values, even where a pixel repeats one of them for ever."""
 
 from pathlib import Path
 

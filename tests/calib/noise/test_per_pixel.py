@@ -96,9 +96,9 @@ def test_outside_the_domain_everything_keeps_its_edge_value() -> None:
 
 def test_what_is_saved_is_what_a_rig_file_loads(tmp_path: Path) -> None:
     model = own_of_pixels()
-    assert isinstance(model.law, TofAmplitude)
+    assert isinstance(model.model, TofAmplitude)
     model.save(tmp_path / "own.npz")
-    table = {"type": "per_pixel", "file": "own.npz", "law": plugins.table(model.law)}
+    table = {"type": "per_pixel", "file": "own.npz", "model": plugins.table(model.model)}
     read = plugins.load("calib.noise", table, tmp_path).build()
     p = np.indices((HEIGHT, WIDTH)).reshape(2, -1)
     x, a = np.linspace(0.3, 4, p.shape[1]), np.geomspace(50, 20_000, p.shape[1])
@@ -123,9 +123,9 @@ def test_maps_that_are_none_are_named(tmp_path: Path, changes: dict, message: st
 
 def test_the_law_must_be_one_of_depth(tmp_path: Path) -> None:
     own_of_pixels().save(tmp_path / "own.npz")
-    with pytest.raises(NoiseError, match="law must be a noise model of depth"):
+    with pytest.raises(NoiseError, match="model must be a noise model of depth"):
         per_pixel.Settings(tmp_path / "own.npz", GaussianColor()).build()
-    with pytest.raises(ProblemsError, match=r'law\.type = "color": no such type, allowed: constant'):
-        plugins.load("calib.noise", {"type": "per_pixel", "file": "own.npz", "law": {"type": "color"}}, tmp_path)
+    with pytest.raises(ProblemsError, match=r'model\.type = "color": no such type, allowed: constant'):
+        plugins.load("calib.noise", {"type": "per_pixel", "file": "own.npz", "model": {"type": "color"}}, tmp_path)
     with pytest.raises(ProblemsError):
         plugins.load("calib.noise", {"type": "per_pixel", "file": "own.npz"}, tmp_path)

@@ -6,7 +6,7 @@ import pytest
 from calib.noise.base import NoiseError
 from calib.noise.constant import Constant
 from calib.noise.fit.quality import Quality
-from calib.sequences import local, parts, plane, reference, stillness
+from calib.sequences import parts, plane, plane_residuals, reference, stillness
 from calib.sequences.candidates import Candidate, Level, of_image
 from calib.sequences.reference import Kind
 from calib.sequences.selection import Trial, attempt, choose, extremes
@@ -147,7 +147,7 @@ def test_a_sensor_s_own_deviations_are_judged_by_local_planes() -> None:
     taken, head = frames("simulated://wall?sensors=tof&distance=1.1&tilt=25", 0, 1)
     reported_sigma = head.noise.sigma(*head.ideal(()))
     for factor, inside in ((1.0, 0.683), (2.0, 0.954)):
-        z = local.normalized(taken[0].si(), factor * reported_sigma, head.camera.rays())
+        z = plane_residuals.normalized(taken[0].si(), factor * reported_sigma, head.camera.rays())
         assert np.isfinite(z).mean() > 0.9
         assert np.mean(np.abs(z[np.isfinite(z)]) < 1) == pytest.approx(inside, abs=0.012)
 

@@ -1,4 +1,4 @@
-"""Same corners and model for mrcal and for us: projections, and what both say of their uncertainty."""
+"""Comparison with mrcal on the same corners and model: projections, and what both say of their uncertainty."""
 
 from collections.abc import Callable
 from pathlib import Path

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from calib import pose
 from calib.camera import Camera
 from calib.warp import errors
-from calib.warp.mesh import LARGEST_STEP_M, MeshWarp
+from calib.warp.mesh import MAX_STEP_M, MeshWarp
 from calib.warp.pictures import PictureLookup
 from tests import reference
 from tests.calib.warp.scenes import BOARD, SOURCE, VIEWS, WALL, Ball, Plane, image, seen_by
@@ -26,7 +26,7 @@ def test_a_plane_warped_is_the_plane_and_whole(view, slope, offset):
     """Within a face a plane is exact in a pinhole; in a bent image 1/z is off by what the lens bends a pixel."""
     plane = (Plane(np.array([*slope, 1.0]), offset),)
     # Neighbours along the diagonal of a steep plane differ by more than the default step.
-    warped = MeshWarp(SOURCE, view, largest_step_m=0.1).warp(image(SOURCE, plane))
+    warped = MeshWarp(SOURCE, view, maximum_step_m=0.1).warp(image(SOURCE, plane))
     truth = image(view, plane)
     known = np.isfinite(warped.distance)
     np.testing.assert_allclose(warped.distance[known], truth[known], atol=2e-6 if view.lens.is_pinhole else 3e-4)
@@ -124,7 +124,7 @@ def test_the_kernels_are_their_definition(seed):
     warped = MeshWarp(source, view).warp(distance)
     sigma = generator.uniform(1e-3, 5e-3, (6, 7))
     deviation = warped.deviation(sigma)
-    expected, spread, margin = reference.warped(source, view, distance, sigma, LARGEST_STEP_M)
+    expected, spread, margin = reference.warped(source, view, distance, sigma, MAX_STEP_M)
     decided = margin > 1e-3
     assert np.array_equal(np.isfinite(warped.distance)[decided], np.isfinite(expected)[decided])
     np.testing.assert_allclose(warped.distance[decided], expected[decided], rtol=1e-5)

@@ -119,7 +119,7 @@ def test_a_model_without_a_basis_has_theta_alone():
 
 
 def test_a_basis_that_is_too_large_for_a_message_is_not_sent(monkeypatch):
-    monkeypatch.setattr(estimate_messages, "LARGEST_BASIS", 100)
+    monkeypatch.setattr(estimate_messages, "MAX_BASIS", 100)
     assert not reading.topology(Bench().topology()).HasField("basis")
 
 

@@ -17,7 +17,7 @@ LIMIT_S = 20.0
 ABANDONED = """
 import sys
 from abs_client import subscribe
-states = subscribe(sys.argv[1], largest_age_s=0.1)
+states = subscribe(sys.argv[1], maximum_age_s=0.1)
 print(next(states).status)
 """
 
@@ -74,7 +74,7 @@ def test_a_slow_reader_gets_the_newest_and_the_rest_is_counted(endpoint, tracker
 
 
 def test_silence_is_told_again_and_again_and_ends_with_a_new_tracker(endpoint, bus, tracker):
-    with subscribe(endpoint, largest_age_s=0.3) as states:
+    with subscribe(endpoint, maximum_age_s=0.3) as states:
         assert next(states).status is Status.STALE
         with estimating(tracker):
             last = first(states, Status.TRACKING)
@@ -91,7 +91,7 @@ def test_silence_is_told_again_and_again_and_ends_with_a_new_tracker(endpoint, b
 
 
 def test_estimates_that_are_too_old_are_not_given(endpoint, tracker):
-    with subscribe(endpoint, largest_age_s=0.3) as states, estimating(tracker, age_s=0.8):
+    with subscribe(endpoint, maximum_age_s=0.3) as states, estimating(tracker, age_s=0.8):
         end_s = time.monotonic() + 1.5
         ages_s = []
         while time.monotonic() < end_s:
@@ -105,7 +105,7 @@ def test_estimates_that_are_too_old_are_not_given(endpoint, tracker):
 def test_the_same_for_a_task(endpoint, tracker):
     async def read():
         given = []
-        with subscribe(endpoint, largest_age_s=0.3) as states:
+        with subscribe(endpoint, maximum_age_s=0.3) as states:
             async for state in states:
                 given.append(state.status)
                 if given[-3:] == [Status.TRACKING] * 3 or len(given) > 50:
@@ -117,7 +117,7 @@ def test_the_same_for_a_task(endpoint, tracker):
 
 
 def test_a_closed_stream_ends_and_has_nothing_more(endpoint, tracker):
-    states = subscribe(endpoint, largest_age_s=LIMIT_S)
+    states = subscribe(endpoint, maximum_age_s=LIMIT_S)
     threading.Timer(0.2, states.close).start()
     assert list(states) == []
     with pytest.raises(NothingReceivedError):
@@ -125,7 +125,7 @@ def test_a_closed_stream_ends_and_has_nothing_more(endpoint, tracker):
 
 
 def test_the_next_one_is_waited_for_no_longer_than_asked(endpoint, bus):
-    with subscribe(endpoint, largest_age_s=LIMIT_S) as states, pytest.raises(NothingReceivedError, match=r"0\.2 s"):
+    with subscribe(endpoint, maximum_age_s=LIMIT_S) as states, pytest.raises(NothingReceivedError, match=r"0\.2 s"):
         states.next(0.2)
 
 
@@ -168,14 +168,14 @@ def test_a_name_that_cannot_be_one_is_told(endpoint, wrong):
         subscribe(**{"endpoint": endpoint} | wrong)
 
 
-@pytest.mark.parametrize("largest_age_s", [0.0, -1.0, float("nan")])
-def test_an_age_that_no_estimate_has_is_told(endpoint, largest_age_s):
-    with pytest.raises(RangeError, match=f"largest_age_s is {largest_age_s:g}: it must be greater than 0"):
-        subscribe(endpoint, largest_age_s=largest_age_s)
+@pytest.mark.parametrize("maximum_age_s", [0.0, -1.0, float("nan")])
+def test_an_age_that_no_estimate_has_is_told(endpoint, maximum_age_s):
+    with pytest.raises(RangeError, match=f"maximum_age_s is {maximum_age_s:g}: it must be greater than 0"):
+        subscribe(endpoint, maximum_age_s=maximum_age_s)
 
 
 def test_without_a_largest_age_silence_is_not_told(endpoint, tracker):
-    with subscribe(endpoint, largest_age_s=float("inf")) as states:
+    with subscribe(endpoint, maximum_age_s=float("inf")) as states:
         with pytest.raises(NothingReceivedError, match=r"within 0\.2 s"):
             states.next(0.2)
         with estimating(tracker, age_s=3600.0):

@@ -189,5 +189,5 @@ def test_a_rig_that_is_not_there_is_told(endpoint, capsys):
 @pytest.mark.parametrize("age", ["0", "x"])
 def test_an_age_that_no_estimate_has_is_told(capsys, age):
     with pytest.raises(SystemExit, match="2"):
-        program.main(["--largest-age", age])
+        program.main(["--maximum-age", age])
     assert f"'{age}' is no age: a number of seconds greater than 0" in capsys.readouterr().err

@@ -57,7 +57,7 @@ class Microsoft:
         return self._functions[f"k4a_{name}"]
 
     def calibration(self, raw: bytes, depth: str, color: str) -> Any:
-        """Its calibration in two modes."""
+        """Calibration of the device in two modes."""
         room, content = ctypes.create_string_buffer(_ROOM), raw.rstrip(b"\0") + b"\0"
         modes = [*DEPTH_MODES].index(depth) + 1, [*COLOR_MODES].index(color) + 1
         assert self.calibration_get_from_raw(content, len(content), *modes, room) == 0
@@ -88,7 +88,7 @@ class Microsoft:
 
     @contextmanager
     def engine(self, calibration: Any) -> Iterator[Any]:
-        """Its engine that transforms whole images, in OpenGL; None where it does not start, as without an X session."""
+        """Engine that transforms whole images, in OpenGL; None where it does not start, as without an X session."""
         transformation = self.transformation_create(calibration)
         try:
             yield transformation

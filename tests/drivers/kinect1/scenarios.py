@@ -61,7 +61,7 @@ def infrared() -> None:
 
 
 def loss() -> None:
-    """With 1 % packet loss most colour images are dropped and counted; depth images lack the pixels that were lost."""
+    """Packet loss of 1 %: most colour images are dropped and counted; depth images lack the pixels that were lost."""
     with Server("--patient") as server:
         device = open_device("kinect1://", time.monotonic_ns)
         sink = RecordingSink()

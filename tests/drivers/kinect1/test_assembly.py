@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.kinect1.assembly import CAUSES, LONGEST_GAP, PLACE, SEQ, STATE_SIZE, Assembler, assemble
+from drivers.kinect1.assembly import CAUSES, MAX_GAP, PLACE, SEQ, STATE_SIZE, Assembler, assemble
 from drivers.kinect1.transport.packets import COLOR, DEPTH, INFRARED, PACKET_BYTES, PacketFormat
 from evaluation.service.kinect1_emulation.packet_stream import PacketStream, begin
 
@@ -179,8 +179,8 @@ def test_corrupt_packets_are_handled_as_by_the_reference(damages: list, at_once:
 
 
 @settings(max_examples=100)
-@given(st.integers(0, 2**32 - 1), st.sampled_from([DEPTH, COLOR, INFRARED]), st.sampled_from([0, LONGEST_GAP]))
-def test_arbitrary_packets_write_no_byte_outside_the_image(seed: int, form: PacketFormat, longest_gap: int) -> None:
+@given(st.integers(0, 2**32 - 1), st.sampled_from([DEPTH, COLOR, INFRARED]), st.sampled_from([0, MAX_GAP]))
+def test_arbitrary_packets_write_no_byte_outside_the_image(seed: int, form: PacketFormat, maximum_gap: int) -> None:
     generator = np.random.default_rng(seed)
     packets = generator.integers(0, 256, (300, PACKET_BYTES), np.uint8)
     plausible = generator.random(300) < 0.9
@@ -195,6 +195,6 @@ def test_arbitrary_packets_write_no_byte_outside_the_image(seed: int, form: Pack
     row = 0
     while row < len(packets):
         image, gone = guarded[1024:-1024], np.zeros(form.packets, np.uint8)
-        row = assemble(packets, lengths, row, state, image, gone, form.base, form.payload, longest_gap)
+        row = assemble(packets, lengths, row, state, image, gone, form.base, form.payload, maximum_gap)
     assert (guarded[:1024] == 0xA5).all()
     assert (guarded[-1024:] == 0xA5).all()

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.contract.device import DeviceError
-from drivers.kinect1.camera import LINE_S, LONGEST_LINES, KinectCamera, Stream
+from drivers.kinect1.camera import LINE_S, MAX_LINES, KinectCamera, Stream
 from drivers.kinect1.reference_plane import ReferencePlane
 from drivers.kinect1.transport.commands import ANSWER_BYTES, TIMEOUT_S, Commands, ProtocolError
 from evaluation.service.kinect1_emulation.emulated_camera import EmulatedKinect
@@ -81,7 +81,7 @@ def test_exposure_and_automatic_modes_of_the_color_camera(pipe: Pipe) -> None:
     camera.set_exposure_s(0.01)
     assert camera.exposure_s() == pytest.approx(0.01, abs=LINE_S / 2)
     camera.set_exposure_s(1.0)
-    assert camera.exposure_s() == pytest.approx(LONGEST_LINES * LINE_S)
+    assert camera.exposure_s() == pytest.approx(MAX_LINES * LINE_S)
     assert camera.auto_exposure()
     assert camera.auto_white_balance()
     camera.set_auto_exposure(False)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from drivers.kinect1 import unpacking
-from drivers.kinect1.assembly import LONGEST_GAP, Assembler
+from drivers.kinect1.assembly import MAX_GAP, Assembler
 from drivers.kinect1.camera import Stream
 from drivers.kinect1.reference_plane import ReferencePlane
 from drivers.kinect1.stream_decoder import StreamDecoder
@@ -43,7 +43,7 @@ def test_depth_images_with_lost_packets_are_delivered_with_no_return_where_they_
 @pytest.mark.parametrize("places", [(0,), (0, 1), (2,), (3,), (1, 2), (2, 3), (3, 4), (2, 3, 4, 5)])
 def test_a_gap_anywhere_in_an_image_is_bridged(places: tuple[int, ...]) -> None:
     """Packets are lost from the second image on; what is left of each image is the one that was shown."""
-    shown, assembler = stream_of(TINY), Assembler(TINY, LONGEST_GAP)
+    shown, assembler = stream_of(TINY), Assembler(TINY, MAX_GAP)
     rows = np.concatenate([np.arange(begin(i), begin(i) + TINY.packets) for i in range(4)])
     packets, lengths = (part[rows] for part in shown.microframes(0, 1200))
     lengths[[TINY.packets + place for place in places]] = 0
@@ -62,8 +62,8 @@ def test_a_gap_anywhere_in_an_image_is_bridged(places: tuple[int, ...]) -> None:
 
 
 def test_a_longer_gap_drops_its_image() -> None:
-    shown, assembler = stream_of(DEPTH), Assembler(DEPTH, LONGEST_GAP)
+    shown, assembler = stream_of(DEPTH), Assembler(DEPTH, MAX_GAP)
     packets, lengths = shown.microframes(0, 800)
-    lengths[20 : 20 + LONGEST_GAP + 1] = 0
+    lengths[20 : 20 + MAX_GAP + 1] = 0
     assert [image.seq for image in assembler.feed(packets, lengths)] == [0, 1]
     assert assembler.dropped == {"lost_packets": 1, "bad_header": 0, "wrong_size": 0, "resynchronised": 0}

@@ -55,7 +55,7 @@ def write(
 
 
 def write_malformed(path: Path, items: Iterable[Frame | Truth]) -> Path:
-    """Like `write`, with a colour image in its middle that is none."""
+    """Writes a recording like `write`, with a malformed colour image in its middle."""
     items = list(items)
     with path.open("wb") as stream:
         file = McapFile(stream)

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from calib import pose
 from calib.camera import Camera
 from calib.warp import errors
-from calib.warp.mesh import LARGEST_STEP_M
+from calib.warp.mesh import MAX_STEP_M
 from evaluation.inputs.warping.splat import WIDTH, SplatWarp
 from tests.calib.warp.scenes import BOARD, SOURCE, VIEWS, WALL, image, seen_by
 
@@ -76,7 +76,7 @@ def test_the_kernels_are_their_definition(seed):
         if np.any(np.abs(off - 1) < 1e-3):
             continue  # single precision may decide otherwise
         front = near[touching].max(initial=0)
-        behind = touching & (1 / near <= 1 / front + LARGEST_STEP_M) if front else touching
+        behind = touching & (1 / near <= 1 / front + MAX_STEP_M) if front else touching
         assert np.isfinite(found[row, column]) == behind.any()
         if behind.any():
             weight = np.prod(1 - off[behind], axis=-1)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from evaluation.method.slid_sheets import FARTHEST_M, SLIDE_FRAME, Slide, creep, sequences
+from evaluation.method.slid_sheets import MAX_DISTANCE_M, SLIDE_FRAME, Slide, creep, sequences
 from evaluation.method.trust import Followed, follow
 from evaluation.scenes.bent_sheet import (
     CAMERA,
@@ -55,7 +55,7 @@ def test_a_sheet_that_jumps_before_nothing_is_not_said_to_be_tracked_while_the_m
     """The first is wrong in one frame, in which only the surprise tells; the second for good, as its edges tell."""
     scene = SheetScene("jumps", motion)
     frames = render_frames(scene, range(frame + 8), np.random.default_rng(31))
-    empty = [replace(one, distance=np.where(one.distance > FARTHEST_M, np.nan, one.distance)) for one in frames]
+    empty = [replace(one, distance=np.where(one.distance > MAX_DISTANCE_M, np.nan, one.distance)) for one in frames]
     found = follow(empty, scene.sigma)
     assert found.error_m[frame] > 0.01
     assert not found.wrong.any()

@@ -10,7 +10,7 @@ from abs_service.tracker.detection.initial_detection import InitialDetection
 from calib.noise.base import pixels_where
 from evaluation.experiment import Context
 from evaluation.paper import geometries
-from evaluation.paper.geometries import bound, measuring, sensor, undone
+from evaluation.paper.geometries import assumptions, bound, measuring, sensor
 from evaluation.paper.geometries.bound import Priors
 from evaluation.paper.geometries.known_sheet import KnownSheet
 from evaluation.scenes.geometries import GEOMETRIES, Motion, MovingSheet
@@ -127,7 +127,7 @@ def test_the_likelihood_comes_near_the_bound_and_profits_from_the_noise_model() 
     assert findings.values["tracked"] == [1.0]
     assert findings.values["ratio_mean"] > 1.3
     assert max(findings.values["to_bound"]) < 1.5
-    assert set(findings.values["ratio_undone"]) == {one.name for one in undone.CONDITIONS}
+    assert set(findings.values["ratio_undone"]) == {one.name for one in assumptions.CONDITIONS}
     json.dumps(findings.values)
     assert [section.title for section in findings.sections] == [
         "Geometries",

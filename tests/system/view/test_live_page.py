@@ -68,7 +68,7 @@ def names_and_buttons_are_where_they_belong(page):
 
 
 def meshes_are_made_anew(page, listener, rig_file):
-    """By the button, by a click on the object, and by the command that the page then names."""
+    """Meshes made anew by the button, by a click on the object, and by the command that the page then names."""
     version = listener.states()[-1][1].mesh_version
     page.get_by_role("button", name="Reinitialise").click()
     wait_until(lambda: listener.states()[-1][1].mesh_version > version, PATIENCE_S, "a new mesh")

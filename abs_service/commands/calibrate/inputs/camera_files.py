@@ -77,7 +77,7 @@ def _check(path: Path, cameras: Mapping[str, Camera], unit: str | None) -> None:
     for doubt in plausibility.doubts(cameras):
         raise OptionError(f"{path}: {doubt}")
     for pair, how in plausibility.baselines(cameras).items():
-        if how.length > plausibility.LARGEST_BASELINE_M and unit is None:
+        if how.length > plausibility.MAX_BASELINE_M and unit is None:
             raise OptionError(
                 f"{path}: {pair} are {how.length:.4g} m apart, if lengths are in metres; say what they are in with "
                 f"--unit, one of {', '.join(UNITS)}"

@@ -17,7 +17,7 @@ from abs_service.display.page.readouts.words import STALE_S
 Record = Callable[[bool], CommandAnswer | None]
 
 ALWAYS = (
-    'Always recording: `record.when = "always"`. With `"asked"` in the rig file, the grey buttons start and stop it.'
+    'Always recording: `record.when = "always"`. With `"requested"` in the rig file, the buttons start and stop it.'
 )
 
 

@@ -16,7 +16,7 @@ Values = NDArray[np.float64]
 GREY = (128, 128, 128)
 
 #: A vertex farther from its measurement has none: something else is in front of it, or nothing behind [m].
-LARGEST_RESIDUAL_M = 0.05
+MAX_RESIDUAL_M = 0.05
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -105,7 +105,7 @@ def residual(view: MeshView) -> Values:
     seen = np.flatnonzero((column >= 0) & (column < width) & (row >= 0) & (row < height))
     measured = view.measured[row[seen].astype(int), column[seen].astype(int)]
     found[seen] = measured - view.camera.distance(view.vertices[seen])
-    return 1e3 * np.where(np.abs(found) < LARGEST_RESIDUAL_M, found, np.nan)
+    return 1e3 * np.where(np.abs(found) < MAX_RESIDUAL_M, found, np.nan)
 
 
 @dataclass(frozen=True, slots=True)

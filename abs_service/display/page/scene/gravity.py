@@ -22,7 +22,7 @@ def down(feed: Feed, tracker: str) -> Direction | None:
 
 @lru_cache(maxsize=1)
 def _directions(toml: str) -> Mapping[str, Direction]:
-    """By tracker; without those that are no directions, since anybody can publish a configuration."""
+    """Directions by tracker; invalid ones are left out, since anybody can publish a configuration."""
     found: dict[str, Direction] = {}
     with suppress(tomllib.TOMLDecodeError, AttributeError):
         for name, tracker in tomllib.loads(toml).get("trackers", {}).items():

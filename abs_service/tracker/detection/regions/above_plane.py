@@ -28,7 +28,7 @@ class Settings:
             distances there.
         seed: column and row of a pixel of the object [px]; without it, the object is the largest connected surface,
             unless that may be a wall or a floor.
-        largest_step_m: largest difference in distance between neighbouring pixels of one surface [m]; "auto": 0.04, or
+        maximum_step_m: largest difference in distance between neighbouring pixels of one surface [m]; "auto": 0.04, or
             five standard deviations of the distance by the noise model, or 3.5 widths of a pixel on the surface, where
             that is more.
         minimum_pixels: minimum number of pixels of a surface; smaller ones are ignored as noise.
@@ -39,7 +39,7 @@ class Settings:
 
     clearance_m: Annotated[float, Gt(0)] = CLEARANCE_M
     seed: tuple[Annotated[int, Ge(0)], Annotated[int, Ge(0)]] | None = None
-    largest_step_m: Step = "auto"
+    maximum_step_m: Step = "auto"
     minimum_pixels: Annotated[int, Ge(16)] = 200
     within: Path | None = None
     polygon: Polygon | None = None
@@ -58,9 +58,9 @@ class Settings:
             self._refuse_background(largest, [labels == label for label in large[1:]], view)
         return largest
 
-    def _refuse_background(self, largest: NDArray[np.bool_], others: list[NDArray[np.bool_]], view: DepthView) -> None:
-        """DetectionError if one of the other surfaces is a thing before the largest one, and no speck."""
-        pixels, away = np.count_nonzero(largest), np.median(view.distance[largest])
+    def _refuse_background(self, piece: NDArray[np.bool_], others: list[NDArray[np.bool_]], view: DepthView) -> None:
+        """DetectionError if one of the other surfaces is a thing before `piece`, the largest one, and no speck."""
+        pixels, away = np.count_nonzero(piece), np.median(view.distance[piece])
         medians = {
             float(np.median(view.distance[other])): other
             for other in others
@@ -85,14 +85,14 @@ class Settings:
             labels, large = self._surfaces(view)
             return labels == large[0]
         try:
-            return surface_at(self.seed, view.distance, view.step(self.largest_step_m), self.minimum_pixels)
+            return surface_at(self.seed, view.distance, view.step(self.maximum_step_m), self.minimum_pixels)
         except DetectionError as error:
             raise self._nothing(error) from None
 
     def _surfaces(self, view: DepthView) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
         """`large_surfaces` of what is above the plane; DetectionError if there is none."""
         try:
-            return large_surfaces(view.distance, view.step(self.largest_step_m), self.minimum_pixels)
+            return large_surfaces(view.distance, view.step(self.maximum_step_m), self.minimum_pixels)
         except DetectionError as error:
             raise self._nothing(error) from None
 

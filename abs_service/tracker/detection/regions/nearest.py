@@ -24,7 +24,7 @@ class Settings:
     """TOML keys of the region.
 
     Attributes:
-        largest_step_m: largest difference in distance between neighbouring pixels of one surface [m]; "auto": 0.04, or
+        maximum_step_m: largest difference in distance between neighbouring pixels of one surface [m]; "auto": 0.04, or
             five standard deviations of the distance by the noise model, or 3.5 widths of a pixel on the surface, where
             that is more.
         minimum_pixels: minimum number of pixels of a surface; smaller ones are ignored as noise.
@@ -32,7 +32,7 @@ class Settings:
         polygon: corners (column, row) of a polygon around the object [px], three or more; pixels outside are ignored.
     """
 
-    largest_step_m: Step = "auto"
+    maximum_step_m: Step = "auto"
     minimum_pixels: Annotated[int, Ge(16)] = 200
     within: Path | None = None
     polygon: Polygon | None = None
@@ -47,7 +47,7 @@ class Settings:
         Raises:
             DetectionError: there is none, or it is a scene in which everything is connected, or a piece of that.
         """
-        step = view.step(self.largest_step_m)
+        step = view.step(self.maximum_step_m)
         labels, large = large_surfaces(view.distance, step, self.minimum_pixels)
         nearest = labels == min(large, key=lambda label: float(np.median(view.distance[labels == label])))
         largest = labels == large[0]
@@ -67,7 +67,7 @@ def _goes_on(
     piece: NDArray[np.bool_],
     surface: NDArray[np.bool_],
     distance: NDArray[np.float32],
-    largest_step: NDArray[np.float32] | float,
+    maximum_step: NDArray[np.float32] | float,
 ) -> bool:
     """True if a surface (height, width) is about as far away as a piece of it, where it begins beside the piece."""
     around = np.ones((2 * TORN_PX + 1, 2 * TORN_PX + 1))
@@ -75,5 +75,5 @@ def _goes_on(
     nearest = cv2.erode(np.where(piece, distance, np.float32(np.inf)), around)
     beside = surface & (farthest > 0)
     with np.errstate(invalid="ignore"):
-        alike = (distance > nearest - largest_step) & (distance < farthest + largest_step)
+        alike = (distance > nearest - maximum_step) & (distance < farthest + maximum_step)
     return bool(np.count_nonzero(beside & alike) > np.count_nonzero(beside) / 2)

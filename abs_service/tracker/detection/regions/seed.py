@@ -30,7 +30,7 @@ class Settings:
         grow: edges at which the object ends: steps in distance ("depth"), or edges of its colours, too ("color").
         minimum_motion_m: least change towards the sensor of a surface that has moved [m]; it is four standard
             deviations of the distances at least.
-        largest_step_m: largest difference in distance between neighbouring pixels of one surface [m]; "auto": 0.04, or
+        maximum_step_m: largest difference in distance between neighbouring pixels of one surface [m]; "auto": 0.04, or
             five standard deviations of the distance by the noise model, or 3.5 widths of a pixel on the surface, where
             that is more.
         minimum_pixels: minimum number of pixels of a surface, and of what moved or has the colour; less is noise.
@@ -43,7 +43,7 @@ class Settings:
     motion_s: Annotated[float, Ge(0.5)] | None = None
     grow: Literal["depth", "color"] = "depth"
     minimum_motion_m: Annotated[float, Gt(0)] = 0.02
-    largest_step_m: Step = "auto"
+    maximum_step_m: Step = "auto"
     minimum_pixels: Annotated[int, Ge(16)] = 16
     within: Path | None = None
     polygon: Polygon | None = None
@@ -53,7 +53,7 @@ class Settings:
 
     def build(self) -> Restricted:
         """The region; DetectionError if `within` is missing or no image."""
-        seed, limits = self._seed(), SurfaceLimits(self.largest_step_m, self.minimum_pixels)
+        seed, limits = self._seed(), SurfaceLimits(self.maximum_step_m, self.minimum_pixels)
 
         def select(view: DepthView) -> NDArray[np.bool_]:
             seeded = seed(view, limits)
@@ -84,6 +84,6 @@ def _apart_from_what_rests(seeded: Seeded, view: DepthView) -> NDArray[np.bool_]
         raise DetectionError(
             f"what moved is connected to {size / whole:.0%} of all returns, which span the image and rest: that is the "
             'scene, not an object. Set region.grow to "color", region.polygon to corners around the object, or a '
-            "smaller region.largest_step_m, or take the object away from what it touches"
+            "smaller region.maximum_step_m, or take the object away from what it touches"
         )
     return seeded.surface

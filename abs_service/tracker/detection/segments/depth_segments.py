@@ -33,37 +33,37 @@ class Surfaces:
     count: int
 
 
-def connected_surfaces(distance: NDArray[np.float32], largest_step: NDArray[np.float32] | float) -> Surfaces:
+def connected_surfaces(distance: NDArray[np.float32], maximum_step: NDArray[np.float32] | float) -> Surfaces:
     """Surfaces that are separated at jumps in distance.
 
     The image is smoothed first, because a single noisy pixel would otherwise connect or split surfaces.
 
     Args:
         distance: radial distances (height, width) [m], NaN without return.
-        largest_step: largest difference between connected neighbours [m], of all pixels or of each (height, width).
+        maximum_step: largest difference between connected neighbours [m], of all pixels or of each (height, width).
     """
     known = np.isfinite(distance)
     smooth = cv2.medianBlur(cv2.copyTo(distance, known.view(np.uint8)), 5)  # zero where unknown
     highest, lowest = cv2.dilate(smooth, _AROUND), cv2.erode(smooth, _AROUND)
-    surface = (known & (lowest > 0) & (highest - lowest < largest_step)).view(np.uint8)
+    surface = (known & (lowest > 0) & (highest - lowest < maximum_step)).view(np.uint8)
     count, labels = cv2.connectedComponents(surface, connectivity=4)
     return Surfaces(distance, np.asarray(smooth, np.float32), np.asarray(labels, np.int32), count)
 
 
 def large_surfaces(
-    distance: NDArray[np.float32], largest_step: NDArray[np.float32] | float, minimum_pixels: int
+    distance: NDArray[np.float32], maximum_step: NDArray[np.float32] | float, minimum_pixels: int
 ) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
     """Label of every pixel's surface, 0 for none, and the labels (k,) of the large surfaces, the largest first.
 
     Args:
         distance: radial distances (height, width) [m], NaN without return.
-        largest_step: see `connected_surfaces`.
+        maximum_step: see `connected_surfaces`.
         minimum_pixels: minimum number of pixels of a surface.
 
     Raises:
         DetectionError: no surface is large enough.
     """
-    surfaces = connected_surfaces(distance, largest_step)
+    surfaces = connected_surfaces(distance, maximum_step)
     labels = surfaces.labels
     sizes = np.bincount(labels.ravel(), minlength=surfaces.count)[1:]
     by_size = 1 + np.argsort(-sizes, kind="stable")
@@ -80,14 +80,14 @@ def large_surfaces(
 def surface_at(
     pixel: tuple[int, int],
     distance: NDArray[np.float32],
-    largest_step: NDArray[np.float32] | float,
+    maximum_step: NDArray[np.float32] | float,
     minimum_pixels: int,
 ) -> NDArray[np.bool_]:
     """Pixels (height, width) of the connected surface at a pixel, or else of the one nearest to it within `REACH_PX`.
 
     Args:
         pixel: its column and row.
-        distance, largest_step, minimum_pixels: see `large_surfaces`.
+        distance, maximum_step, minimum_pixels: see `large_surfaces`.
 
     Raises:
         DetectionError: the pixel is outside the image, or there is no surface near it.
@@ -95,7 +95,7 @@ def surface_at(
     height, width = distance.shape
     if not (0 <= pixel[0] < width and 0 <= pixel[1] < height):
         raise DetectionError(f"the pixel {list(pixel)} is outside the depth image of {width} × {height} pixels")
-    labels, large = large_surfaces(distance, largest_step, minimum_pixels)
+    labels, large = large_surfaces(distance, maximum_step, minimum_pixels)
     rows, columns = np.nonzero(np.isin(labels, large))
     away = np.hypot(columns - pixel[0], rows - pixel[1])
     nearest = int(np.argmin(away))

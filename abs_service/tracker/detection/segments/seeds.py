@@ -16,7 +16,7 @@ from abs_service.tracker.detection.segments.depth_segments import large_surfaces
 DISC = 1 / 64
 
 #: Colours are alike up to this difference in CIE L*a*b*, in which L*, that changes in the shade, counts half.
-LARGEST_COLOR_DIFFERENCE, LIGHTNESS_COUNTS = 14.0, 0.5
+MAX_COLOR_DIFFERENCE, LIGHTNESS_COUNTS = 14.0, 0.5
 
 #: Number of images over the time in which motion is looked for, and in how many of them something farther away has to
 #: be where a moved surface is now: single distances beside a moving edge are wrong.
@@ -49,7 +49,7 @@ class Seeded:
 class SurfaceLimits:
     """Limits of what is one surface, and of what counts as one: see `large_surfaces`."""
 
-    largest_step_m: Step
+    maximum_step_m: Step
     minimum_pixels: int
 
 
@@ -69,7 +69,7 @@ class PixelSeed:
 
     def __call__(self, view: DepthView, limits: SurfaceLimits) -> Seeded:
         """The disc of the surface that is nearest to the pixel; DetectionError if there is no surface near it."""
-        surface = surface_at(self.pixel, view.distance, view.step(limits.largest_step_m), limits.minimum_pixels)
+        surface = surface_at(self.pixel, view.distance, view.step(limits.maximum_step_m), limits.minimum_pixels)
         row, column = np.ogrid[: surface.shape[0], : surface.shape[1]]
         away = np.hypot(column - self.pixel[0], row - self.pixel[1])
         return Seeded(surface & (away <= away[surface].min() + DISC * surface.shape[1]), surface)
@@ -148,7 +148,7 @@ def alike(rgb: NDArray[np.float32], colors: NDArray[np.float32]) -> NDArray[np.b
     image = _lab(rgb)
     with np.errstate(invalid="ignore"):
         differences = [np.linalg.norm(image - color, axis=-1) for color in _lab(colors[None])[0]]
-        return np.asarray(np.min(differences, axis=0) <= LARGEST_COLOR_DIFFERENCE)
+        return np.asarray(np.min(differences, axis=0) <= MAX_COLOR_DIFFERENCE)
 
 
 def joined(pixels: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -163,7 +163,7 @@ def _largest_patch(view: DepthView, limits: SurfaceLimits, pixels: NDArray[np.bo
     Raises:
         DetectionError: none has `minimum_pixels`.
     """
-    labels, large = large_surfaces(view.distance, view.step(limits.largest_step_m), limits.minimum_pixels)
+    labels, large = large_surfaces(view.distance, view.step(limits.maximum_step_m), limits.minimum_pixels)
     there = (pixels & np.isin(labels, large)).view(np.uint8)
     patches = np.asarray(cv2.connectedComponents(cv2.morphologyEx(there, cv2.MORPH_OPEN, np.ones((3, 3))))[1])
     sizes = np.bincount(patches.ravel())[1:]

@@ -23,14 +23,14 @@ class Limits:
 
     Attributes:
         minimum_pixels: minimum number of pixels; the sides of a smaller sheet cannot be fitted.
-        largest_bow_m: largest height of a fitted paraboloid over the object for it to be flat [m].
+        maximum_bow_m: largest height of a fitted paraboloid over the object for it to be flat [m].
         minimum_gap_m: lower bound of the largest distance of the sheet's pixels from its plane, for small noise [m].
         minimum_overlap: minimum intersection over union of object and rectangle. A disc has 0.90, a sheet of 450 pixels
             0.96 and more, a sheet of which a finger occludes 6 % has 0.94.
     """
 
     minimum_pixels: int = 200
-    largest_bow_m: float = 0.02
+    maximum_bow_m: float = 0.02
     minimum_gap_m: float = 0.01
     minimum_overlap: float = 0.93
 
@@ -96,18 +96,18 @@ def _pixels_on_plane(points_p: NDArray[np.float64], limits: Limits) -> NDArray[n
         DetectionError: the points (height, width, 3), NaN without return, do not lie on a plane.
     """
     valid = points_p[np.isfinite(points_p[..., 2])]
-    _check_flat(valid, limits.largest_bow_m)
+    _check_flat(valid, limits.maximum_bow_m)
     gap = max(4 * 1.4826 * float(np.median(np.abs(valid[:, 2]))), limits.minimum_gap_m)
     near = (np.abs(points_p[..., 2]) < gap).astype(np.uint8)  # False for NaN
     labels, statistics = cv2.connectedComponentsWithStats(cv2.medianBlur(near, 3))[1:3]
     return np.asarray(labels == 1 + np.argmax(statistics[1:, cv2.CC_STAT_AREA]))
 
 
-def _check_flat(points_p: NDArray[np.float64], largest_bow_m: float) -> None:
+def _check_flat(points_p: NDArray[np.float64], maximum_bow_m: float) -> None:
     """Fits a paraboloid to points (k, 3), which averages their noise.
 
     Raises:
-        DetectionError: its height over the points exceeds `largest_bow_m`.
+        DetectionError: its height over the points exceeds `maximum_bow_m`.
     """
     a, b, z = points_p[:: len(points_p) // MAX_POINTS + 1].T
     arch = np.column_stack([a * a, a * b, b * b])
@@ -117,9 +117,9 @@ def _check_flat(points_p: NDArray[np.float64], largest_bow_m: float) -> None:
         weight = 1 / np.sqrt(np.maximum(np.abs(z - terms @ coefficients), 1e-3))
         coefficients = np.linalg.lstsq(terms * weight[:, None], z * weight, rcond=None)[0]
     bow = float(np.ptp(arch @ coefficients[:3]))
-    if bow > largest_bow_m:
+    if bow > maximum_bow_m:
         raise DetectionError(
-            f"the object arches by {bow * 1e3:.0f} mm, more than largest_bow_m = {largest_bow_m:g} m; a sheet must be "
+            f"the object arches by {bow * 1e3:.0f} mm, more than maximum_bow_m = {maximum_bow_m:g} m; a sheet must be "
             "flat to be found"
         )
 

@@ -44,7 +44,7 @@ RIM_PX = 2
 #: The fit is bad if its error (root mean square of the best 90 %) exceeds this, or so many σ if that is more [m].
 MIN_ERROR_M, ERROR_DEVIATIONS = 0.004, 2.0
 #: … or if a larger share of the object lies beside the template, or of the template before the background.
-LARGEST_SHARE = 0.1
+MAX_SHARE = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +125,7 @@ def registration_deviation(samples: Samples) -> float:
 
 
 def _distinct(fits: list[tuple[Pose, float]]) -> list[tuple[Pose, float]]:
-    """Those of poses and their costs, the best first, that differ in rotation from all better ones."""
+    """Poses with their costs, the best first, without those whose rotation is about that of a better one."""
     kept: list[tuple[Pose, float]] = []
     for T_ro, cost in fits:
         if all(np.trace(other[:3, :3].T @ T_ro[:3, :3]) < 1 + 2 * np.cos(SAME_TURN) for other, _ in kept):
@@ -240,11 +240,11 @@ def _check(match: Match, samples: Samples, scene: Scene, deviation: float) -> No
     errors = np.sort(match.errors)[: max(int(0.9 * len(match.errors)), 1)]
     error = float(np.sqrt(np.mean(errors**2))) if len(errors) else np.inf
     limit = max(MIN_ERROR_M, ERROR_DEVIATIONS * deviation)
-    if error <= limit and max(match.beside, match.before) <= LARGEST_SHARE:
+    if error <= limit and max(match.beside, match.before) <= MAX_SHARE:
         return
     raise DetectionError(
         f"the template does not fit the object in sight, which measures {extents(scene.points)}, the template "
         f"{extents(samples.points)}: it is {error * 1e3:.1f} mm away (root mean square, {limit * 1e3:.1f} mm allowed), "
         f"{match.beside:.0%} of the object lie beside it, and {match.before:.0%} of it would hide what is seen of the "
-        f"background ({LARGEST_SHARE:.0%} allowed)"
+        f"background ({MAX_SHARE:.0%} allowed)"
     )

@@ -15,7 +15,7 @@ Vector = NDArray[np.float64]
 NOISE_M = 5e-3
 
 #: Points farther away than this multiple of the noise are outliers: another object, or a mixed pixel.
-LARGEST_GAP = 3.0
+MAX_GAP = 3.0
 
 #: Step of the numerical derivatives: of a position [m], an angle [rad], and the logarithm of a load.
 STEP = 1e-3
@@ -145,7 +145,7 @@ def _curve(along: Vector, beside: Vector) -> tuple[np.polynomial.Polynomial, NDA
     curve = np.polynomial.Polynomial.fit(along, beside, 4)
     for _ in range(2):
         gap = np.abs(beside - curve(along))
-        near = gap <= max(LARGEST_GAP * NOISE_M, LARGEST_GAP * 1.5 * float(np.median(gap)))
+        near = gap <= max(MAX_GAP * NOISE_M, MAX_GAP * 1.5 * float(np.median(gap)))
         curve = np.polynomial.Polynomial.fit(along[near], beside[near], 4)
     return curve, near
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection
 from abs_service.tracker.detection.shapes.sheet_mesh import Sheet
 from abs_service.tracker.detection.strip.elastica_fit import (
-    LARGEST_GAP,
+    MAX_GAP,
     NOISE_M,
     FittedElastica,
     Plane,
@@ -28,7 +28,7 @@ from calib.pose import Pose
 MIN_PIXELS, MAX_PIXELS = 100, 1500
 
 #: Pixels farther beyond an end than this share of the length are outliers.
-LARGEST_OVERHANG = 0.08
+MAX_OVERHANG = 0.08
 
 #: Minimum share of the pixels on one elastica for the object to be a strip.
 MIN_SHARE = 0.7
@@ -149,7 +149,7 @@ def _refine(before: _Fitted, points: NDArray[np.float64], camera: Camera) -> _Fi
     elastica = fit(before.elastica, flat[before.belongs])
     along, gap, phi = elastica.unroll(flat)
     beyond = np.abs(along - elastica.length / 2) - elastica.length / 2
-    belongs = (np.abs(gap) < LARGEST_GAP * NOISE_M) & (beyond < LARGEST_OVERHANG * elastica.length)
+    belongs = (np.abs(gap) < MAX_GAP * NOISE_M) & (beyond < MAX_OVERHANG * elastica.length)
     normals = plane.normals(phi)
     high, wide = (size[belongs] for size in _pixel_sizes(sight, normals, camera.fx))
     across, along, gap, phi = across[belongs], along[belongs], gap[belongs], phi[belongs]

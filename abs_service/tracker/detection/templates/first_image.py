@@ -8,7 +8,7 @@ from abs_service.tracker.detection.templates.base import ALL_SEEN, Model_co, Mod
 
 @dataclass(frozen=True)
 class Settings:
-    """It has no keys."""
+    """TOML keys: none."""
 
     def build(self, vertices: int) -> "FirstImage":
         """The null object."""

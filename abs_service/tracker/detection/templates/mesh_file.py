@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.detection.initial_detection import DetectionError
-from abs_service.tracker.detection.plausibility import LARGEST_M, SMALLEST_M
+from abs_service.tracker.detection.plausibility import MAX_M, MIN_M
 from abs_service.tracker.detection.shapes.paint import NO_PAINT, PointPaint
 from abs_service.tracker.detection.shapes.principal_axes import extents, principal_axes
 from abs_service.tracker.detection.shapes.resampling import evenly_spread, triangulated
@@ -26,7 +26,7 @@ FORMATS = (".obj", ".ply", ".stl")
 SAMPLES, PAINTED = 1500, 10_000
 
 #: The vertices of the file are kept if there are so many times as many as asked for.
-FEWEST, MOST = 0.5, 2.0
+MIN_RATIO, MAX_RATIO = 0.5, 2.0
 
 #: Faces are divided until no edge is longer than this share of the distance between vertices, or there are so many.
 FINENESS, MAX_VERTICES = 0.7, 50_000
@@ -66,7 +66,7 @@ def load(path: Path, metres: float, vertices: int) -> KnownObject:
     chosen = evenly_spread(dense, SAMPLES)
     samples = Samples(dense.vertices[chosen], dense.normals[chosen], dense.area, _is_closed(given))
     paint = PointPaint(dense.vertices, dense.normals, dense.colors.astype(np.float64)) if is_painted else NO_PAINT
-    if FEWEST * vertices <= len(given.vertices) <= MOST * vertices:
+    if MIN_RATIO * vertices <= len(given.vertices) <= MAX_RATIO * vertices:
         return KnownObject(given, samples, paint)
     kept, faces = triangulated(dense, evenly_spread(dense, vertices))
     coarse = replace(dense, vertices=dense.vertices[kept], faces=faces, colors=dense.colors[kept])
@@ -108,12 +108,12 @@ def _with_colors(visual: Any, vertices: NDArray[np.float64], faces: NDArray[np.i
     return _Content(vertices, faces, lambda rows: np.full((len(rows), 3), np.nan))
 
 
-def _divided(content: _Content, longest: float) -> _Content:
+def _divided(content: _Content, maximum: float) -> _Content:
     """The same surface with every face divided into four until no edge is longer."""
     subdivide = import_module("trimesh.remesh").subdivide
     vertices, faces = content.vertices, content.faces
     while len(vertices) < MAX_VERTICES:
-        if edge_lengths(vertices[:, :3], sides_of(faces)).max() <= longest:
+        if edge_lengths(vertices[:, :3], sides_of(faces)).max() <= maximum:
             break
         vertices, faces = subdivide(vertices, faces)[:2]
     return replace(content, vertices=vertices, faces=faces)
@@ -142,10 +142,10 @@ def _checked(mesh: Mesh, path: Path) -> Mesh:
     if len(mesh.vertices) < 3 or not mesh.area > 0:
         raise DetectionError(f"path = {str(path)!r} has no triangles with an area; a surface is needed")
     size = float(np.linalg.norm(np.ptp(mesh.vertices, axis=0)))
-    if not SMALLEST_M <= size <= LARGEST_M:
+    if not MIN_M <= size <= MAX_M:
         raise DetectionError(
-            f"path = {str(path)!r}: the object would measure {extents(mesh.vertices)}, {SMALLEST_M:g} m to "
-            f'{LARGEST_M:g} m allowed; unit = "m", "cm" or "mm" says what its coordinates are'
+            f"path = {str(path)!r}: the object would measure {extents(mesh.vertices)}, {MIN_M:g} m to "
+            f'{MAX_M:g} m allowed; unit = "m", "cm" or "mm" says what its coordinates are'
         )
     directed = sides_of(mesh.faces).astype(np.int64) @ [len(mesh.vertices), 1]
     if len(np.unique(directed)) < len(directed):

@@ -31,7 +31,7 @@ def _ends(bends: NDArray[np.float64], ends: NDArray[np.complex128], derivatives:
 
 @kernel
 def end_of(bend: float) -> tuple[complex, complex]:
-    """Same as `arc`, for one bend."""
+    """End of an arc and its derivative for one bend; see `arc`."""
     if abs(bend) < SMALL:
         return 1 - bend * bend / 6 + 0.5j * bend, -bend / 3 + 1j * (0.5 - 0.125 * bend * bend)
     turn = np.cos(bend) + 1j * np.sin(bend)

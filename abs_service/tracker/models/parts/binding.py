@@ -11,7 +11,7 @@ from abs_service.tracker.models.parts import spline
 BINDING_TOLERANCE_M = 1e-2
 
 #: Largest share of a mesh's area, seen on its chart, that may lie behind the rest of it.
-LARGEST_FOLD = 0.02
+MAX_FOLD = 0.02
 
 #: Factors of the rest surface's smoothing, tried in turn until every vertex has a normal. One that follows a limb or a
 #: step closely is bent so much there that its normals miss vertices; a smoother one leaves more to their offsets.
@@ -26,10 +26,10 @@ def check_chart(mesh: Mesh) -> None:
     """
     signed = _chart_areas(mesh)
     backwards = min(np.sum(signed[signed > 0]), -np.sum(signed[signed < 0])) / np.sum(np.abs(signed))
-    if backwards > LARGEST_FOLD:
+    if backwards > MAX_FOLD:
         raise ModelError(
             f"nurbs is a surface with one side, like a sheet or a relief: {backwards:.0%} of the mesh's area lies "
-            f"behind the rest, seen along its shortest axis ({LARGEST_FOLD:.0%} allowed); rigid follows a closed body"
+            f"behind the rest, seen along its shortest axis ({MAX_FOLD:.0%} allowed); rigid follows a closed body"
         )
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from annotated_types import Ge, Gt
 from numpy.typing import NDArray
 
-from abs_service.tracker.optimizers.base import Budget, Costs, Outcome, Problem, Search, StartSearch, Stop
+from abs_service.tracker.optimizers.base import Budget, Costs, FrameProblem, Outcome, Search, StartSearch, Stop
 from abs_service.tracker.optimizers.search.convergence import ConvergenceMonitor
 from abs_service.tracker.posterior.curvature import newton_step, search_metric
 from abs_service.tracker.terms.agreement import outlier_share
@@ -106,7 +106,7 @@ class AskAndTell:
         self._restarts = settings.restarts
         self._sampler = make(self._population, settings.step)
 
-    def follow(self, problem: Problem, start: NDArray[np.float64], budget: Budget) -> Search:
+    def follow(self, problem: FrameProblem, start: NDArray[np.float64], budget: Budget) -> Search:
         """Searches in the metric of the curvature, from the best of none, half and all of a Newton step."""
         linearized = problem.linearize(start)
         metric = search_metric(linearized.quadratic)
@@ -117,7 +117,7 @@ class AskAndTell:
         found = yield from sample(origins[best], float(costs[best]), metric, self._sampler, self._schedule, budget)
         return replace(found, linearized=linearized)
 
-    def explore(self, problem: Problem, start: NDArray[np.float64], budget: Budget) -> Search:
+    def explore(self, problem: FrameProblem, start: NDArray[np.float64], budget: Budget) -> Search:
         """Follows, then samples the priors with growing populations."""
         return explore(problem, start, self.follow, self._make, self._population, self._restarts, budget)
 
@@ -153,7 +153,7 @@ def sample(
 
 
 def explore(
-    problem: Problem,
+    problem: FrameProblem,
     start: NDArray[np.float64],
     follow: StartSearch,
     make: MakeSampler,

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.optimizers.base import Budget, Outcome, Problem, Search, Stop
+from abs_service.tracker.optimizers.base import Budget, FrameProblem, Outcome, Search, Stop
 from abs_service.tracker.posterior.curvature import Quadratic, solved
 
 NAME = "levenberg_marquardt"
@@ -17,7 +17,9 @@ GROWTH = 10.0
 REFUSED = 3.0
 
 
-def descend(problem: Problem, start: NDArray[np.float64], iterations: int, tolerance: float, budget: Budget) -> Search:
+def descend(
+    problem: FrameProblem, start: NDArray[np.float64], iterations: int, tolerance: float, budget: Budget
+) -> Search:
     """Descends from start (dim,), one linearisation per accepted step.
 
     Steps contract: the decrease after a step is foretold from those of this step and the one before, as codes for

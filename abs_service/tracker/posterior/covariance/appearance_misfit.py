@@ -30,7 +30,7 @@ from calib.jit import kernel
 REACH = 2.0
 
 
-class Displacement(Protocol):
+class SurfaceDisplacement(Protocol):
     """Displacement of the vertices along the surface that images show."""
 
     def variance(self, optimum: Optimum) -> NDArray[np.float64]:

@@ -29,7 +29,7 @@ _PROBES, _SMALL_SHARE = 60, 1e-3
 _RIGID = 6
 
 #: Precision that keeps the deviation finite [1/m²]: nothing slides by more than a metre.
-_LEAST = 1.0
+_MIN_PRECISION = 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -106,7 +106,7 @@ def _held(
 
 def _deviation(held: NDArray[np.float64]) -> float:
     """Deviation [m] along the slide that is held least."""
-    return float(1 / np.sqrt(_LEAST + held.min()))
+    return float(1 / np.sqrt(_MIN_PRECISION + held.min()))
 
 
 def _direction_error(part: Part) -> float:
@@ -133,15 +133,15 @@ def _information(
     A gradient in an image lies across the line of sight, however steeply that meets the surface, and is off within the
     image only.
     """
-    known, most = np.zeros((2, 6, 6))
+    known, possible = np.zeros((2, 6, 6))
     if len(part.rows):
         places = np.ascontiguousarray(part.places, np.float64)
         own, sight = part.of_surface(part.rows), np.zeros_like(places)
         if isinstance(part, PointLinearization) and part.center.size:  # of an image
             sight = places - part.center
             sight /= np.sqrt(np.einsum("mi,mi->m", sight, sight))[:, None]
-        add_information(part.rows, own, places, sight, center, size, known, most)
-    return known, most
+        add_information(part.rows, own, places, sight, center, size, known, possible)
+    return known, possible
 
 
 @kernel
@@ -153,7 +153,7 @@ def add_information(
     center: NDArray[np.float64],
     size: float,
     known: NDArray[np.float64],
-    most: NDArray[np.float64],
+    possible: NDArray[np.float64],
 ) -> None:
     """Adds up (row M)ᵀ(own M) and |row|² Mᵀ(1 − s sᵀ)M, of the motions M (3, 6) of every place; see `_motions`.
 
@@ -164,7 +164,7 @@ def add_information(
         own: the same derivatives (m, 3), by the surface itself.
         sight: directions s (m, 3) in which an error of the row's direction does not lie, of length 1; or 0.
         center, size: of the motions (3,) [m] and [m].
-        known, most: the sums (6, 6), zeros before.
+        known, possible: the sums (6, 6), zeros before.
     """
     seen, shown, unseen, along = np.empty(6), np.empty(6), np.empty(6), np.zeros((3, 6))
     along[0, 0] = along[1, 1] = along[2, 2] = 1.0
@@ -186,10 +186,10 @@ def add_information(
             for j in range(i, 6):
                 known[i, j] += 0.5 * (seen[i] * shown[j] + shown[i] * seen[j])
                 moved = along[0, i] * along[0, j] + along[1, i] * along[1, j] + along[2, i] * along[2, j]
-                most[i, j] += square * (moved - unseen[i] * unseen[j])
+                possible[i, j] += square * (moved - unseen[i] * unseen[j])
     for i in range(6):
         for j in range(i):
-            known[i, j], most[i, j] = known[j, i], most[j, i]
+            known[i, j], possible[i, j] = known[j, i], possible[j, i]
 
 
 def _moved(vertices: NDArray[np.float64], center: NDArray[np.float64], size: float) -> NDArray[np.float64]:

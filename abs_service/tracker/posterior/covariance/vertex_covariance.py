@@ -6,7 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.models.base import DeformationModel, JacobianBlocks, SparseJacobian
-from abs_service.tracker.posterior.covariance.appearance_misfit import AppearanceMisfit, Displacement, NoDisplacement
+from abs_service.tracker.posterior.covariance.appearance_misfit import (
+    AppearanceMisfit,
+    NoDisplacement,
+    SurfaceDisplacement,
+)
 from abs_service.tracker.posterior.covariance.first_frame_slide import FirstFrameSlide, NoSlide, Slide
 from abs_service.tracker.posterior.covariance.mesh_noise import MeshNoise
 from abs_service.tracker.posterior.covariance.misfit import Misfit
@@ -32,7 +36,7 @@ class VertexCovariance:
         self._slide: Slide = FirstFrameSlide(model.mesh) if is_new else NoSlide()
         self._mesh_noise = MeshNoise(model)
         self._misfit = Misfit(model.mesh)
-        self._displacement: Displacement = AppearanceMisfit(model.mesh) if len(centers) else NoDisplacement()
+        self._displacement: SurfaceDisplacement = AppearanceMisfit(model.mesh) if len(centers) else NoDisplacement()
         self._began = False
 
     def restart(self) -> None:

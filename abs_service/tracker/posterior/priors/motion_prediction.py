@@ -9,7 +9,7 @@ from abs_service.tracker.posterior.priors.change_metric import ChangeMetric
 from abs_service.tracker.posterior.priors.settings import Settings
 
 #: Radius of the search around the prediction, in standard deviations of the widest motion prior.
-FARTHEST = 4.0
+MAX_DEVIATIONS = 4.0
 
 #: Width of the prior in root mean squares of the innovations.
 MARGIN = 2.0
@@ -38,7 +38,7 @@ class MotionPrediction:
     @property
     def reach_m(self) -> float:
         """Radius around the predicted surface within which the surface is searched [m]."""
-        return np.inf if self.is_first else FARTHEST * self._widest_m
+        return np.inf if self.is_first else MAX_DEVIATIONS * self._widest_m
 
     @property
     def precision(self) -> NDArray[np.float64]:

@@ -20,7 +20,7 @@ from abs_service.tracker.posterior.priors.settings import Settings
 
 #: Interval assumed before the first two frames, and the longest over which a motion is extrapolated [s].
 FIRST_INTERVAL_S = 1 / 30
-LONGEST_INTERVAL_S = 0.5
+MAX_INTERVAL_S = 0.5
 
 #: Width of the prior in root mean squares of what successive innovations have in common.
 LAG_MARGIN = 10.0
@@ -62,13 +62,13 @@ class MotionPrior:
     @property
     def longest_covariance(self) -> NDArray[np.float64]:
         """Covariance (dim, dim) of the parameters around the predicted ones after the longest interval."""
-        return (self._settings.speed * LONGEST_INTERVAL_S) ** 2 * self._metric.inverse
+        return (self._settings.speed * MAX_INTERVAL_S) ** 2 * self._metric.inverse
 
     def predict(self, t_ns: int) -> MotionPrediction:
         """The prior at time `t_ns` [ns]; the velocity decays with the age of the last estimate."""
         is_first = self._t_ns is None
         elapsed_ns = FIRST_INTERVAL_S * 1e9 if self._t_ns is None else max(t_ns - self._t_ns, 1)
-        elapsed_s = min(elapsed_ns * 1e-9, LONGEST_INTERVAL_S)
+        elapsed_s = min(elapsed_ns * 1e-9, MAX_INTERVAL_S)
         self._t_ns = t_ns
         travel = elapsed_s * self._settings.persistence(elapsed_s)
         theta = self._theta + travel * self._velocity
@@ -77,7 +77,7 @@ class MotionPrior:
     def restart(self, theta: NDArray[np.float64]) -> None:
         """Restarts at theta (dim,) with zero velocity and the deviation of the longest interval, for relocation."""
         self._theta, self._velocity = theta, np.zeros_like(theta)
-        self._t_ns = (self._t_ns or 0) - round(LONGEST_INTERVAL_S * 1e9)
+        self._t_ns = (self._t_ns or 0) - round(MAX_INTERVAL_S * 1e9)
         self._speed, self._innovations = self._settings.speed, Innovations(len(theta))
 
     def update(

@@ -134,7 +134,7 @@ def _nearest(seen: Projected, faces: NDArray[np.int32], nearness: NDArray[np.flo
 
 @kernel
 def _nearest_at(seen: Projected, faces: NDArray[np.int32], few: FewPixels, nearness: NDArray[np.float32]) -> None:
-    """As `_nearest`, at some pixels (k,)."""
+    """Writes the nearest surface at some pixels (k,); see `_nearest`."""
     height = few.start.size - 1
     for f in range(faces.shape[0]):
         plane, is_seen = _plane(seen, faces[f])

@@ -21,7 +21,7 @@ from calib.camera import Camera
 COLUMNS = 80
 
 #: Surface farther beside the mesh than this share of its side, if it were square, is not counted: it may be anything.
-LARGEST_REACH = 0.25
+MAX_REACH = 0.25
 
 
 class Continuation(Protocol):
@@ -58,7 +58,7 @@ class CoarseContinuation:
         self._shape = few.height, few.width
         self._focal = camera.fx / self._step
         self._gap_m = float(np.median(edge_lengths(mesh.vertices, mesh.edges)))
-        self._reach_m = LARGEST_REACH * float(np.sqrt(mesh.area)) + self._gap_m
+        self._reach_m = MAX_REACH * float(np.sqrt(mesh.area)) + self._gap_m
         self._at_first = float("nan")
 
     def observe(self, shown: NDArray[np.bool_], window: Window = WHOLE) -> Callable[[Surface], Remainder]:

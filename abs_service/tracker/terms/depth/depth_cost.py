@@ -38,7 +38,7 @@ class ConstantCosts(NamedTuple):
     outlier: float
 
 
-class Residuals(NamedTuple):
+class DepthResiduals(NamedTuple):
     """Measured distances compared with synthesised ones, each (n,).
 
     Attributes:
@@ -52,8 +52,8 @@ class Residuals(NamedTuple):
     cost: NDArray[np.float64]
 
 
-def missing_cost(law: NoReturn, predicted: Surface, center: NDArray[np.float64], most: float) -> NDArray[np.float32]:
-    """Cost (1, n) of a missing return at each vertex beyond that of a measurement that agrees, at most `most` [nats].
+def missing_cost(law: NoReturn, predicted: Surface, center: NDArray[np.float64], maximum: float) -> NDArray[np.float32]:
+    """Cost (1, n) of a missing return at each vertex beyond that of an agreeing measurement, up to `maximum` [nats].
 
     It is −log p of a missing return minus −log(1 − p) of a return, so it is 0 where no return is as likely as one.
     Distance and angle are those of the predicted mesh, the same for all candidates.
@@ -62,12 +62,12 @@ def missing_cost(law: NoReturn, predicted: Surface, center: NDArray[np.float64],
         law: probability of no return.
         predicted: the predicted surface, a population of one.
         center: of the camera (3,) [m].
-        most: upper bound [nats].
+        maximum: upper bound [nats].
     """
     sight = predicted.vertices[0] - center[:, None]
     distance = np.linalg.norm(sight, axis=0)
     cosine = -np.einsum("in,in->n", predicted.normals[0], sight) / distance
-    return np.clip(-law.log_odds(distance, np.clip(cosine, 0, 1)), 0, most)[None].astype(np.float32)
+    return np.clip(-law.log_odds(distance, np.clip(cosine, 0, 1)), 0, maximum)[None].astype(np.float32)
 
 
 def median_inlier_cost(texels: NDArray[np.float32], shown: NDArray[np.bool_]) -> float:
@@ -117,7 +117,7 @@ def write_constants(costs: ConstantCosts, corner: tuple[int, int], texture: NDAr
 
 @kernel
 def normalize(
-    pixel: NDArray[np.int32], distance: NDArray[np.float32], texture: NDArray[np.float32], found: Residuals
+    pixel: NDArray[np.int32], distance: NDArray[np.float32], texture: NDArray[np.float32], found: DepthResiduals
 ) -> None:
     """Writes the residuals of samples (n,), see `Synthesis`, with the texels (pixels, 8) of a texture."""
     for v in range(pixel.size):

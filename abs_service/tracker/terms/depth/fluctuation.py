@@ -12,8 +12,8 @@ from abs_service.tracker.terms.image_noise import NORMAL_MEDIAN
 from abs_service.tracker.terms.median import median
 
 #: Weight of a new frame in the running mean square; until there are as many frames, all count the same. Fewer than
-#: `FEWEST` say nothing.
-NEW, FEWEST = 0.1, 5
+#: `MIN_FRAMES` say nothing.
+NEW, MIN_FRAMES = 0.1, 5
 
 #: The noise model is contradicted by so many of its deviations, as in the first image (`TOO_MUCH_SCATTER`). With a
 #: right one, wrinkles that wander through a curtain of 2 mm of noise make 1.3 of them at most, and real structured
@@ -52,4 +52,4 @@ class Fluctuation:
         self._frames += 1
         self._square += max(NEW, 1 / self._frames) * ((median(change) / NORMAL_MEDIAN) ** 2 - self._square)
         scale = float(np.sqrt(self._square))
-        self.scale = scale if self._frames >= FEWEST and scale > TOO_MUCH else 1.0
+        self.scale = scale if self._frames >= MIN_FRAMES and scale > TOO_MUCH else 1.0

@@ -10,7 +10,7 @@ from abs_service.tracker.memo import Memo
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import ObservedView, Synthesis
 from abs_service.tracker.terms.base import Bounds, facing
-from abs_service.tracker.terms.depth.depth_cost import FREE_SCALE_M, Residuals, depth_cost, normalize
+from abs_service.tracker.terms.depth.depth_cost import FREE_SCALE_M, DepthResiduals, depth_cost, normalize
 from abs_service.tracker.terms.depth.fluctuation import Fluctuation
 from abs_service.tracker.terms.depth.outline.base import ObservedOutline
 from abs_service.tracker.terms.depth.pixel_classes import PixelClasses
@@ -25,7 +25,7 @@ from abs_service.tracker.terms.vertex_counts import VertexMasks
 MIN_FREE_M = 0.005
 
 #: A measurement that is farther from its vertex is no measurement of the object [m].
-LARGEST_MISFIT_M = 0.05
+MAX_MISFIT_M = 0.05
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,7 +61,7 @@ class ObservedDepth:
     fluctuation: Fluctuation
     scale: float
     is_surprised: bool
-    residuals: Memo[Synthesis, Residuals] = field(init=False, default_factory=Memo[Synthesis, Residuals])
+    residuals: Memo[Synthesis, DepthResiduals] = field(init=False, default_factory=Memo[Synthesis, DepthResiduals])
     misfits: Memo[Surface, NDArray[np.float64]] = field(init=False, default_factory=Memo[Surface, NDArray[np.float64]])
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
@@ -150,7 +150,7 @@ class ObservedDepth:
         residual, inverse, cost = self.residuals.get(seen, self._residuals)
         classes = self.classes.at(np.maximum(seen.pixel[0], 0))
         deviation = 1 / np.maximum(inverse, 1e-9)
-        signed = np.clip(residual * deviation, -LARGEST_MISFIT_M, LARGEST_MISFIT_M)
+        signed = np.clip(residual * deviation, -MAX_MISFIT_M, MAX_MISFIT_M)
         usable, measured = (seen.pixel[0] > 0) & ~classes.unknown, cost < np.inf
         distance = np.where(measured, signed, classes.free_m.astype(np.float64))
         return np.stack([distance, np.where(measured, deviation, 0.0)]) * usable
@@ -160,8 +160,8 @@ class ObservedDepth:
         distance, deviation = self.misfit(surface)
         self.fluctuation.update(distance, deviation / self.scale)
 
-    def _residuals(self, seen: Synthesis) -> Residuals:
+    def _residuals(self, seen: Synthesis) -> DepthResiduals:
         """Residuals of the samples of a population of one."""
-        found = Residuals(*np.empty((3, seen.pixel.shape[1])))
+        found = DepthResiduals(*np.empty((3, seen.pixel.shape[1])))
         normalize(seen.pixel[0], seen.distance[0], self.texels.at(seen.pixel), found)
         return found

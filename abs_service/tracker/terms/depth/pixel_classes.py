@@ -29,7 +29,7 @@ class PixelClasses:
     free_m: NDArray[np.float32]
 
     def at(self, pixel: NDArray[np.integer]) -> "PixelClasses":
-        """Those of samples at indices (m,) into the flattened image, see `Synthesis`."""
+        """Classes of samples at indices (m,) into the flattened image, see `Synthesis`."""
         lost, covered, beyond, doubtful = (
             image.take(pixel) for image in (self.lost, self.covered, self.beyond, self.doubtful)
         )

@@ -18,7 +18,7 @@ from abs_service.tracker.terms.patches import NEAR_PX, Patches, found_at
 from calib.camera import Camera
 
 #: Largest shift of a patch to the right or down [px], and largest number of its samples that are compared.
-REACH_PX, MOST = 8, 40
+REACH_PX, MAX_SAMPLES = 8, 40
 
 #: A shift that is less likely by this is another one [nats]; of two places that differ by less, either may be right.
 SIGNIFICANT, AMBIGUOUS = 20.0, 10.0
@@ -94,13 +94,13 @@ def _shifts(seen: Synthesis, shape: tuple[int, int], of_samples: NDArray[np.intp
 
 
 def _some_of_each(of_samples: NDArray[np.intp], in_sight: NDArray[np.bool_]) -> NDArray[np.intp]:
-    """Indices (k,) of no more than `MOST` samples in sight (m,) of every patch, evenly spaced in their order."""
+    """Indices (k,) of no more than `MAX_SAMPLES` samples in sight (m,) of every patch, evenly spaced in their order."""
     samples = in_sight.nonzero()[0]
     samples = samples[of_samples[samples].argsort(kind="stable")]
     patch = of_samples[samples]
     count = np.bincount(patch)
     place = np.arange(len(samples)) - (count.cumsum() - count)[patch]  # within its patch
-    return samples[place % -(-count // MOST)[patch] == 0]
+    return samples[place % -(-count // MAX_SAMPLES)[patch] == 0]
 
 
 def _best(costs: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -14,7 +14,7 @@ from abs_service.report.provenance import Provenance
 from calib.board.corners import errors
 from calib.board.views import CornerView
 from calib.calibration_check import mistakes
-from calib.calibration_check.stored import Views
+from calib.calibration_check.stored_calibration import Views
 from calib.lenses.lens import Lens
 from calib.pose import Pose
 from calib.solve.start.board_poses import pose_candidates
@@ -52,7 +52,7 @@ def exchanged(view: CornerView) -> CornerView:
 
 
 def mirrored(view: CornerView) -> CornerView:
-    """As a detector numbers the board's mirror image."""
+    """Views as a detector numbers the board's mirror image."""
     if view.sensor != "right":
         return view
     points_b = view.points_b * (-1, 1, 1) + (board_points()[:, 0].max(), 0, 0)

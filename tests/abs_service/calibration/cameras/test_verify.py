@@ -50,7 +50,7 @@ def verify(recording: Path, tmp_path: Path, capsys):
 
 
 def calibration(cameras: dict[str, Camera]) -> rig_file.RigCalibration:
-    """As a solve would have stored it: to a tenth of a millimetre and a hundredth of a degree."""
+    """Calibration as a solve would have stored it: to a tenth of a millimetre and a hundredth of a degree."""
     names = [
         f"{name}.{part}" for name in SENSORS[1:] for part in ("rotation_x", "rotation_y", "rotation_z", "x", "y", "z")
     ]

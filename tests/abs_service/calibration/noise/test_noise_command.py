@@ -55,7 +55,7 @@ def test_five_distances_and_three_materials_give_the_law_and_what_pixels_differ_
     result = learnt(found, depths)
     model = result.model
     assert isinstance(model, PerPixel)
-    assert isinstance(model.law, TofAmplitude)
+    assert isinstance(model.model, TofAmplitude)
     rows, columns = (part.ravel() for part in np.indices(head.pattern.shape))
     for depth in np.linspace(DISTANCES[0], DISTANCES[-1], 9):
         for reflectivity in np.linspace(MATERIALS[-1], MATERIALS[0], 5):
@@ -65,7 +65,7 @@ def test_five_distances_and_three_materials_give_the_law_and_what_pixels_differ_
             error = model.mean(x, a, (rows, columns)) - truth
             assert np.sqrt(np.mean(error**2)) < 1e-3
             assert np.abs(np.median(error)) < 1e-3
-            assert np.abs(model.law.mean(x, a, (rows, columns))[0] - head.noise.mu(x, a)[0]) < 1e-3
+            assert np.abs(model.model.mean(x, a, (rows, columns))[0] - head.noise.mu(x, a)[0]) < 1e-3
             ratio = model.deviation(x, a, (rows, columns)) / head.noise.sigma(x, a)
             assert np.quantile(np.abs(ratio - 1), 0.99) < 0.10
     quality = result.chosen.quality

@@ -14,7 +14,7 @@ from tests.calib.sequences.walls import frames
 
 
 def learnt(sensor: str, distances: tuple[float, ...], unit: float) -> measurement.NoiseCalibration:
-    """From walls at known distances, stored in a unit [m]."""
+    """Model learnt from walls at known distances, stored in a unit [m]."""
     found = []
     for distance in distances:
         taken, head = frames(f"simulated://wall?sensors={sensor}&distance={distance}&tilt=6", 0, 20)

@@ -22,8 +22,8 @@ MASK = Path("/rigs/mask.png")
 @pytest.mark.parametrize(
     ("region", "chosen"),
     [
-        (nearest.Settings(0.02, within=MASK), seed.Settings(PIXEL, largest_step_m=0.02, within=MASK)),
-        (distance.Settings(1.2, largest_step_m=0.03), seed.Settings(PIXEL, largest_step_m=0.03)),
+        (nearest.Settings(0.02, within=MASK), seed.Settings(PIXEL, maximum_step_m=0.02, within=MASK)),
+        (distance.Settings(1.2, maximum_step_m=0.03), seed.Settings(PIXEL, maximum_step_m=0.03)),
         (above_plane.Settings(0.005), above_plane.Settings(0.005, PIXEL)),
         (above_plane.Settings(seed=(1, 2)), above_plane.Settings(seed=PIXEL)),
         (seed.Settings((1, 2), grow="color"), seed.Settings(PIXEL, grow="color")),
@@ -52,7 +52,7 @@ def kept(chosen):
     ("region", "chosen"),
     [
         (nearest.Settings(0.02, 100, MASK), nearest.Settings(0.02, 100, MASK, POLYGON)),
-        (distance.Settings(1.2, largest_step_m=0.03), nearest.Settings(0.03, polygon=POLYGON)),
+        (distance.Settings(1.2, maximum_step_m=0.03), nearest.Settings(0.03, polygon=POLYGON)),
         (above_plane.Settings(0.005, (1, 2)), above_plane.Settings(0.005, polygon=POLYGON)),
         (seed.Settings(motion_s=2.0, minimum_pixels=30), nearest.Settings(minimum_pixels=30, polygon=POLYGON)),
         (box.Settings((0, 0, 0), (1, 1, 1)), nearest.Settings(polygon=POLYGON)),

@@ -45,7 +45,9 @@ print(-faults() + faults())
 """
 
 
-@pytest.mark.parametrize(("tune", "least", "most"), [("process_tuning.keep_freed_memory()", 0, 50), ("", 500, 20_000)])
-def test_the_memory_of_an_image_serves_the_next_one(tune, least, most):
+@pytest.mark.parametrize(
+    ("tune", "minimum", "maximum"), [("process_tuning.keep_freed_memory()", 0, 50), ("", 500, 20_000)]
+)
+def test_the_memory_of_an_image_serves_the_next_one(tune, minimum, maximum):
     program = [sys.executable, "-c", _FAULTS.format(tune=tune)]
-    assert least <= int(subprocess.run(program, check=True, capture_output=True, text=True).stdout) <= most
+    assert minimum <= int(subprocess.run(program, check=True, capture_output=True, text=True).stdout) <= maximum

@@ -20,7 +20,7 @@ from calib.rig import Rig, Sensor
 from tests.abs_service.tracker.detection.test_segmentation import EVERYWHERE, SHEET, detect
 
 
-@pytest.mark.parametrize("region", [EVERYWHERE, seed.Settings((50, 40), largest_step_m=5.0).build()])
+@pytest.mark.parametrize("region", [EVERYWHERE, seed.Settings((50, 40), maximum_step_m=5.0).build()])
 def test_a_region_that_selects_the_scene_is_told(region):
     (doubt,) = warnings(detect(SHEET, region))
     assert doubt.startswith("the object fills ")

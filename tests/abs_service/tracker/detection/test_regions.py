@@ -81,8 +81,8 @@ def test_small_surfaces_are_noise():
 
 def test_the_largest_step_decides_what_is_connected():
     stair = scene((slice(10, 30), slice(5, 25), 1.0), (slice(10, 30), slice(25, 45), 1.03))
-    assert selected(nearest.Settings(largest_step_m=0.04), stair)[20, 40]
-    assert not selected(nearest.Settings(largest_step_m=0.02), stair)[20, 40]
+    assert selected(nearest.Settings(maximum_step_m=0.04), stair)[20, 40]
+    assert not selected(nearest.Settings(maximum_step_m=0.02), stair)[20, 40]
 
 
 @pytest.mark.parametrize("rows", [slice(0, 48), slice(20, 48), slice(3, 45)])

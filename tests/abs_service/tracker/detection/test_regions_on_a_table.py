@@ -36,7 +36,7 @@ SMALL = (slice(60, 85), slice(100, 130), 0.05)
 
 
 def assert_is(selected: np.ndarray, thing: tuple[slice, slice, float]) -> None:
-    """Only pixels of the thing, and all but its rim."""
+    """Asserts that pixels of the thing alone are selected, and all but its rim."""
     inside = np.zeros(selected.shape, bool)
     inside[thing[:2]] = True
     assert not (selected & ~inside).any()
@@ -45,7 +45,7 @@ def assert_is(selected: np.ndarray, thing: tuple[slice, slice, float]) -> None:
 
 def test_nearest_refuses_a_table_with_things_on_it():
     with pytest.raises(DetectionError, match=r'is the scene.*"above_plane"'):
-        nearest.Settings(largest_step_m=0.1).build().select(table(LARGE, SMALL))
+        nearest.Settings(maximum_step_m=0.1).build().select(table(LARGE, SMALL))
 
 
 def test_the_largest_thing_on_a_table_is_selected():
@@ -140,19 +140,19 @@ def test_a_seed_without_returns_around_it_is_refused():
 def test_the_largest_surface_in_a_range_of_distances_is_selected():
     speck = (slice(100, 116), slice(4, 20), 1.2)
     view = before_a_wall(NEAR, FAR, speck)
-    assert_is(distance.Settings(farthest_m=1.3).build().select(view), NEAR)
-    assert_is(distance.Settings(farthest_m=1.8, nearest_m=1.1).build().select(view), FAR)
-    assert_is(distance.Settings(farthest_m=1.3, nearest_m=1.1, minimum_pixels=16).build().select(view), speck)
+    assert_is(distance.Settings(maximum_m=1.3).build().select(view), NEAR)
+    assert_is(distance.Settings(maximum_m=1.8, minimum_m=1.1).build().select(view), FAR)
+    assert_is(distance.Settings(maximum_m=1.3, minimum_m=1.1, minimum_pixels=16).build().select(view), speck)
 
 
 def test_an_empty_range_of_distances_is_named():
     with pytest.raises(DetectionError, match=r"from 0\.2 to 0\.9 m: no connected surface of .* minimum_pixels = 200"):
-        distance.Settings(farthest_m=0.9, nearest_m=0.2).build().select(before_a_wall(NEAR))
+        distance.Settings(maximum_m=0.9, minimum_m=0.2).build().select(before_a_wall(NEAR))
 
 
 def test_a_range_of_distances_inside_out_is_refused():
-    with pytest.raises(DetectionError, match=r"nearest_m = 1\.0 must be below farthest_m = 0\.5"):
-        distance.Settings(farthest_m=0.5, nearest_m=1.0)
+    with pytest.raises(DetectionError, match=r"minimum_m = 1\.0 must be below maximum_m = 0\.5"):
+        distance.Settings(maximum_m=0.5, minimum_m=1.0)
 
 
 def drawn(folder: Path, where: tuple[slice, slice]) -> tuple[Path, np.ndarray]:
@@ -230,7 +230,7 @@ def test_a_real_sponge_is_found_on_its_table(toy):
     sponge = mask.Settings(path).build().select(view)
     with pytest.raises(DetectionError, match=r"has 16% of all returns and lies along the image's border"):
         above_plane.Settings().build().select(view)  # hand, arm and body are connected to it
-    alone = above_plane.Settings(seed=(111, 133), largest_step_m=0.015).build().select(view)
+    alone = above_plane.Settings(seed=(111, 133), maximum_step_m=0.015).build().select(view)
     assert np.count_nonzero(alone & sponge) > 0.75 * np.count_nonzero(sponge)
     assert np.count_nonzero(alone & ~sponge) < 0.02 * np.count_nonzero(alone)
 

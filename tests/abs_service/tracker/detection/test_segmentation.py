@@ -87,7 +87,7 @@ def test_noise_and_steps_of_a_sensor_do_not_tear_a_far_surface(away_m, step, who
     stepped = noise.step * np.round((1 / depth + shared) / noise.step)
     images = observation(tof=depth_image(np.where(inside, 1 / stepped, np.nan).astype(np.float32)))
     rig = Rig("r", {"tof": Sensor("tof", FINE, noise)})
-    seen = detect_object(images, rig, "tof", nearest.Settings(largest_step_m=step).build(), 300)
+    seen = detect_object(images, rig, "tof", nearest.Settings(maximum_step_m=step).build(), 300)
     covered = np.count_nonzero(np.isfinite(seen.distance)) / np.count_nonzero(inside)
     vertices = len(grid_mesh(seen).vertices)
     assert (covered > 0.85 and vertices > 220) == whole, (covered, vertices)
@@ -102,7 +102,7 @@ def test_large_pixels_do_not_tear_a_round_surface(step, whole):
     inside = aside < 0.285
     depth = np.where(inside, 2.3 - np.sqrt(np.maximum(0.3**2 - aside**2, 0)), np.nan).astype(np.float32)
     rig = Rig("r", {"tof": Sensor("tof", coarse, Constant(5e-3))})
-    region = nearest.Settings(largest_step_m=step).build()
+    region = nearest.Settings(maximum_step_m=step).build()
     seen = detect_object(observation(tof=depth_image(depth)), rig, "tof", region, 300)
     covered = np.count_nonzero(np.isfinite(seen.distance)) / np.count_nonzero(inside)
     assert (covered > 0.75) == whole, covered

@@ -24,8 +24,8 @@ CASES = pytest.mark.parametrize("case", MODELS, ids=str)
 seeds = st.integers(0, 2**32 - 1)
 
 
-def vectors(largest: float) -> st.SearchStrategy[np.ndarray]:
-    return st.tuples(*[st.floats(-largest, largest)] * 3).map(np.array)
+def vectors(maximum: float) -> st.SearchStrategy[np.ndarray]:
+    return st.tuples(*[st.floats(-maximum, maximum)] * 3).map(np.array)
 
 
 def vertices_of(model: Nurbs, theta: np.ndarray) -> np.ndarray:
@@ -33,7 +33,7 @@ def vertices_of(model: Nurbs, theta: np.ndarray) -> np.ndarray:
 
 
 def order_of(mesh: Mesh, given: Mesh = MESH) -> np.ndarray:
-    """For every vertex of `given` the index of the vertex of `mesh` with the same colour."""
+    """Index of the vertex of `mesh` with the same colour, for every vertex of `given`."""
     return np.array([np.flatnonzero((mesh.colors == color).all(axis=1))[0] for color in given.colors])
 
 

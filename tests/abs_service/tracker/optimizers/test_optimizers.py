@@ -13,9 +13,9 @@ from abs_service.tracker.optimizers.search.ask_and_tell import Sampler, default_
 def make(request):
     """A strategy from seed, dimension, least step, population and step."""
 
-    def strategy(seed: int = 1, dimension: int = 6, least: float = 0.5, population: int = 0, step: float = 1.0):
+    def strategy(seed: int = 1, dimension: int = 6, minimum: float = 0.5, population: int = 0, step: float = 1.0):
         population = population or default_population(dimension)
-        return request.param(dimension, np.random.default_rng(seed), least, population, step)
+        return request.param(dimension, np.random.default_rng(seed), minimum, population, step)
 
     return strategy
 
@@ -108,7 +108,7 @@ def test_long_searches_leave_the_next_frame_free_to_move():
 
 
 def test_the_step_of_a_new_frame_is_bounded(make):
-    strategy = make(step=1.0, least=0.5)
+    strategy = make(step=1.0, minimum=0.5)
     minimize(strategy, sphere, 60)
     assert strategy.deviation < 0.1
     begin(strategy)

@@ -1,4 +1,4 @@
-"""Only a window around the prediction is prepared: costs within reach are unchanged, all beyond are outliers."""
+"""Window around the prediction, which alone is prepared: costs within reach are unchanged, others are outliers."""
 
 from dataclasses import asdict
 from functools import partial

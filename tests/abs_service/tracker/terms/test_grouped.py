@@ -12,7 +12,7 @@ DIM, OWN = 11, 5
 
 
 def drawn(generator: np.random.Generator, counts: list[int]) -> GroupedLinearization:
-    """So many residuals in every group."""
+    """Rows and residuals, as many in every group."""
     m, start = sum(counts), np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
     parameters = np.array([generator.permutation(DIM)[:OWN] for _ in counts], np.int64)
     return GroupedLinearization(generator.standard_normal(m), generator.standard_normal((m, OWN)), parameters, start)

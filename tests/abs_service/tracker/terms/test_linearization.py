@@ -74,7 +74,7 @@ def test_depth_residuals_are_normalised_differences():
 
 
 def drawn(generator: np.random.Generator, count: int) -> PointLinearization:
-    """So many residuals of nine points in some order, in groups of four out of seven parameters."""
+    """Residuals of nine points in some order, in groups of four out of seven parameters."""
     group = np.sort(generator.integers(0, 3, 9)).astype(np.int32)
     parameters = np.stack([generator.permutation(7)[:4] for _ in range(3)])
     sparse_jacobian = SparseJacobian(generator.standard_normal((9, 3, 4)), group, parameters, 7)

@@ -149,7 +149,7 @@ def test_shares_are_of_the_vertices_that_face_the_sensor(name: str):
 
 
 def remainder(size: tuple[float, float]) -> Callable[[Surface], Remainder]:
-    """Of a sheet of a size in its first image."""
+    """Remainder of a sheet of a size in its first image."""
     return CoarseContinuation(CAMERA, MESH).observe(picture(size) < 1.3)
 
 

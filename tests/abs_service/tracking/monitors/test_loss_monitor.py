@@ -156,7 +156,7 @@ def test_what_has_other_colors_is_rejected_and_a_part_of_the_object_in_other_lig
 
 
 def without_object(k: int, frames: list[Frame]) -> list[Frame]:
-    """Nothing but a wall with a large opening from exposure 20 to 50, and grey light."""
+    """Frames of a wall with a large opening from exposure 20 to 50, in grey light."""
     if not 20 <= k < 50:
         return frames
     return [dataclasses.replace(frame, data=_empty(frame)) for frame in frames]

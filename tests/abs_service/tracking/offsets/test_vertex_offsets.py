@@ -107,8 +107,8 @@ def test_hidden_vertices_stay(random_walk):
 
 
 @pytest.mark.parametrize("random_walk", [0.0, 1.6e-3])
-@pytest.mark.parametrize(("beyond", "frames", "most"), [(0.005, 1, 1.8e-3), (0.03, 15, 1.2e-3), (0.1, 15, 1.2e-3)])
-def test_a_wild_measurement_makes_no_spike(random_walk, beyond, frames, most):
+@pytest.mark.parametrize(("beyond", "frames", "maximum"), [(0.005, 1, 1.8e-3), (0.03, 15, 1.2e-3), (0.1, 15, 1.2e-3)])
+def test_a_wild_measurement_makes_no_spike(random_walk, beyond, frames, maximum):
     """A measurement that the sensor's σ does not reject moves the vertex a little, and its effect decays."""
     model = Flat(np.zeros(N), 0.5e-3)
     offsets = learnt(model, random_walk)
@@ -116,18 +116,18 @@ def test_a_wild_measurement_makes_no_spike(random_walk, beyond, frames, most):
     wild[N // 2] = beyond
     for k in range(1, 30):
         offsets.update(image(offset_z(wild if k <= frames else 0 * wild)), model.surface, k * FRAME_NS)
-        assert np.abs(model.offset).max() < most
+        assert np.abs(model.offset).max() < maximum
     assert np.abs(model.offset).max() < 0.03 * beyond
 
 
-@pytest.mark.parametrize(("random_walk", "least", "most"), [(0.0, 0.0, 1e-4), (1.6e-3, 2e-3, 4e-3)])
-def test_what_a_whole_area_misses_is_the_models_unless_offsets_change(random_walk, least, most):
+@pytest.mark.parametrize(("random_walk", "minimum", "maximum"), [(0.0, 0.0, 1e-4), (1.6e-3, 2e-3, 4e-3)])
+def test_what_a_whole_area_misses_is_the_models_unless_offsets_change(random_walk, minimum, maximum):
     """Each vertex alone is within three deviations, and would take it for noise of the first frame."""
     generator, model = np.random.default_rng(5), Flat(np.zeros(N), 1e-3)
     offsets = learnt(model, random_walk)
     for k in range(1, 60):
         offsets.update(image(1 - 4e-3 + SIGMA * generator.standard_normal(SHAPE)), model.surface, k * FRAME_NS)
-    assert least <= np.median(model.offset) < most
+    assert minimum <= np.median(model.offset) < maximum
 
 
 def test_no_offset_moves_farther_than_half_an_edge():
@@ -135,9 +135,9 @@ def test_no_offset_moves_farther_than_half_an_edge():
     offsets = learnt(model, 1.0)  # a metre in a second: everything is believed
     for k in range(1, 100):
         offsets.update(image(1 - 2e-3 * k), model.surface, k * FRAME_NS)
-    most = 0.5 * vertex_offsets.edges_around(model.mesh)
-    assert (np.abs(model.offset) <= 1.000001 * most).all()
-    assert np.abs(model.offset).max() > 0.9 * most.min()
+    maximum = 0.5 * vertex_offsets.edges_around(model.mesh)
+    assert (np.abs(model.offset) <= 1.000001 * maximum).all()
+    assert np.abs(model.offset).max() > 0.9 * maximum.min()
 
 
 def test_a_folded_face_is_one_that_is_turned_from_its_surface():

@@ -1,4 +1,4 @@
-"""After the warm-up nothing is left to be compiled or loaded when the first frames come."""
+"""Warm-up: nothing is left to be compiled or loaded when the first frames come."""
 
 import json
 import os

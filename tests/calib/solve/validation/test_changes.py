@@ -6,9 +6,9 @@ import pytest
 from calib.solve.solution import Solution
 from calib.solve.validation import verdict
 from calib.solve.validation.free_shape import free_shape
-from calib.solve.validation.unlike_shots import findings
-from calib.solve.validation.unlike_shots.changes import is_confirmed, unseen
-from calib.solve.validation.unlike_shots.steadiness import Change, changes_of_optics
+from calib.solve.validation.inconsistent_shots import findings
+from calib.solve.validation.inconsistent_shots.changes import is_confirmed, unseen
+from calib.solve.validation.inconsistent_shots.steadiness import Change, changes_of_optics
 from tests.calib.solve.validation.test_steadiness import solved, views, zoomed
 
 #: As was said of a fisheye that did not change, and of which four images at the border missed by 0.9 px.

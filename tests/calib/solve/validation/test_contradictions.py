@@ -15,8 +15,8 @@ from calib.solve.diagnoses import unlike_the_rest
 from calib.solve.solution import Solution
 from calib.solve.start.extrinsics_graph import ContradictionError
 from calib.solve.start.start import start
-from calib.solve.validation.unlike_shots.contradictions import contradictions
-from calib.solve.validation.unlike_shots.scatter import scatter
+from calib.solve.validation.inconsistent_shots.contradictions import contradictions
+from calib.solve.validation.inconsistent_shots.scatter import scatter
 from calib.solve.validation.verdict import assess
 from evaluation.scenes.boards import board_views
 from evaluation.scenes.boards.board_views import Head

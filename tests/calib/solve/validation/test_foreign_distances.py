@@ -9,7 +9,7 @@ import pytest
 from calib.board.views import PlaneView
 from calib.solve.bundle.tasks import SensorTask, Task
 from calib.solve.calibrate import calibrate
-from calib.solve.validation.unlike_shots.foreign_distances import foreign_distances
+from calib.solve.validation.inconsistent_shots.foreign_distances import foreign_distances
 from calib.solve.validation.verdict import assess
 from evaluation.scenes.boards import board_views
 

@@ -12,7 +12,7 @@ from calib.solve.bundle.tasks import SensorTask, Task
 from calib.solve.calibrate import calibrate
 from calib.solve.solution import Solution
 from calib.solve.validation.free_shape import free_shape
-from calib.solve.validation.unlike_shots.groups import groups
+from calib.solve.validation.inconsistent_shots.groups import groups
 from calib.solve.validation.verdict import assess
 from evaluation.scenes.boards import board_views
 from tests.calib.solve.validation.test_steadiness import HEADS, SIZE, views
@@ -25,7 +25,7 @@ def turned(view: CornerView) -> CornerView:
 
 
 def mirrored(view: CornerView) -> CornerView:
-    """As a detector numbers the corners of a chessboard that it sees in a mirror: along the rows, from the left."""
+    """Corners as a detector numbers those of a chessboard that it sees in a mirror: along the rows, from the left."""
     pixels = np.stack([SIZE[0] - 1 - view.pixels[:, 0], view.pixels[:, 1]], axis=1)
     across = (board_views.COLUMNS - 1) * board_views.SQUARE - view.points_b[:, 0]
     return replace(view, pixels=pixels, points_b=np.column_stack([across, view.points_b[:, 1:]]))

@@ -39,7 +39,7 @@ def test_a_lens_that_fits_is_not_named() -> None:
 
 
 def behind_a_wavy_window(shift_px: float) -> Task:
-    """As through plastic foil: corners are displaced by where they are in the image."""
+    """Views as through plastic foil: corners are displaced by where they are in the image."""
     head = board_views.Head(board_views.three_heads()["color"].camera, 0.1)
     boards = board_views.random_boards(24, np.random.default_rng(3), 0.5, 0.8)
     seen = board_views.look({"color": head}, boards, np.random.default_rng(4))

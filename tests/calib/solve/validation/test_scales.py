@@ -6,7 +6,7 @@ SciPy warns where they do, and a warning is an error here.
 import numpy as np
 
 from calib.solve.bundle.uncertainty import with_boards
-from calib.solve.validation.unlike_shots.steadiness import of_focal
+from calib.solve.validation.inconsistent_shots.steadiness import of_focal
 
 SIZES = np.array([1e3, 1.0, 1e-4, 1e-9, 1e2, 1.0])
 

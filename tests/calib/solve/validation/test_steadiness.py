@@ -13,7 +13,7 @@ from calib.solve.bundle.tasks import SensorTask, Task
 from calib.solve.calibrate import calibrate
 from calib.solve.solution import Solution
 from calib.solve.validation.free_shape import free_shape
-from calib.solve.validation.unlike_shots.steadiness import (
+from calib.solve.validation.inconsistent_shots.steadiness import (
     changes_of_optics,
     changes_of_place,
     focal_scatter,

@@ -1,4 +1,4 @@
-"""Of two groups of shots that contradict each other each shot is found; the smaller group is named, or both."""
+"""Two groups of shots that contradict each other: each shot is found; the smaller group is named, or both."""
 
 from functools import cache
 
@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from calib.solve.bundle.adjustment import NotSolvedError
-from calib.solve.regrouping.guesses import by_residuals
+from calib.solve.regrouping.initial_groups import by_residuals
 from calib.solve.regrouping.two_groups import TwoGroups, numbered, two_groups, unexplained
 from calib.solve.solution import Solution
 from calib.solve.validation.free_shape import free_shape
-from calib.solve.validation.unlike_shots.contradictions import completed, contradictions
-from calib.solve.validation.unlike_shots.findings import unlike_shots
+from calib.solve.validation.inconsistent_shots.contradictions import completed, contradictions
+from calib.solve.validation.inconsistent_shots.findings import inconsistent_shots
 from tests.calib.solve.validation.test_contradictions import BOARDS, moved, solved
 
 FEW, HALF = (2, 3, 7, 11, 16), (0, 2, 3, 5, 7, 11, 12, 14, 16, 19)
@@ -24,7 +24,7 @@ def bumped(shots: tuple[int, ...], by: float = 0.006) -> Solution:
 
 
 def reasons(solution: Solution) -> list[str]:
-    return [*unlike_shots(free_shape(solution), [], 1.0).reasons]
+    return [*inconsistent_shots(free_shape(solution), [], 1.0).reasons]
 
 
 @pytest.mark.parametrize("shots", [FEW, HALF])

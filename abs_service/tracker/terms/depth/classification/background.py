@@ -18,7 +18,7 @@ MIN_PIXELS = 10
 
 #: Missing returns deeper inside the expected outline are a hole all the same: the object does not move as far between
 #: two frames [m].
-DEEPEST_M = 0.03
+MAX_DEPTH_M = 0.03
 
 #: Returns are missing beside the object's edge in any case; so many pixels around it are no background.
 MARGIN_PX = 3

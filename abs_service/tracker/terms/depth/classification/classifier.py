@@ -15,7 +15,7 @@ from abs_service.tracker.terms.depth.classification.nearest_range import Nearest
 from abs_service.tracker.terms.depth.classification.separation import separates, separating_step
 from abs_service.tracker.terms.depth.classification.visibility import (
     AGREEMENT_M,
-    LARGEST_STEP_M,
+    MAX_STEP_M,
     Visibility,
     classify,
     surfaces_of,
@@ -34,7 +34,7 @@ class Classifier:
         self._focal = camera.fx
         self._background, self._beyond_view = Background(), BeyondView()
         self._nearest_range, self._fixed_edges = NearestRange(camera), FixedEdges()
-        self._begun, self._is_interrupted, self._step = False, True, LARGEST_STEP_M
+        self._begun, self._is_interrupted, self._step = False, True, MAX_STEP_M
 
     def classify(
         self, distance: NDArray[np.float32], expected: NDArray[np.float32], window: Window, shape: tuple[int, ...]
@@ -54,8 +54,8 @@ class Classifier:
         if not self._begun:
             self._step = separating_step(distance, silhouette)
         # A flat thing that is lifted ends as others do, and its surface may be steep then.
-        is_flat = self._step < LARGEST_STEP_M and not separates(LARGEST_STEP_M, distance, silhouette)
-        step = self._step if is_flat else LARGEST_STEP_M
+        is_flat = self._step < MAX_STEP_M and not separates(MAX_STEP_M, distance, silhouette)
+        step = self._step if is_flat else MAX_STEP_M
         surfaces, areas = surfaces_of(distance, step), missing & ~(single | beyond)
         # What the surface goes on beyond is a hole, not the background. If there is none at first, none is looked for.
         hole = interruptions(surfaces, areas, silhouette) if self._is_interrupted else np.False_
@@ -63,7 +63,7 @@ class Classifier:
             self._begun, self._is_interrupted = True, bool(hole.any())
         empty, lost = self._background.observe(areas & ~hole, silhouette, window, shape)
         given = expected, self._focal, empty, single, beyond
-        seen = classify(surfaces, *given, agreement=AGREEMENT_M * (step / LARGEST_STEP_M))
+        seen = classify(surfaces, *given, agreement=AGREEMENT_M * (step / MAX_STEP_M))
         if is_flat and not seen.object.any():  # it moved farther than a finer agreement allows for
             seen = classify(surfaces_of(distance), *given)
         unsettled = self._fixed_edges.unsettled[window]

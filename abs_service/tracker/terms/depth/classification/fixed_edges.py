@@ -24,7 +24,7 @@ LATER_IMAGES = 4
 #: An edge is fixed where so large a share of the outline in a cell of the image is [px], for so many pixels in a row.
 #: Dropouts of 2 % change a tenth of a fixed one. Of a sheet that hands bend before a real Kinect v1, far from the sides
 #: of its image, an edge was so in 5 of 116 such series of images.
-CELL_PX, MIN_SHARE, MIN_LENGTH, LARGEST_GAP = 16, 0.8, 24, 8
+CELL_PX, MIN_SHARE, MIN_LENGTH, MAX_GAP = 16, 0.8, 24, 8
 #: If no more than this share of the rest of the outline changes, all of it stands still, and nothing is known.
 MIN_ELSEWHERE = 0.25
 #: So many returns farther than this beyond an edge, in all images so far, show that the sensor sees there [px].
@@ -196,7 +196,7 @@ def _runs(places: NDArray[np.intp], side: int, shape: tuple[int, int]) -> list[N
     found = np.stack(_from_side((places[:, 0], places[:, 1]), side, shape))
     found = found[:, found[0] < _margin(side, shape)]
     found = found[:, np.argsort(found[1], kind="stable")]
-    runs = np.split(found, np.flatnonzero(np.diff(found[1]) > LARGEST_GAP) + 1, axis=1)
+    runs = np.split(found, np.flatnonzero(np.diff(found[1]) > MAX_GAP) + 1, axis=1)
     return [run for run in runs if len(np.unique(run[1])) >= MIN_LENGTH]
 
 

@@ -14,7 +14,7 @@ from abs_service.tracker.terms.depth.classification.visibility import AGREEMENT_
 from calib.jit import kernel
 
 #: They are no wider than this share of the mesh's side, if it were square: beyond more of them may be anything.
-WIDEST = 0.5
+MAX_WIDTH = 0.5
 
 #: Labelled surfaces end up to so many pixels inside their outlines, and so do the interruptions between them.
 EDGE_PX = 2
@@ -32,7 +32,7 @@ def interruptions(surfaces: Surfaces, missing: NDArray[np.bool_], expected: NDAr
     result = np.zeros(missing.shape, np.bool_)
     if not expected.any():
         return result
-    reach = int(WIDEST * np.sqrt(np.count_nonzero(expected)))
+    reach = int(MAX_WIDTH * np.sqrt(np.count_nonzero(expected)))
     part = around(expected, reach + EDGE_PX)
     smooth, labels = np.ascontiguousarray(surfaces.smooth[part]), np.ascontiguousarray(surfaces.labels[part])
     ours = np.bincount(labels[expected[part]], minlength=surfaces.count) >= MIN_PIXELS

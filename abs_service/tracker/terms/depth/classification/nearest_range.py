@@ -1,7 +1,7 @@
 """Missing returns of what is nearer than a depth sensor can measure: a surface that comes so near does not end there.
 
-The line at which it leaves the range stays in place while the surface moves along itself. It is told from the end of an
-object by the first image: nothing is nearer than it, its distance is the same all along it, and the surface comes
+The line at which it leaves the range stays in place while the surface moves along itself. It differs from the end of an
+object in the first image: nothing is nearer than it, its distance is the same all along it, and the surface comes
 nearer towards it.
 """
 
@@ -14,7 +14,7 @@ from abs_service.tracker.terms.depth.classification.neighbourhood import grown
 from calib.camera import Camera
 
 #: Cameras measure from 0.1 (RealSense D4xx, PMD), 0.4 (Kinect v1), 0.5 (Kinect v2, Azure Kinect) or 0.6 m (Astra) on.
-LONGEST_M = 0.62
+MAX_M = 0.62
 #: Depths of one line differ by at most this share: noise and steps of a near surface.
 TOLERANCE = 0.01
 #: It has so many pixels, and that share of all that are at the edge of the object and nearly as near, by `NEARLY`.
@@ -78,7 +78,7 @@ def _nearest(
         return None
     # Some strays may be nearer.
     nearest = float(np.partition(measured, MIN_PIXELS // 2)[MIN_PIXELS // 2])
-    if nearest > LONGEST_M:
+    if nearest > MAX_M:
         return None
     line = edge & around & (depth < (1 + TOLERANCE) * nearest)
     length, nearly = np.count_nonzero(line), np.count_nonzero(at_edge < (1 + NEARLY) * nearest)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.detection.segments.depth_segments import Surfaces, connected_surfaces
-from abs_service.tracker.terms.depth.classification.background import DEEPEST_M
+from abs_service.tracker.terms.depth.classification.background import MAX_DEPTH_M
 from abs_service.tracker.terms.depth.classification.neighbourhood import grown
 from calib.jit import kernel
 
@@ -21,7 +21,7 @@ from calib.jit import kernel
 AGREEMENT_M = 0.03
 
 #: Neighbouring pixels whose distances differ by more show different surfaces [m].
-LARGEST_STEP_M = 0.04
+MAX_STEP_M = 0.04
 
 #: A connected surface is the object if at least this share of what it has on the expected place agrees …
 MIN_SHARE = 0.3
@@ -77,9 +77,9 @@ class Compared(NamedTuple):
     missing: NDArray[np.bool_]
 
 
-def surfaces_of(distance: NDArray[np.floating], largest_step: float = LARGEST_STEP_M) -> Surfaces:
+def surfaces_of(distance: NDArray[np.floating], maximum_step: float = MAX_STEP_M) -> Surfaces:
     """Surfaces of radial distances (height, width) [m], NaN without return, separated at larger steps [m]."""
-    return connected_surfaces(np.ascontiguousarray(distance, np.float32), largest_step)
+    return connected_surfaces(np.ascontiguousarray(distance, np.float32), maximum_step)
 
 
 def classify(
@@ -198,7 +198,7 @@ def _holes(
         return inside, empty & ~inside
     with np.errstate(over="ignore"):  # where the object fills the image, its outline is infinitely far away
         depth = _depth_inside(expected) * metres
-    hole = inside & (depth > np.where(empty, np.float32(DEEPEST_M), np.float32(RIM_M)))
+    hole = inside & (depth > np.where(empty, np.float32(MAX_DEPTH_M), np.float32(RIM_M)))
     if hole.any():
         hole |= missing & ~empty & (_depth_inside(~hole) * metres < 2 * RIM_M)
     return hole, empty & ~hole

@@ -73,7 +73,7 @@ class NoOutline:
         predicted: Surface,
         window: Window = WHOLE,
     ) -> "UnobservedOutline":
-        """Nothing to compare."""
+        """Outline without any edge: there is nothing to compare."""
         return UnobservedOutline(np.zeros(distance.shape, np.bool_))
 
 

@@ -11,8 +11,8 @@ from abs_service.tracker.memo import Memo
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.perspective import project_with_jacobian
 from abs_service.tracker.terms.depth.outline.rim import Edges, LocatedEdges, OutlineImage, by_side, chain
-from abs_service.tracker.terms.depth.outline.rim_classes import LARGEST_GAP_STEPS
-from abs_service.tracker.terms.depth.outline.rim_cost import FARTHEST
+from abs_service.tracker.terms.depth.outline.rim_classes import MAX_GAP_STEPS
+from abs_service.tracker.terms.depth.outline.rim_cost import MAX_DEVIATIONS
 from abs_service.tracker.terms.depth.outline.rim_match import shift_to_outline
 from abs_service.tracker.terms.depth.outline.rim_motion import displacement, motion
 from abs_service.tracker.terms.depth.outline.rim_normal import across_rim
@@ -73,7 +73,7 @@ class ObservedRimOutline:
         points = self.edges.points(surface)
         values, gradients = self.image.look_at(points)
         residual, points = values / self.deviation, points[0].T
-        use = np.flatnonzero(np.abs(residual) < FARTHEST)
+        use = np.flatnonzero(np.abs(residual) < MAX_DEVIATIONS)
         by_place = project_with_jacobian(self.image.camera, points[use].astype(np.float64))[1]
         shown = across_rim(gradients[use], self.along[use])
         shown = without_turn(shown, by_place, points[use]) if self.is_round else shown
@@ -118,7 +118,7 @@ class ObservedRimOutline:
 
     def _displacement(self, edges: LocatedEdges, known: NDArray[np.bool_]) -> float:
         """The larger of `displacement` and `motion` [m] of free edges, of which some (k,) are known."""
-        away, bound, directions = edges.away[known], FARTHEST * self.deviation, edges.directions[known]
+        away, bound, directions = edges.away[known], MAX_DEVIATIONS * self.deviation, edges.directions[known]
         # Outside, distances are known up to there; how much farther, nothing tells.
         off_px = np.where(away < -self.off_px, -np.inf, np.where(away > self.off_px, away, 0.0))
         moved = motion(np.clip(away, -bound, bound), directions, edges.places[known])
@@ -130,7 +130,7 @@ class ObservedRimOutline:
     def _of_covered(self, surface: Surface) -> tuple[int, float]:
         """Number of covered edges of a population of one beyond which the object goes on, and `_hanging`."""
         outer, inner = self.covered.ends(surface), self.covered.starts(surface)
-        beyond = self.image.inside_at(outer + LARGEST_GAP_STEPS * (outer - inner))
+        beyond = self.image.inside_at(outer + MAX_GAP_STEPS * (outer - inner))
         return int(np.count_nonzero(beyond > 0)), self._hanging(outer, inner)
 
     def _hanging(self, outer: NDArray[np.float64], inner: NDArray[np.float64]) -> float:

@@ -68,7 +68,7 @@ class Edges(NamedTuple):
         return surface.vertices[0].T[self.outer].astype(np.float64)
 
     def starts(self, surface: Surface) -> NDArray[np.float64]:
-        """Their neighbours inside (k, 3) [m]."""
+        """Neighbours inside of the outermost vertices (k, 3) [m]."""
         return surface.vertices[0].T[self.inner].astype(np.float64)
 
     def points(self, surface: Surface) -> NDArray[np.float32]:

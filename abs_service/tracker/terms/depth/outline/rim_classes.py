@@ -14,13 +14,13 @@ from abs_service.tracker.terms.sensor_fit import MIN_RIM
 from calib.camera import Camera
 
 #: The object continues beyond the outermost vertices by no more than so many times their distance from the next ones.
-LARGEST_GAP_STEPS = 2.0
+MAX_GAP_STEPS = 2.0
 
 #: The end of the object is known if the outline is so near to where it is extrapolated [px].
-LARGEST_MISS_PX = 4.0
+MAX_MISS_PX = 4.0
 
 #: Something hides an edge if it is in front of a point so many steps beyond it.
-_HIDING_STEPS = (0.5, 1.0, 1.5, LARGEST_GAP_STEPS)
+_HIDING_STEPS = (0.5, 1.0, 1.5, MAX_GAP_STEPS)
 
 #: A surface that is seen at a smaller cosine at its rim turns away from the sensor: the outline is a silhouette, which
 #: wanders over a body as it turns, not the end of a sheet.
@@ -28,7 +28,7 @@ MIN_COSINE = 0.25
 
 #: All of an outline is one where a surface bulges: most normals lean outwards by 37° or more (sine 0.6), and to all
 #: sides. A sheet bends to two sides only. A direction has at least so great a share of the leaning.
-_LEANING, _MOST, _MIN_DIRECTION = 0.6, 0.75, 0.25
+_LEANING, _MIN_SHARE, _MIN_DIRECTION = 0.6, 0.75, 0.25
 
 #: The surface ends before the outline if, most of the way to it, the measurement is so far off the extrapolated mesh at
 #: most of so many neighbouring edges: at the edge of a table top, its side goes on [m].
@@ -37,7 +37,7 @@ _NEIGHBOURS = 7
 _ALMOST = 0.75
 
 #: A body with a smaller share of free edges in its outline is round for the most part; those few belong to it as well.
-LEAST_FREE = 0.25
+MIN_FREE = 0.25
 
 #: Vertices within so many pixels of the image's border may continue beyond it.
 BORDER_PX = 2.0
@@ -79,13 +79,13 @@ def classify_rim(
     outer, inner = (surface.vertices[0].T[which].astype(np.float64) for which in (rim.outer, rim.inner))
     place, step = camera.project(outer), outer - inner
     beyond = _steps_to_outline(inside, gradients, place - camera.project(inner))
-    ends_near = beyond <= LARGEST_GAP_STEPS
+    ends_near = beyond <= MAX_GAP_STEPS
     gap = np.where(ends_near, np.maximum(beyond, 0.0), 0.0)
     ends = outer + gap[:, None] * step
     # If the mesh ends far inside the object, or the outline bends, it is nearest elsewhere than where the edge points.
-    ends_elsewhere = (np.abs(inside_at(ends)) > LARGEST_MISS_PX) & (gap > 0)
+    ends_elsewhere = (np.abs(inside_at(ends)) > MAX_MISS_PX) & (gap > 0)
     goes_on = ~ends_near | ends_elsewhere
-    far = ~goes_on & (inside > LARGEST_MISS_PX) & (not rim.is_end)
+    far = ~goes_on & (inside > MAX_MISS_PX) & (not rim.is_end)
     goes_on[far] = _leaves(camera, (outer + _ALMOST * gap[:, None] * step)[far], distance)
     hidden, unseen = _unseen(camera, [outer + by * step for by in _HIDING_STEPS], inside_at)
     turned = turns_away(camera, surface, rim.outer, rim.inner)
@@ -120,7 +120,7 @@ def _are_few(classes: NDArray[np.uint8]) -> bool:
     So it is beside specks of relief and quantised distances, and at the ends of a round body.
     """
     free, silhouettes = (np.count_nonzero(classes == one) for one in (RimClass.FREE, RimClass.SILHOUETTE))
-    return bool(free < max(MIN_RIM, LEAST_FREE * (free + silhouettes)))
+    return bool(free < max(MIN_RIM, MIN_FREE * (free + silhouettes)))
 
 
 def _steps_to_outline(
@@ -158,7 +158,7 @@ def _ends_at_border(places: NDArray[np.float64], distance: NDArray[np.float32]) 
         lines = np.flatnonzero(known.mean(axis=axis) >= MIN_RETURNS)
         first = min(lines[lines <= BLIND_SHARE * size], default=0)
         last = max(lines[lines >= (1 - BLIND_SHARE) * size], default=size - 1)
-        at_border |= (places[:, axis] < first + LARGEST_MISS_PX) | (places[:, axis] > last - LARGEST_MISS_PX)
+        at_border |= (places[:, axis] < first + MAX_MISS_PX) | (places[:, axis] > last - MAX_MISS_PX)
     return at_border
 
 
@@ -173,7 +173,7 @@ def _bulges(camera: Camera, surface: Surface, outer: NDArray[np.intp], outwards:
     across = (normals - np.vecdot(normals, sight)[:, None] * sight) @ camera.T_rs[:3, :3]
     outwards = outwards / np.maximum(np.linalg.norm(outwards, axis=1), np.finfo(float).tiny)[:, None]
     leaning = np.vecdot(across[:, :2], outwards) > _LEANING
-    if np.mean(leaning) < _MOST:
+    if np.mean(leaning) < _MIN_SHARE:
         return False
     shares = np.linalg.eigvalsh(outwards[leaning].T @ outwards[leaning] / np.count_nonzero(leaning))
     return bool(shares[0] > _MIN_DIRECTION)

@@ -13,7 +13,7 @@ from calib.lenses.forward import distort, lens_parts
 from calib.lenses.lens import LensModel
 
 #: Bound of the normalised distance from the outline: beyond it, the outline may belong to something else.
-FARTHEST = 8.0
+MAX_DEVIATIONS = 8.0
 
 #: Rim vertices are gathered so many at a time, and then compared all at once.
 _TILE = 64
@@ -51,7 +51,7 @@ def _rim_cost(
     outer, inner, beyond = edges
     last_row, last_column = np.float32(inwards.shape[0] - 1), np.float32(inwards.shape[1] - 1)
     pixels, stride, width = inwards.reshape(-1), np.int32(inwards.shape[1]), np.uintp(inwards.shape[1])
-    most, per_deviation = np.float32(FARTHEST**2), np.float32(1 / deviation)
+    most, per_deviation = np.float32(MAX_DEVIATIONS**2), np.float32(1 / deviation)
     far = 0.0 if last_row > 0 and last_column > 0 else most * outer.size  # there is no pixel between others
     # Gathered first: with that in the same loop, the rest would not be computed for many at once.
     tile, at, seen = np.empty((8, _TILE), np.float32), np.empty(_TILE, np.int32), np.empty(_TILE, np.bool_)

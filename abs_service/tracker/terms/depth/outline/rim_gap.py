@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.terms.depth.outline.rim import Look
-from abs_service.tracker.terms.depth.outline.rim_classes import LARGEST_GAP_STEPS, LARGEST_MISS_PX
+from abs_service.tracker.terms.depth.outline.rim_classes import MAX_GAP_STEPS, MAX_MISS_PX
 from calib.camera import Camera
 
 #: Steps of Newton's method, the share of a step outwards over which its slope is taken, and the least slope: an outline
 #: that is met at a smaller angle than 17° is not looked for along the edge.
-REFINEMENTS, _NEARBY, _LEAST_SLOPE = 5, 0.1, 0.3
+REFINEMENTS, _NEARBY, _MIN_SLOPE = 5, 0.1, 0.3
 
 
 def exact_gap(
@@ -41,7 +41,7 @@ def exact_gap(
         best, least = np.where(nearer, gap, best), np.where(nearer, np.abs(inside), least)
         step_px = (camera.project(ends + _NEARBY * step) - place) / _NEARBY
         length = np.linalg.norm(step_px, axis=1)
-        slope = np.maximum(-np.vecdot(gradients, step_px), _LEAST_SLOPE * length)
-        known = begun & (np.abs(inside) < 2 * LARGEST_MISS_PX) & (slope > 0)
-        gap = np.clip(gap + np.divide(inside, slope, out=np.zeros(len(gap)), where=known), 0.0, LARGEST_GAP_STEPS)
+        slope = np.maximum(-np.vecdot(gradients, step_px), _MIN_SLOPE * length)
+        known = begun & (np.abs(inside) < 2 * MAX_MISS_PX) & (slope > 0)
+        gap = np.clip(gap + np.divide(inside, slope, out=np.zeros(len(gap)), where=known), 0.0, MAX_GAP_STEPS)
     return best.astype(np.float32)

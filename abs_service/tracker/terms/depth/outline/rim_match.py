@@ -1,6 +1,6 @@
 """Search for the outline of an object beside its mesh: free edges are moved in the image until they lie on it.
 
-The cost of an outline is bounded, so edges that are farther away than `rim_cost.FARTHEST` deviations do not feel it. A
+The cost of an outline is bounded, so edges farther away than `rim_cost.MAX_DEVIATIONS` deviations do not feel it. A
 mesh whose object moves faster than was predicted would end where some edges are held by other parts of the outline. So
 a slide and a turn of all edges in the image are looked for first, as in iterative closest points (P. Besl, N. McKay: A
 method for registration of 3-D shapes. IEEE Transactions on Pattern Analysis and Machine Intelligence 14, 1992).

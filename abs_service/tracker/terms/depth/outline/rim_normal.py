@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from calib.jit import kernel
 
 #: So many edges, the edge included, tell the direction of the outline at one of them; or fewer that face as it does.
-EDGES, FEWEST = 7, 3
+EDGES, MIN_EDGES = 7, 3
 
 #: Edges of one side of the mesh: smallest cosine between their directions, more than at a corner. Those of a hexagonal
 #: grid point by up to 30° to the left or to the right of the normal.
@@ -60,5 +60,5 @@ def _rim_directions(places: NDArray[np.float64], directions: NDArray[np.float64]
         for m in nearest[:count]:
             from_x, from_y = places[m, 0] - places[k, 0] - x, places[m, 1] - places[k, 1] - y
             xx, xy, yy = xx + from_x * from_x, xy + from_x * from_y, yy + from_y * from_y
-        angle, tells = np.arctan2(2 * xy, xx - yy) / 2, 1.0 if count >= FEWEST else 0.0
+        angle, tells = np.arctan2(2 * xy, xx - yy) / 2, 1.0 if count >= MIN_EDGES else 0.0
         along[k, 0], along[k, 1] = tells * np.cos(angle), tells * np.sin(angle)

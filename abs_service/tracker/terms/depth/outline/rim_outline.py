@@ -23,7 +23,7 @@ from abs_service.tracker.terms.depth.outline.observed_outline import ObservedRim
 from abs_service.tracker.terms.depth.outline.raggedness import Raggedness
 from abs_service.tracker.terms.depth.outline.rim import Edges, OutlineImage, Rim, read
 from abs_service.tracker.terms.depth.outline.rim_classes import RimClass, classify_rim, turns_away
-from abs_service.tracker.terms.depth.outline.rim_cost import FARTHEST, rim_cost
+from abs_service.tracker.terms.depth.outline.rim_cost import MAX_DEVIATIONS, rim_cost
 from abs_service.tracker.terms.depth.outline.rim_gap import exact_gap
 from abs_service.tracker.terms.depth.outline.rim_normal import rim_directions
 from abs_service.tracker.terms.depth.outline.round_outline import is_round
@@ -71,7 +71,7 @@ class RimOutline:
         self._edges = Edges(rim.outer, rim.inner, np.zeros(len(rim.outer), np.float32))
         self._first, self._was_cut = np.zeros((len(rim.outer), 2)), np.zeros(len(rim.outer), np.bool_)
         self._raggedness = Raggedness(deviation, ragged)
-        self._min_off_px = max(OFF_PX, FARTHEST * deviation)
+        self._min_off_px = max(OFF_PX, MAX_DEVIATIONS * deviation)
         self._images, self._is_round, self._size = 0, False, (camera.width, camera.height)
 
     def observe(
@@ -84,7 +84,7 @@ class RimOutline:
     ) -> ObservedRimOutline:
         """See `Outline`."""
         deviation, off_px = self._raggedness.deviation, max(self._min_off_px, self._raggedness.off_px)
-        part, away = inwards(distance, seen, int(np.ceil(FARTHEST * deviation)) + 1)
+        part, away = inwards(distance, seen, int(np.ceil(MAX_DEVIATIONS * deviation)) + 1)
         first = np.add(corner(window), corner(part))[::-1].astype(np.float32)
         image = OutlineImage(self._camera, self._projection, away, first)
         if not self._images:

@@ -16,7 +16,7 @@ from calib.camera import Camera
 
 #: An outline is round if the squared cosine between its normals and a turn is smaller, on average. That of an ellipse
 #: with axes of 0.85 to 1 is as large, of a hexagon 0.09; pixels alone make 0.002, and 0.006 if noise frays them.
-LARGEST_COSINE_SQUARED = 0.01
+MAX_COSINE_SQUARED = 0.01
 
 #: Standard deviation of the window in which normals of the outline are found [px].
 SMOOTH_PX = 1.5
@@ -41,7 +41,7 @@ def is_round(
     known = np.isfinite(slopes).all(axis=0)
     normals = slopes[:, known].T / np.maximum(np.linalg.norm(slopes[:, known], axis=0), np.finfo(float).tiny)[:, None]
     cosine = np.vecdot(normals, _turn(points, by_place)[known])
-    return len(cosine) >= MIN_RIM and float(np.mean(cosine**2)) < LARGEST_COSINE_SQUARED
+    return len(cosine) >= MIN_RIM and float(np.mean(cosine**2)) < MAX_COSINE_SQUARED
 
 
 def without_turn(

@@ -17,7 +17,7 @@ _ALONG_PX = np.array([-6.0, -3.0, 0.0, 3.0, 6.0])
 
 #: A side is round where its sine at the outline is beyond the first (72°), and from there as far as it is beyond the
 #: second (58°), if that in the image is beyond the third. A sheet may be bent by as much as the second at its edge.
-_CERTAIN_SINE, _GROWING_SINE, _LEAST_MEASURED = 0.95, 0.85, 0.65
+_CERTAIN_SINE, _GROWING_SINE, _MIN_MEASURED = 0.95, 0.85, 0.65
 
 #: Number of neighbouring edges, of which the median counts; and of those that a round one among them makes round: where
 #: an end meets a silhouette, its corner wanders as well.
@@ -63,7 +63,7 @@ def is_round_side(
     at_near, at_far = (centers[1:] + centers[:-1]) / 2
     extrapolated = near + (near - far) * at_near / (at_far - at_near)
     both = _smoothed(np.stack([near, extrapolated], axis=1), near_by)
-    is_steep = both[:, 0] > _LEAST_MEASURED
+    is_steep = both[:, 0] > _MIN_MEASURED
     may_be = is_steep & (both[:, 1] > _GROWING_SINE)
     is_round, beside = may_be & (both[:, 1] > _CERTAIN_SINE), near_by[:, :_BESIDE]
     for _ in places:

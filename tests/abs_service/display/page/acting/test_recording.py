@@ -44,8 +44,8 @@ def test_a_recorder_that_records_always_says_so(wanted):
     ("toml", "said"),
     [
         ('[record]\nwhen = "always"', 'record.when = "always"'),
-        ("", 'With `"asked"`'),
-        ('[record]\nwhen = "asked"', ""),
+        ("", 'With `"requested"`'),
+        ('[record]\nwhen = "requested"', ""),
         ("record = 3", ""),
         ("[", ""),
     ],

@@ -26,7 +26,7 @@ MESHES = {"left": view(SQUARE), "right": view(np.add(SQUARE, (1.0, 0, 0)))}
 
 
 def ray_at(target):
-    """From the camera."""
+    """Ray from the camera."""
     return np.zeros(3), target / np.linalg.norm(target)
 
 

@@ -26,7 +26,7 @@ PREDICTION = MotionPrediction(
 
 
 def optimum(curvature: np.ndarray) -> Optimum:
-    """Of points that only move along x and y with two parameters."""
+    """Optimum of points that only move along x and y with two parameters."""
     local = np.zeros((30, 3, 2))
     local[:, 0, 0] = local[:, 1, 1] = 1.0
     jacobian = SparseJacobian(local, np.zeros(30, np.int32), np.array([[0, 1]]), 2)

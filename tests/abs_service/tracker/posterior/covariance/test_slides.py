@@ -156,17 +156,17 @@ def test_a_strip_whose_gripper_is_fixed_does_not_slide(is_free: bool, expected_m
 def test_information_on_rigid_motions_matches_numpy(seed: int, count: int):
     generator, center, size = np.random.default_rng(seed), np.array([0.1, -0.2, 0.9]), 0.15
     rows, own, places = generator.standard_normal((3, count, 3))
-    known, most = np.zeros((2, 6, 6))
+    known, possible = np.zeros((2, 6, 6))
     sight = generator.standard_normal((count, 3)) * generator.integers(0, 2, (count, 1))  # none for some
     sight /= np.maximum(np.linalg.norm(sight, axis=1, keepdims=True), 1e-9)
-    add_information(rows, own, places, sight, center, size, known, most)
+    add_information(rows, own, places, sight, center, size, known, possible)
     turns = np.cross(np.eye(3), ((places - center) / size)[:, None])  # turn × place, of every axis
     motions = np.concatenate([np.tile(np.eye(3), (count, 1, 1)), turns], axis=1).transpose(0, 2, 1)
     seen, shown = (np.einsum("mi,mik->mk", each, motions) for each in (rows, own))
     np.testing.assert_allclose(known, (seen.T @ shown + shown.T @ seen) / 2, atol=1e-9)
     weighted = motions * np.linalg.norm(rows, axis=1)[:, None, None]
     in_sight = weighted - np.einsum("mi,mj,mjk->mik", sight, sight, weighted)
-    np.testing.assert_allclose(most, np.einsum("mik,mil->kl", in_sight, in_sight), atol=1e-9)
+    np.testing.assert_allclose(possible, np.einsum("mik,mil->kl", in_sight, in_sight), atol=1e-9)
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(0, 4))

@@ -82,11 +82,11 @@ def test_runs_stay_within_the_mesh(seed, rows, columns):
 
 
 @pytest.mark.parametrize(
-    ("least", "mesh"), [(0.99, sheet(17, 18)), (0.9, Nurbs((4, 4), 2).of_mesh(sheet(17, 18)).mesh)]
+    ("minimum", "mesh"), [(0.99, sheet(17, 18)), (0.9, Nurbs((4, 4), 2).of_mesh(sheet(17, 18)).mesh)]
 )
-def test_most_edges_of_a_grid_are_in_few_runs(least, mesh):
+def test_most_edges_of_a_grid_are_in_few_runs(minimum, mesh):
     found = runs_of(mesh)
-    assert len(found.singles) < (1 - least) * len(mesh.edges)
+    assert len(found.singles) < (1 - minimum) * len(mesh.edges)
     assert len(found.runs) < 30
     assert found.runs[:, 2].sum() < 1.3 * len(mesh.edges)
 

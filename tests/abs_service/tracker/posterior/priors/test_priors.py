@@ -14,7 +14,7 @@ from abs_service.tracker.posterior.priors.motion_prediction import MARGIN, Motio
 from abs_service.tracker.posterior.priors.motion_prior import (
     FIRST_INTERVAL_S,
     LAG_MARGIN,
-    LONGEST_INTERVAL_S,
+    MAX_INTERVAL_S,
     MotionPrior,
     RecentMotion,
 )
@@ -65,7 +65,7 @@ def test_motion_fades_with_the_age_of_the_last_estimate():
         for t_ms, x in [(0, 0.0), (50, 0.05)]:
             motion.update(motion.predict(t_ms * MS), np.array([x, 0]), KNOWN)
         travelled.append(motion.predict((50 + gap_ms) * MS).theta[0] - 0.05)
-    expected = [gap * np.exp(-gap / 0.1) for gap in (0.01, 0.1, 0.4, LONGEST_INTERVAL_S)]
+    expected = [gap * np.exp(-gap / 0.1) for gap in (0.01, 0.1, 0.4, MAX_INTERVAL_S)]
     np.testing.assert_allclose(travelled, expected, atol=1e-12)
 
 
@@ -98,7 +98,7 @@ def test_the_cost_is_that_of_a_speed():
     np.testing.assert_allclose(prediction.cost(off), [0.5, 0.5, 0])
 
 
-@pytest.mark.parametrize(("gap_ms", "seconds"), [(20, 0.02), (10_000, LONGEST_INTERVAL_S)])
+@pytest.mark.parametrize(("gap_ms", "seconds"), [(20, 0.02), (10_000, MAX_INTERVAL_S)])
 def test_the_longer_the_gap_the_less_is_known_up_to_a_bound(gap_ms, seconds):
     motion = prior()
     motion.update(motion.predict(0), np.zeros(2), KNOWN)

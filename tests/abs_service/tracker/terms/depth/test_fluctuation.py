@@ -5,7 +5,7 @@ import pytest
 
 from abs_service.tracker.terms.base import Bounds, Prediction
 from abs_service.tracker.terms.depth.depth import DepthTerm
-from abs_service.tracker.terms.depth.fluctuation import FEWEST, MIN_VERTICES, Fluctuation
+from abs_service.tracker.terms.depth.fluctuation import MIN_FRAMES, MIN_VERTICES, Fluctuation
 from calib.camera import Camera
 from calib.noise.constant import Constant
 from tests.abs_service.tracker.scenes import as_surface, depth_image, sparse
@@ -32,7 +32,7 @@ def test_more_noise_than_stated_is_found_whatever_the_model_misses(noise):
     wrinkles = 0.01 * np.sin(np.arange(300))
     for misfit in (np.zeros(300), wrinkles):
         assert after(40, noise, misfit) == pytest.approx(noise, rel=0.15)
-    assert after(FEWEST, noise, wrinkles) == 1  # there are no more than FEWEST − 1 differences
+    assert after(MIN_FRAMES, noise, wrinkles) == 1  # there are no more than MIN_FRAMES − 1 differences
 
 
 def test_a_misfit_that_lasts_or_moves_slowly_is_no_noise():
@@ -66,7 +66,7 @@ def test_what_is_learnt_of_a_frame_counts_from_the_next_one_on():
     vertices = camera.unproject(np.ones((120, 160)))[rows.astype(int), columns.astype(int)].reshape(-1, 3)
     surface = as_surface((vertices, np.tile([0.0, 0.0, -1.0], (len(vertices), 1))))
     term, scales = DepthTerm("tof", sparse(camera), len(vertices), Constant(DEVIATION), Bounds(0.05, 1.6, 4.6)), []
-    for _ in range(FEWEST + 2):
+    for _ in range(MIN_FRAMES + 2):
         frame = term.observe(depth_image(1 + generator.normal(0, 4 * DEVIATION, (120, 160))), Prediction(surface))
         before = frame.fit(surface).normalized_residual
         frame.learn(surface)

@@ -38,7 +38,7 @@ def term(law: NoReturn) -> DepthTerm:
 
 
 def cost_without(law: NoReturn, vertex: int) -> float:
-    """By how much the mesh costs more if nothing returns from the pixel of one vertex [nats]."""
+    """Additional cost of the mesh if nothing returns from the pixel of one vertex [nats]."""
     column, row = np.floor(CAMERA.project(MESH.vertices[vertex : vertex + 1])[0] + 0.5).astype(int)
     whole, lost = turned(), turned()
     lost[row, column] = np.nan

@@ -11,7 +11,7 @@ from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.objectives import likelihood
 from abs_service.tracker.terms.base import Prediction, Term
 from abs_service.tracker.terms.linearization import PointLinearization
-from abs_service.tracker.terms.patches import MOST, SIGMA_PX, SIZE, is_beside, patches_of
+from abs_service.tracker.terms.patches import MAX_PATCHES, SIGMA_PX, SIZE, is_beside, patches_of
 from abs_service.tracker.terms.photometric.channel import ChannelTerm
 from abs_service.tracker.terms.photometric.color import ColorTerm
 from abs_service.tracker.terms.photometric.illumination import Passive
@@ -110,5 +110,5 @@ def test_a_print_that_is_gone_or_outside_the_image_is_found_nowhere():
 def test_patches_cover_the_mesh_and_are_not_too_many(rows, columns):
     mesh = sheet(rows, columns, height=flat)
     patches = patches_of(mesh)
-    count = min(max(len(mesh.vertices) // SIZE, 1), MOST)
+    count = min(max(len(mesh.vertices) // SIZE, 1), MAX_PATCHES)
     np.testing.assert_array_equal(np.unique(patches), np.arange(count))

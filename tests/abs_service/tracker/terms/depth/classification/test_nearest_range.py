@@ -11,7 +11,7 @@ from calib.camera import Camera
 CAMERA = Camera(160, 120, 140.0, 140.0, 79.5, 59.5)
 RAYS = CAMERA.rays() / CAMERA.rays()[..., 2:]
 #: Half the sides of a sheet [m], and what the sensor can measure at least.
-HALF_M, NEAREST_M = np.array([0.1, 0.2]), 0.5
+HALF_M, MIN_DISTANCE_M = np.array([0.1, 0.2]), 0.5
 #: A pixel below the last returns of the sheet that leans towards the camera.
 BELOW = 97, 80
 
@@ -29,7 +29,7 @@ def leaning(lean: float, roll: float = 0.0, noise_m: float = 0.0, away_m: float 
 
 
 def cut(distance: np.ndarray) -> np.ndarray:
-    return np.where(distance * CAMERA.rays()[..., 2] > NEAREST_M, distance, np.nan).astype(np.float32)
+    return np.where(distance * CAMERA.rays()[..., 2] > MIN_DISTANCE_M, distance, np.nan).astype(np.float32)
 
 
 def seen(*images: np.ndarray) -> Visibility:

@@ -7,7 +7,7 @@ import abs_service as a
 from abs_service.tracker.synthesis.window import WHOLE
 from abs_service.tracker.terms.depth.classification.classifier import Classifier
 from abs_service.tracker.terms.depth.classification.separation import separating_step
-from abs_service.tracker.terms.depth.classification.visibility import LARGEST_STEP_M
+from abs_service.tracker.terms.depth.classification.visibility import MAX_STEP_M
 from calib.camera import Camera
 
 CAMERA = Camera(160, 120, 140.0, 140.0, 79.5, 59.5)
@@ -32,11 +32,11 @@ def test_a_flat_thing_is_separated_by_a_step_of_less_than_its_height(height_m, n
 @pytest.mark.parametrize(("height_m", "noise_m"), [(0.1, 1e-3), (0.0, 1e-3), (0.002, 1e-4), (0.01, 6e-3)])
 def test_the_usual_step_is_kept_where_it_separates_or_none_does(height_m, noise_m):
     """A thing that is high enough, none, one that is too flat, and one in too much noise."""
-    assert separating_step(*scene(height_m, noise_m)) == LARGEST_STEP_M
+    assert separating_step(*scene(height_m, noise_m)) == MAX_STEP_M
 
 
 def test_the_usual_step_is_kept_for_a_mesh_out_of_sight():
-    assert separating_step(scene(0.01)[0], np.zeros((120, 160), np.bool_)) == LARGEST_STEP_M
+    assert separating_step(scene(0.01)[0], np.zeros((120, 160), np.bool_)) == MAX_STEP_M
 
 
 @pytest.mark.parametrize("nearer_m", [0.0, 0.02])  # what jumps farther than the finer agreement is classified as usual

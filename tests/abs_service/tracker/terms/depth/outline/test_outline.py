@@ -18,7 +18,7 @@ from abs_service.tracker.terms.base import Bounds, Prediction
 from abs_service.tracker.terms.depth.classification.outline_distance import inwards, outvoted
 from abs_service.tracker.terms.depth.classification.visibility import classify, surfaces_of
 from abs_service.tracker.terms.depth.outline.rim import Edges, Rim, look_up, read
-from abs_service.tracker.terms.depth.outline.rim_cost import FARTHEST, rim_cost
+from abs_service.tracker.terms.depth.outline.rim_cost import MAX_DEVIATIONS, rim_cost
 from calib.lenses.fisheye import KannalaBrandt
 from calib.lenses.lens import Lens
 from calib.noise.constant import Constant
@@ -98,7 +98,8 @@ def test_the_cost_of_the_rim_is_that_of_its_bounded_distances(lens: Lens, seed: 
     undecided = np.any(np.abs(places - np.round(places)) < 1e-3, axis=(0, 2))  # single precision may decide otherwise
     rim = outer[~undecided], inner[~undecided], beyond[~undecided]
     expected = [
-        reference.rim_cost(camera, member.astype(float), *rim, corner, inwards, 0.5, FARTHEST) for member in vertices
+        reference.rim_cost(camera, member.astype(float), *rim, corner, inwards, 0.5, MAX_DEVIATIONS)
+        for member in vertices
     ]
     costs, population = np.empty(2), np.ascontiguousarray(vertices.transpose(0, 2, 1))
     rim_cost(lens)(population, Edges(*rim), Optics.of(camera), inwards, corner, 0.5, costs)
@@ -109,7 +110,7 @@ def test_a_rim_beside_an_image_part_of_one_row_is_far_away():
     rim, costs = Edges(np.array([0]), np.array([1]), np.zeros(1, np.float32)), np.empty(3)
     row = np.zeros((1, 5), np.float32), np.zeros(2, np.float32)
     rim_cost(CAMERA.lens)(np.ones((3, 3, 2), np.float32), rim, Optics.of(CAMERA), *row, 0.5, costs)
-    assert costs.tolist() == [0.5 * FARTHEST**2] * 3
+    assert costs.tolist() == [0.5 * MAX_DEVIATIONS**2] * 3
 
 
 def test_the_outline_is_zero_and_distances_grow_inwards():

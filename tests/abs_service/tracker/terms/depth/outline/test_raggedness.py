@@ -10,9 +10,9 @@ from tests.abs_service.tracker.terms.depth.outline.outline_scene import CAMERA, 
 from tests.abs_service.tracker.terms.depth.outline.test_rim_motion import OUT, PLACES, off
 
 
-def after(away: list[np.ndarray], least: float = 0.5, most: float = 3.0) -> Raggedness:
-    """That of an outline after frames with such distances of its edges."""
-    ragged = Raggedness(least, most)
+def after(away: list[np.ndarray], minimum: float = 0.5, maximum: float = 3.0) -> Raggedness:
+    """Raggedness of an outline after frames with such distances of its edges."""
+    ragged = Raggedness(minimum, maximum)
     for frame in away:
         ragged.update(frame, OUT, PLACES)
     return ragged

@@ -9,7 +9,7 @@ from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.terms.depth.classification.visibility import classify, surfaces_of
 from abs_service.tracker.terms.depth.outline.rim import Rim
 from abs_service.tracker.terms.depth.outline.rim_classes import RimClass
-from abs_service.tracker.terms.depth.outline.rim_cost import FARTHEST
+from abs_service.tracker.terms.depth.outline.rim_cost import MAX_DEVIATIONS
 from tests.abs_service.tracker.scenes import flat, sheet, sparse
 from tests.abs_service.tracker.terms.depth.outline.outline_scene import (
     BESIDE_M,
@@ -222,7 +222,7 @@ def test_the_distance_of_the_edges_from_the_outline_is_told_in_metres():
     longer = look(begun(picture()), np.minimum(picture(), picture(by=0.04)))
     here, y = longer.fit(moved(MESH, 0.0)), np.linspace(-0.1, 0.1, 13)[1:-1]
     nearest = np.minimum(0.04, 0.1 - np.abs(y))
-    off = nearest > FARTHEST * 0.5 / CAMERA.fx  # beyond the bound of the cost
+    off = nearest > MAX_DEVIATIONS * 0.5 / CAMERA.fx  # beyond the bound of the cost
     assert (here.outside, here.inside) == (0, np.count_nonzero(off))
     assert here.off_m == pytest.approx(nearest[off].sum() / here.visible, rel=0.1)
 

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import abs_service as a
-from abs_service.tracker.terms.depth.outline.rim_normal import EDGES, FACING, FEWEST, across_rim, rim_directions
+from abs_service.tracker.terms.depth.outline.rim_normal import EDGES, FACING, MIN_EDGES, across_rim, rim_directions
 from tests.abs_service.tracker.terms.depth.outline.pixelated import (
     HEIGHT,
     WIDTH,
@@ -69,7 +69,7 @@ def test_the_directions_match_numpy(seed: int, count: int):
         apart = np.linalg.norm(places - places[k], axis=1)
         alike = np.flatnonzero((directions @ directions[k] >= FACING) & np.isfinite(apart))
         around = places[alike[np.argsort(apart[alike])[:EDGES]]]
-        if len(around) >= FEWEST:
+        if len(around) >= MIN_EDGES:
             expected[k] = np.linalg.eigh(np.cov(around.T))[1][:, 1]
     found = rim_directions(places, directions)
     np.testing.assert_allclose(np.abs(np.vecdot(found, expected)), np.vecdot(expected, expected), atol=1e-6)

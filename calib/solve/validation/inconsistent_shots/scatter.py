@@ -37,18 +37,18 @@ class Scatter:
         )
 
 
-def scatter(solution: Solution, least_px: float = SCATTERS_PX) -> list[Scatter]:
+def scatter(solution: Solution, minimum_px: float = SCATTERS_PX) -> list[Scatter]:
     """Evidence that images of most shots were taken at different moments: empty, or one `Scatter`.
 
     Args:
         solution: from all shots.
-        least_px: what they miss by together, to be named [px].
+        minimum_px: what they miss by together, to be named [px].
     """
     together = [shot for shot in solution.task.shots if len(_seeing(solution, shot)) > 1]
     corners = [view for view in solution.views if view.of == "corners" and view.shot in together]
     worst = [max(view.rms for view in corners if view.shot == shot) for shot in together]
     joint = float(np.median(worst)) if worst else 0.0
-    if not worst or joint < least_px:
+    if not worst or joint < minimum_px:
         return []
     alone = [fitted for name in solution.task.sensors for fitted in _alone(solution, name, together)]
     if not alone or joint < _BETTER * float(np.median(alone)):

@@ -7,11 +7,11 @@ from numpy.typing import NDArray
 
 from calib.calibration_check.board_poses import solve
 from calib.calibration_check.changes import MIN_SHOTS
-from calib.calibration_check.stored import Stored, Views
+from calib.calibration_check.stored_calibration import Stored, Views
 from calib.solve.bundle import robust
 from calib.solve.bundle.adjustment import NotSolvedError
 from calib.solve.start.board_poses import pose_candidates
-from calib.solve.validation.unlike_shots.foreign_distances import DistanceError, wrong_distances
+from calib.solve.validation.inconsistent_shots.foreign_distances import DistanceError, wrong_distances
 
 
 @dataclass(frozen=True)

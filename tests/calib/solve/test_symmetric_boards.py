@@ -11,7 +11,7 @@ from calib.board.views import CornerView
 from calib.pose import Pose
 from calib.solve.bundle.tasks import SensorTask, Task
 from calib.solve.calibrate import calibrate
-from calib.solve.start.half_turns import numbered_alike
+from calib.solve.start.symmetric_boards import numbered_alike
 from evaluation.scenes.boards import board_views
 from evaluation.scenes.boards.board_views import Head
 

@@ -47,7 +47,7 @@ GAIN = 2.0
 #: Ratio of the disagreement about the focal length to that about all parameters, from which on it is not steady: real
 #: sets have 3.3 at most (nine poses, 4096 pixels), the others 2.1. Beyond the largest deviation the shots say nothing
 #: of the focal length.
-UNSTEADY, LARGEST = 3.5, 0.1
+UNSTEADY, MAX_DEVIATION = 3.5, 0.1
 
 #: Share of the information, by which what some poses do not show at all is kept from dividing by zero.
 _UNSEEN = 1e-9
@@ -103,7 +103,7 @@ def focal_scatter(free: FreeShape, needed_px: float) -> dict[str, float]:
             continue
         focal = of_focal(information, free.poses.prior, scores, directions[:, 0])
         harm = focal.deviation * from_middle_px(free.solution, name)
-        if focal.ratio > UNSTEADY and focal.deviation < LARGEST and harm > HARMLESS * needed_px:
+        if focal.ratio > UNSTEADY and focal.deviation < MAX_DEVIATION and harm > HARMLESS * needed_px:
             found[name] = focal.deviation
     return found
 

@@ -4,18 +4,18 @@ from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
 from calib.solve.calibrate import calibrate
-from calib.solve.regrouping.guesses import by_residuals
+from calib.solve.regrouping.initial_groups import by_residuals
 from calib.solve.regrouping.two_groups import TwoGroups, numbered, two_groups
 from calib.solve.solution import Solution
 from calib.solve.validation.board_shape import ShapeError
 from calib.solve.validation.free_shape import FreeShape
+from calib.solve.validation.inconsistent_shots import changes
+from calib.solve.validation.inconsistent_shots.contradictions import Contradiction, completed, contradictions
+from calib.solve.validation.inconsistent_shots.foreign_distances import wrong_distances
+from calib.solve.validation.inconsistent_shots.groups import groups
+from calib.solve.validation.inconsistent_shots.scatter import SCATTERS_PX, Scatter, scatter, typical_alone
+from calib.solve.validation.inconsistent_shots.steadiness import changes_of_optics, changes_of_place, focal_scatter
 from calib.solve.validation.rolling_shutter import Motion
-from calib.solve.validation.unlike_shots import changes
-from calib.solve.validation.unlike_shots.contradictions import Contradiction, completed, contradictions
-from calib.solve.validation.unlike_shots.foreign_distances import wrong_distances
-from calib.solve.validation.unlike_shots.groups import groups
-from calib.solve.validation.unlike_shots.scatter import SCATTERS_PX, Scatter, scatter, typical_alone
-from calib.solve.validation.unlike_shots.steadiness import changes_of_optics, changes_of_place, focal_scatter
 
 #: Two groups are the explanation if corners then miss by at most this many times what they do in each image alone.
 _EXPLAINED = 1.5
@@ -29,7 +29,7 @@ class ShotDoubts(NamedTuple):
     causes: Sequence[str]
 
 
-def unlike_shots(free: FreeShape, shared: Sequence[ShapeError | Motion], needed_px: float) -> ShotDoubts:
+def inconsistent_shots(free: FreeShape, shared: Sequence[ShapeError | Motion], needed_px: float) -> ShotDoubts:
     """Looks whether all shots show one board and one rig, beside the errors that they share."""
     solution = free.solution
     if wrong := wrong_distances(solution, needed_px):
@@ -78,16 +78,16 @@ def _contradicting(found: Sequence[Contradiction]) -> list[str]:
     ]
 
 
-def _scattered(solution: Solution, contradicting: Sequence[Contradiction], least_px: float) -> list[Scatter]:
-    found = scatter(solution, least_px)
+def _scattered(solution: Solution, contradicting: Sequence[Contradiction], minimum_px: float) -> list[Scatter]:
+    found = scatter(solution, minimum_px)
     if found and contradicting:  # a few wrong shots spoil the others until they are left out
-        found = _scatter_without({one.shot for one in contradicting}, solution, least_px)
+        found = _scatter_without({one.shot for one in contradicting}, solution, minimum_px)
     return found
 
 
-def _scatter_without(shots: Collection[int], solution: Solution, least_px: float) -> list[Scatter]:
+def _scatter_without(shots: Collection[int], solution: Solution, minimum_px: float) -> list[Scatter]:
     rest = solution.task.of_shots([shot for shot in solution.task.shots if shot not in shots])
     try:
-        return scatter(calibrate(rest), least_px)
+        return scatter(calibrate(rest), minimum_px)
     except ValueError:  # nor can the rest be calibrated
-        return scatter(solution, least_px)
+        return scatter(solution, minimum_px)

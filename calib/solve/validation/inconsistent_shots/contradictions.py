@@ -138,7 +138,7 @@ def _hidden(solution: Solution, shot: int, miss: float, boards: Mapping[tuple[st
 
 
 def _with_partner(found: Contradiction, boards: Mapping[tuple[str, int], _Seen]) -> Contradiction:
-    """With the other sensor of a pair whose views each fit alone, and the shots that would fit instead."""
+    """Contradiction with the other sensor of a pair whose views each fit alone, and the shots that would fit."""
     own = {sensor: each for (sensor, shot), each in boards.items() if shot == found.shot}
     pairs = [
         (_apart(own[a].T_rb, own[b].T_rb), a, b)
@@ -177,7 +177,7 @@ def _boards(solution: Solution) -> dict[tuple[str, int], _Seen]:
 
 
 def _nearest(candidates: Sequence[PoseCandidate], solution: Solution, view: CornerView) -> _Seen:
-    """Of the two poses that a planar board may have, the nearer to the solution's if both fit."""
+    """Pose of a view's board alone; where both poses of a planar board fit, the nearer to the solution's."""
     T_rs = solution.cameras[view.sensor].T_rs
     allowed = [one for one in candidates if one.rms_px < 2 * candidates[0].rms_px]
     board = solution.boards.get(view.shot)

@@ -14,8 +14,8 @@ from calib.solve.regrouping.two_groups import numbered, two_groups
 from calib.solve.solution import Solution
 from calib.solve.validation.board_shape import NOTICED, effect_px
 from calib.solve.validation.free_shape import AlongDirections, FreeShape, Members, along, disagreement, once, without
+from calib.solve.validation.inconsistent_shots.steadiness import HARMLESS, from_middle_px, of_focal, optics
 from calib.solve.validation.projection_uncertainty import reach
-from calib.solve.validation.unlike_shots.steadiness import HARMLESS, from_middle_px, of_focal, optics
 
 #: Minimum number of distinct poses, as any few fall into two groups, and of those in the smaller group.
 POSES, MIN_MEMBERS = 12, 3

@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 
 from calib.calibration_check.optics import QUANTILE, optics_change
-from calib.calibration_check.stored import Stored, Views
+from calib.calibration_check.stored_calibration import Stored, Views
 from calib.solve.bundle.adjustment import NotSolvedError
 from calib.solve.bundle.parameters.lens_parameters import MATRIX
 from calib.solve.solution import Solution
-from calib.solve.validation.unlike_shots.steadiness import HARMLESS
+from calib.solve.validation.inconsistent_shots.steadiness import HARMLESS
 from calib.solve.validation.verdict import Assessment
 
 

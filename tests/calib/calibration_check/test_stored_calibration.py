@@ -9,7 +9,7 @@ from calib import pose
 from calib.calibration_check.changes import QUANTILE, PairChange, pair_changes
 from calib.calibration_check.comparison import compare
 from calib.calibration_check.hypotheses import Kind
-from calib.calibration_check.stored import Stored, Views
+from calib.calibration_check.stored_calibration import Stored, Views
 from calib.camera import Camera
 from calib.solve.bundle.parameters.layout import POSE
 from calib.solve.bundle.tasks import SensorTask, Task

@@ -9,8 +9,8 @@ from calib.solve.bundle.adjustment import NotSolvedError
 from calib.solve.bundle.parameters.lens_parameters import ASPECT
 from calib.solve.solution import Solution
 from calib.solve.start.start import fit_camera
+from calib.solve.validation.inconsistent_shots.steadiness import Change, rms
 from calib.solve.validation.support import from_middle
-from calib.solve.validation.unlike_shots.steadiness import Change, rms
 
 #: A change shifts the corners by less than this many times what the shots before and after, fitted alone, say.
 _CONFIRMED = 2.0
@@ -75,11 +75,11 @@ def of_focus(sensor: str, deviation: float) -> str:
     )
 
 
-def unseen(least: Mapping[str, float]) -> str:
+def unseen(hidden: Mapping[str, float]) -> str:
     """Sentence on the least changes of focal lengths [1] that would have shown, by sensor; "" without any."""
-    if not least:
+    if not hidden:
         return ""
-    sensor = max(least, key=lambda name: least[name])
-    of = f"the focal length of {sensor}" if len(least) > 1 else "its focal length"
-    size = f" of less than {max(least[sensor], 0.001):.1%}" if np.isfinite(least[sensor]) else ""
+    sensor = max(hidden, key=lambda name: hidden[name])
+    of = f"the focal length of {sensor}" if len(hidden) > 1 else "its focal length"
+    size = f" of less than {max(hidden[sensor], 0.001):.1%}" if np.isfinite(hidden[sensor]) else ""
     return f" A change of {of} half way{size} would not have shown."
