@@ -159,7 +159,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 @contextmanager
 def _ended_by_interrupt() -> Iterator[None]:
-    """Within it, Ctrl-C is no exception: native libraries take one for a failure of their imports, or swallow it."""
+    """Context in which Ctrl-C is no exception: native libraries take one for a failed import, or swallow it."""
     if signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
         yield
         return

@@ -84,7 +84,7 @@ class Supervisor:
         child.start_at_ns = self._clock() + self._limits.stop_ns
 
     def exchange(self, children: Iterable[Child]) -> None:
-        """Has the given children from now on: those of new components start, those that are not given end in order."""
+        """Exchanges the children for the given ones: new ones start, those that are not given end in order."""
         wanted = {child.component: child for child in children}
         for component in self.children.keys() - wanted.keys():
             self.renew(component)

@@ -84,7 +84,7 @@ class Comparison:
 
     @property
     def rivals(self) -> list[Explanation]:
-        """Others that these shots cannot tell from the chosen one, without those that contain it."""
+        """Explanations that these shots cannot distinguish from the chosen one, without those that contain it."""
         chosen = self.chosen
         return [
             each for each in self._unbeaten if each is not chosen and not each.hypothesis.contains(chosen.hypothesis)

@@ -57,7 +57,7 @@ class LensModel(Protocol):
         ...
 
     def undistort(self, xy: NDArray[np.floating]) -> NDArray[np.float64]:
-        """Same as `inverse`, but raises where there is no solution.
+        """Points without distortion, see `inverse`, which does not raise where there is no solution.
 
         Raises:
             LensError: at least one point has no inverse; names one.

@@ -123,7 +123,7 @@ class MosaicSequence:
 
 
 def select_sigmas(scene: MosaicSequence, sigmas: Sequence[float]) -> dict[str, float]:
-    """Per variant the σ with the smallest mean vertex error in a sequence; a single candidate needs no run."""
+    """Selects per variant the σ with the smallest mean vertex error in a sequence; a single one needs no run."""
     if len(sigmas) == 1:
         return dict.fromkeys(VARIANTS, sigmas[0])
     return {

@@ -1,4 +1,4 @@
-"""Is TRACKING true, and σ: sheets that slide along themselves, and the coverage of the 95 % regions over time.
+"""Truth of TRACKING and σ: sheets that slide along themselves, and the coverage of the 95 % regions over time.
 
 All settings are a user's defaults, but for the cameras, the noise and the sheet's mask; coverage is measured without
 the outline, too. Truth: the states of a sheet that is rendered densely with noise and mixed pixels

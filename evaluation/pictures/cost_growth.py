@@ -32,7 +32,7 @@ def by_vertices() -> dict[int, Case]:
 
 
 def by_population() -> dict[int, Case]:
-    """More and more candidates."""
+    """Cases of growing populations of candidates."""
     surface = nurbs_of((4, 4))
     return {size: whole("", surface, size=size) for size in POPULATIONS}
 

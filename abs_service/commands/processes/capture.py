@@ -148,7 +148,7 @@ def tick(
     health: Health,
     clock: WallClock,
 ) -> None:
-    """Once a second: follows the wall clock, publishes new metadata and the health."""
+    """Follows the wall clock, and publishes new metadata and the health, once a second."""
     if not health.due():
         return
     steps = clock.steps

@@ -28,7 +28,7 @@ def is_own(host: str, origin: str) -> bool:
 
 @contextmanager
 def own_pages_only() -> Iterator[None]:
-    """Within it, servers of websockets that are started answer own pages only; browsers leave that to the server."""
+    """Context in which new servers of websockets answer own pages only; browsers leave that to the server."""
     serve = server.serve
 
     def serve_own(*args: Any, process_request: Callable[[Any, Request], Response | None], **options: Any) -> Any:

@@ -36,7 +36,7 @@ class AlwaysTrigger:
     reason = "always"
 
     def ask(self, recording: bool) -> str:
-        """Refuses."""
+        """Refusal, with its reason."""
         return 'record.when = "always": it records as long as it runs'
 
     def watch(self, sample: Sample) -> None:

@@ -66,7 +66,7 @@ class _NoProcess:
     pid = 0
 
     def poll(self) -> int:
-        """0: ended."""
+        """Exit code 0: there is no process."""
         return 0
 
     def threads(self) -> Mapping[int, ThreadTimes]:

@@ -43,7 +43,7 @@ def ignore(progress: Progress) -> None:
 
 @contextmanager
 def compiled_ahead(report: Callable[[Progress], None] = ignore) -> Iterator[Pool]:
-    """Within it, kernels that the cache lacks are run by Python while others compile them; its end waits for all.
+    """Context in which Python runs kernels that the cache lacks while others compile them; its end waits for all.
 
     Kernels that have been called before are as they were. What could not be compiled elsewhere, such as a kernel that
     is not in a module, is compiled at its next call.
@@ -67,13 +67,13 @@ class NotCachedError(Exception):
 
 
 def cached_only() -> AbstractContextManager[None]:
-    """Within it, a kernel that is not in the cache raises NotCachedError instead of being compiled."""
+    """Context in which a kernel that is not in the cache raises NotCachedError instead of being compiled."""
     return _stood_in_for(lambda kernel: partial(_call_cached, kernel))
 
 
 @contextmanager
 def _stood_in_for(by: Callable[[Kernel], Callable[..., Any]]) -> Iterator[None]:
-    """Within it, something else takes the calls of kernels that have not been called before."""
+    """Context in which a stand-in takes the calls of kernels that have not been called before."""
     taken: list[Kernel] = []
 
     def stand_in(kernel: Kernel) -> Callable[..., Any]:

@@ -51,7 +51,7 @@ class Assembly:
         self.lacks_topology = False
 
     def add_state(self, state: DeformationState) -> None:
-        """A state has arrived."""
+        """Takes a state that has arrived."""
         self._add(self._states, _number(state.header), state)
 
     def add_mesh(self, mesh: DeformedMesh) -> None:
@@ -59,7 +59,7 @@ class Assembly:
         self._add(self._meshes, _number(mesh.header), mesh)
 
     def add_topology(self, topology: MeshTopology) -> None:
-        """A topology has arrived; it may complete what waits."""
+        """Takes a topology that has arrived; it may complete what waits."""
         with self._lock:
             _keep(self._topologies, (topology.header.boot_id, topology.mesh_version), topology)
             for number in list(self._states):

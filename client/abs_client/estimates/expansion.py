@@ -72,7 +72,7 @@ class Expansion:
         self._waiting: CompactState | None = None
 
     def add_topology(self, topology: MeshTopology) -> None:
-        """A topology has arrived; it may complete what waits."""
+        """Takes a topology that has arrived; it may complete what waits."""
         surface = surface_of(topology.basis) if topology.HasField("basis") else None
         with self._lock:
             self._surfaces[topology.header.boot_id, topology.mesh_version] = surface
@@ -85,7 +85,7 @@ class Expansion:
             self.add_compact(waiting)
 
     def add_compact(self, compact: CompactState) -> None:
-        """Theta has arrived.
+        """Takes a theta that has arrived.
 
         Raises:
             MalformedError: it is not of the mesh that it names.

@@ -44,7 +44,7 @@ class KnownSheet:
 
     @property
     def board(self) -> tuple[float, float]:
-        """Any would do."""
+        """Board of the sheet's size; any would do."""
         return BOARD
 
     @cached_property

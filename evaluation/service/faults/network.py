@@ -21,7 +21,7 @@ ADDRESS = "10.213.7.1"
 
 @contextmanager
 def two_hosts() -> Iterator[None]:
-    """`CAMERAS` and `TRACKING` exist, linked to each other and to this host; afterwards nothing is left of them.
+    """Creates the hosts `CAMERAS` and `TRACKING`, linked to each other and to this one, and removes them afterwards.
 
     Raises:
         UnavailableError: the user or the kernel does not permit it; says what was refused.

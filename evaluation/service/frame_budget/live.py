@@ -141,7 +141,7 @@ def observe(take: Path, head: str, run: Run, progress: Callable[[str], None]) ->
 
 @contextmanager
 def _busy(programs: int) -> Iterator[None]:
-    """Other programs that do not rest."""
+    """Load of other programs that do not rest."""
     with ExitStack() as stack:
         for _ in range(programs):
             busy = stack.enter_context(subprocess.Popen([sys.executable, "-c", _BUSY]))

@@ -24,7 +24,7 @@ _ZENOH = re.compile(r"\S+Z +[A-Z]+ .*?ThreadId\(\d+\) (?P<module>[\w:]+): (?P<te
 
 @contextmanager
 def logged() -> Iterator[None]:
-    """Within it, the lines are warnings of the log, and `sys.stdout` writes to where standard output was."""
+    """Context in which the lines are warnings of the log, and `sys.stdout` writes to where standard output was."""
     sys.stdout.flush()
     before, number = sys.stdout, os.dup(1)
     reads, writes = os.pipe()

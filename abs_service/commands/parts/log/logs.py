@@ -72,7 +72,7 @@ def set_up(arguments: argparse.Namespace, command: str, given: Sequence[str]) ->
 
 @contextmanager
 def in_background() -> Iterator[None]:
-    """Within it, nothing waits for a reader of standard error who stands still, as a halted terminal (Ctrl-S)."""
+    """Context in which nothing waits for a halted reader of standard error, such as a terminal after Ctrl-S."""
     handlers = [one for one in logging.getLogger().handlers if getattr(one, "stream", None) is sys.stderr]
     with output.of(sys.stderr) as background:
         for handler in handlers:

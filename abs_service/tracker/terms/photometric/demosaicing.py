@@ -31,5 +31,5 @@ def demosaiced(values: NDArray[np.float32], channel: NDArray[np.uint8]) -> NDArr
 
 
 def _filtered(values: NDArray[np.float32], gains: NDArray[np.integer]) -> NDArray[np.float32]:
-    """Beyond its border the mosaic is mirrored in its outermost pixels, so that the filters go on alternating."""
+    """Filtered mosaic; it is mirrored in its outermost pixels, so that the colours go on alternating beyond them."""
     return np.asarray(cv2.filter2D(values, -1, gains / 16, borderType=cv2.BORDER_REFLECT_101), np.float32)

@@ -1,4 +1,4 @@
-"""Is the mesh of the sponge, in the toy's sequence, still the sponge's: folds, stretch, and drift over the image."""
+"""Quality of the sponge's mesh in the toy's sequence: folds, stretch, and drift over the image."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
