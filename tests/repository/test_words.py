@@ -13,8 +13,8 @@ FOLDERS = ("abs_service", "calib", "client", "drivers", "evaluation", "examples"
 SUPERLATIVES = {"largest", "longest", "farthest", "fewest", "least", "most", "smallest", "shortest", "widest"}
 #: Beginnings of the middle of a sentence: the thing itself is missing.
 FRAGMENT = re.compile(
-    r"(After|Also|As|Both|But|Does|If|In|It|Its|Nothing|Of|Only|Or|So many|Such|That|Their|There|These|They|This|Those"
-    r"|To|Until|At|By|From|With|Without)\b"
+    r"(After|Also|As|At|Beyond|Both|But|By|Does|From|If|In|Is|It|Its|More|Nothing|Of|Once|Only|Or|So many|Such|That"
+    r"|Their|There|These|They|This|Those|To|Until|With|Within|Without)\b"
 )
 QUESTION = re.compile(r'^ *"""(What|How|Where|Whether|Which|Why|When|Who)(ever|se)?\b.*', re.MULTILINE)
 

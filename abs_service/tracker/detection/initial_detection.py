@@ -14,7 +14,7 @@ class DetectionError(ValueError):
 
 
 class UndecidedError(DetectionError):
-    """More images are needed to locate the object."""
+    """Object that can only be located with more images."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
