@@ -18,7 +18,7 @@ from drivers.contract.discovery import Availability, Found
 from drivers.encoding.foreign_recording import ForeignRecording
 
 #: Time beyond its timeout after which a driver is abandoned [s].
-_GRACE_S = 1.0
+GRACE_S = 1.0
 
 
 def open_device(uri: str, clock: Callable[[], int]) -> Device:
@@ -58,14 +58,15 @@ def available() -> list[str]:
     return [scheme for scheme in _modules() if _driver(scheme)]
 
 
-def discover(timeout_s: float) -> list[Found]:
+def discover(timeout_s: float, grace_s: float = GRACE_S) -> list[Found]:
     """Attached devices of all drivers, which search concurrently; never raises.
 
     Args:
-        timeout_s: timeout of each driver. A driver that exceeds it or raises is reported as faulty.
+        timeout_s: timeout of each driver [s]. A driver that exceeds it or raises is reported as faulty.
+        grace_s: time beyond it after which a driver is abandoned [s].
     """
     searches = {scheme: _search(scheme, timeout_s) for scheme in available()}
-    return [one for scheme, search in searches.items() for one in _result(scheme, search, timeout_s + _GRACE_S)]
+    return [one for scheme, search in searches.items() for one in _result(scheme, search, timeout_s, grace_s)]
 
 
 def _search(scheme: str, timeout_s: float) -> Future[list[Found]]:
@@ -82,9 +83,9 @@ def _search(scheme: str, timeout_s: float) -> Future[list[Found]]:
     return result
 
 
-def _result(scheme: str, search: Future[list[Found]], timeout_s: float) -> list[Found]:
+def _result(scheme: str, search: Future[list[Found]], timeout_s: float, grace_s: float) -> list[Found]:
     try:
-        return search.result(timeout_s)
+        return search.result(timeout_s + grace_s)
     except TimeoutError:
         reason, remedy = f"the driver has not answered for {timeout_s:g} s", "on a slow or busy machine: --timeout 30"
     except Exception as error:

@@ -1,11 +1,15 @@
 """Deformation models by their public names; docs/explanation/models.md describes them."""
 
+from collections.abc import Sequence
+from typing import Any
+
 from abs_service.api.checks import ArgumentError
 from abs_service.tracker.models import nurbs
 from abs_service.tracker.models.flexpad import Settings as FlexPad
 from abs_service.tracker.models.gravity import Settings as Gravity
 from abs_service.tracker.models.posed import Settings as Posed
 from abs_service.tracker.models.rigid import Settings as Rigid
+from abs_service.tracking.plan import ModelSettings
 
 __all__ = ["FlexPad", "Gravity", "Nurbs", "Posed", "Rigid"]
 
@@ -21,7 +25,7 @@ def Nurbs(
     margin: float = _DEFAULT.margin,
     smoothing: float = _DEFAULT.smoothing,
     bend_deg: float = _DEFAULT.bend_deg,
-) -> nurbs.Settings:
+) -> ModelSettings:
     """A NURBS surface of any smooth shape; theta lists x, y, z of its control points row by row [m].
 
     Args:
@@ -39,6 +43,8 @@ def Nurbs(
     """
     if (long is None) != (short is None):
         raise ArgumentError(f"long = {long}, short = {short}: give both, or neither")
+    if not _is_table(weights):
+        raise ArgumentError(f"weights = {weights!r}: must be a table, a row of numbers for each of `long`")
     try:
         return nurbs.Settings(
             "auto" if long is None or short is None else (long, short),
@@ -50,3 +56,8 @@ def Nurbs(
         )
     except ValueError as error:
         raise ArgumentError(f"Nurbs: {error}") from error
+
+
+def _is_table(weights: Any) -> bool:
+    """False for what has no rows."""
+    return isinstance(weights, Sequence) and all(isinstance(row, Sequence) for row in weights)

@@ -14,7 +14,7 @@ from abs_service.api import checks
 from abs_service.api.checks import ArgumentError
 from abs_service.api.estimate import Estimate
 from abs_service.api.recorded_estimates import estimates, trackers
-from abs_service.api.rig import Rig
+from abs_service.api.rig import Rig, configured_rig
 from calib.camera import Camera
 from drivers import replay
 from drivers.contract.frame import Frame
@@ -87,7 +87,7 @@ class Recording:
         if not toml:
             raise config.ConfigError(f"{self.path}: no configuration is in this recording")
         settings = config.loads(toml, f"{self.path} (rig.toml)", self.path.resolve().parent)
-        return Rig(settings, self.cameras)
+        return configured_rig(settings, self.cameras)
 
     def images(self, *streams: str) -> Iterator[Image]:
         """Images in the order of their times.
@@ -101,7 +101,9 @@ class Recording:
         """
         for stream in streams:
             if stream not in self.streams:
-                raise ArgumentError(f"{self.path} has no stream {stream!r}; it has {', '.join(self.streams)}")
+                raise ArgumentError(
+                    f"streams = {stream!r}: must be in {self.path}, which has {', '.join(self.streams)}"
+                )
         wanted = {(sensor, name) for sensor, _, name in (stream.partition("/") for stream in streams)}
         return (_image(item) for item in self._images.frames(wanted) if isinstance(item, Frame))
 
@@ -118,18 +120,10 @@ class Recording:
         if not tracker and len(self.trackers) == 1:
             tracker = self.trackers[0]
         if not self.trackers:
-            raise ArgumentError(f"{self.path} has no estimates; `abs-service replay` makes them")
+            raise ArgumentError(f"tracker = {tracker!r}: {self.path} has no estimates; `abs-service replay` makes them")
         if tracker not in self.trackers:
-            raise ArgumentError(f"tracker = {tracker!r}: {self.path} has estimates of {', '.join(self.trackers)}")
+            raise ArgumentError(f"tracker = {tracker!r}: must be in {self.path}, which has {', '.join(self.trackers)}")
         return estimates(self.path, self._contents, tracker)
-
-    def frames(self) -> Iterator[Frame]:
-        """Images as devices deliver them, in the order of their times; `images` has them as arrays.
-
-        Raises:
-            RecordingError: there are no images in the file, or a part of it is damaged.
-        """
-        return (item for item in self._images.frames() if isinstance(item, Frame))
 
     @cached_property
     def _images(self) -> replay.Recording:

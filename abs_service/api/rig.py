@@ -1,6 +1,7 @@
 """A rig file in a program: its cameras, its noise models and its trackers."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal
@@ -8,35 +9,30 @@ from typing import Any, Literal
 from abs_service import config, wiring
 from abs_service.api import checks
 from abs_service.api.checks import ArgumentError
-from abs_service.api.tracker import Tracker
+from abs_service.api.tracker import RigTracker, Tracker
+from abs_service.api.tracker_parts import tracker_parts
 from calib.camera import Camera
 
 _NONE: Mapping[str, Camera] = MappingProxyType({})
 
 
+@dataclass(frozen=True, eq=False)
 class Rig:
     """A rig file; `load_rig` reads one, `Recording.rig` is that of a recording.
-
-    Args:
-        settings: the configuration.
-        cameras: cameras of the sensors as their devices know them; what the file says takes their place.
 
     Attributes:
         name: of the rig.
         sensors, trackers: names.
-        cameras: by sensor: those that the file or `cameras` describes. Others are known when their device is opened.
+        cameras: by sensor: those that the file or the recording has. Others are known when their device is opened.
         noise: noise model of every sensor that has one, by sensor.
     """
 
-    def __init__(self, settings: config.ServiceConfig, cameras: Mapping[str, Camera] = _NONE):
-        self._settings = settings
-        self.name = settings.name
-        self.sensors = tuple(settings.sensors)
-        self.trackers = tuple(settings.trackers)
-        self.cameras: Mapping[str, Camera] = wiring.cameras(settings, cameras)
-        self.noise: Mapping[str, Any] = {
-            name: table.noise for name, table in settings.sensors.items() if table.noise is not None
-        }
+    name: str
+    sensors: tuple[str, ...]
+    trackers: tuple[str, ...]
+    cameras: Mapping[str, Camera]
+    noise: Mapping[str, Any]
+    _settings: config.ServiceConfig = field(repr=False)
 
     def tracker(
         self,
@@ -62,15 +58,17 @@ class Rig:
         if name == "" and len(self.trackers) == 1:
             name = self.trackers[0]
         if name not in self.trackers:
-            raise ArgumentError(f"name = {name!r}: the rig has {', '.join(self.trackers) or 'no trackers'}")
+            raise ArgumentError(
+                f"name = {name!r}: must be a tracker of the rig, {', '.join(self.trackers) or 'it has none'}"
+            )
         known = wiring.cameras(self._settings, {**self.cameras, **given})
         for sensor in self._settings.trackers[name].sensors:
             if sensor not in known:
                 raise ArgumentError(
-                    f'cameras: sensor "{sensor}" of tracker "{name}" has no camera in the rig file; '
-                    f'pass cameras={{"{sensor}": Camera(…)}}'
+                    f'cameras = {dict(given)}: must have one of "{sensor}", a sensor of tracker "{name}" that has '
+                    f'none in the rig file: cameras={{"{sensor}": Camera(…)}}'
                 )
-        return Tracker.configured(self._settings, name, known, geometry, bayer, budget_ms)
+        return RigTracker(tracker_parts(self._settings, name, known, geometry, bayer, budget_ms))
 
 
 def load_rig(path: str | Path) -> Rig:
@@ -80,4 +78,16 @@ def load_rig(path: str | Path) -> Rig:
         ArgumentError: no path.
         ConfigError: names file, key, value and the allowed values, for all that is wrong with it.
     """
-    return Rig(config.load(checks.path(path)))
+    return configured_rig(config.load(checks.path(path)))
+
+
+def configured_rig(settings: config.ServiceConfig, cameras: Mapping[str, Camera] = _NONE) -> Rig:
+    """The rig of a configuration.
+
+    Args:
+        settings: the configuration.
+        cameras: cameras of the sensors as their devices know them; what the configuration says takes their place.
+    """
+    noise = {name: table.noise for name, table in settings.sensors.items() if table.noise is not None}
+    known = wiring.cameras(settings, cameras)
+    return Rig(settings.name, tuple(settings.sensors), tuple(settings.trackers), known, noise, settings)

@@ -3,30 +3,26 @@
 import time
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
-from typing import Literal, Self
+from typing import Literal
 
-import numpy as np
 from numpy.typing import ArrayLike
 
-from abs_service import config, wiring
 from abs_service.api import arguments, checks
 from abs_service.api import noise as noise_models
 from abs_service.api.arguments import ModelPart, NoisePart, Table
-from abs_service.api.arrays import FrameBuilder, object_mask
+from abs_service.api.arrays import object_mask
 from abs_service.api.blas import one_blas_thread
 from abs_service.api.checks import ArgumentError
 from abs_service.api.estimate import Estimate, with_mesh
-from abs_service.api.region_or_mask import RegionOrMask
 from abs_service.api.replayable import Replayable
+from abs_service.api.tracker_parts import TrackerParts, tracker_parts
 from abs_service.pairing.observation import ObservationError
-from abs_service.tracker.detection.initial_detection import DetectionError
 from abs_service.tracking.observer import missing_streams
-from abs_service.tracking.session import TrackingSession
 from abs_service.tracking.tracked_sets import TrackedSet, track_sets
 from abs_service.tracking.warmup.board import warm_up
 from calib.camera import Camera
-from calib.noise.base import NoiseError
-from drivers.contract.frame import FrameSet
+from drivers.contract.frame import Frame, FrameSet
+from drivers.replay import Recording
 
 
 class Tracker:
@@ -90,7 +86,7 @@ class Tracker:
         bayer: Literal["rggb", "bggr", "grbg", "gbrg"] = "rggb",
     ):
         if color is None and color_noise is not None:
-            raise ArgumentError("color_noise is given without the camera: color=Camera(…)")
+            raise ArgumentError(f"color_noise = {color_noise}: must be None without the camera, color=Camera(…)")
         sensor = {"noise": noise_models.StructuredLight() if noise is None else noise, "texture": texture}
         sensor |= {"range_m": range_m, "outlier_share": outlier_share, "no_return": no_return}
         parts = {"model": model, "region": region, "template": template, "synthesis": synthesis, "objective": objective}
@@ -101,54 +97,7 @@ class Tracker:
             cameras[arguments.COLOR] = checks.camera("color", color)
             color_noise = noise_models.Color() if color_noise is None else color_noise
         settings = arguments.configuration(sensor, color_noise, parts, vertices)
-        self._configure(settings, arguments.TRACKER, cameras, geometry, bayer, budget_ms)
-
-    @classmethod
-    def configured(
-        cls,
-        settings: config.ServiceConfig,
-        name: str,
-        cameras: Mapping[str, Camera],
-        geometry: str = "z",
-        bayer: str = "rggb",
-        budget_ms: float | None = None,
-    ) -> Self:
-        """One tracker of a configuration; `Rig.tracker` is the way to it.
-
-        Raises:
-            ArgumentError: the configuration has no such tracker, a sensor has no camera, or a part cannot be made.
-        """
-        tracker = cls.__new__(cls)
-        tracker._configure(settings, name, cameras, geometry, bayer, budget_ms)  # noqa: SLF001  a second constructor
-        return tracker
-
-    def _configure(
-        self,
-        settings: config.ServiceConfig,
-        name: str,
-        cameras: Mapping[str, Camera],
-        geometry: str,
-        bayer: str,
-        budget_ms: float | None,
-    ) -> None:
-        try:
-            plan = wiring.plan(settings, name)
-            rig = wiring.rig(settings, name, cameras)
-        except (wiring.PlanError, NoiseError) as error:
-            raise ArgumentError(arguments.in_arguments(str(error))) from None
-        try:
-            self._region = RegionOrMask(plan.region.build())
-        except DetectionError as error:
-            raise ArgumentError(f"region.{error}") from None
-        try:
-            self._session = TrackingSession(rig, replace(plan, region=self._region))
-        except DetectionError as error:
-            raise ArgumentError(f"template.{error}") from None
-        if budget_ms is not None:
-            checks.positive("budget_ms", budget_ms, "more than 0, or None for no limit")
-        self._budget_ns = np.inf if budget_ms is None else float(budget_ms) * 1e6
-        self._settings, self._name, self._rig, self._plan = settings, name, rig, plan
-        self._frames = FrameBuilder(rig, plan.reference, geometry, bayer)
+        self._parts = tracker_parts(settings, arguments.TRACKER, cameras, geometry, bayer, budget_ms)
 
     def track(
         self,
@@ -178,12 +127,13 @@ class Tracker:
             ArgumentError: an array that does not fit, that nothing uses or that is missing; a time that is not later.
         """
         given = {"depth_m": depth_m, "image": image, "amplitude": amplitude, "deviation_m": deviation_m}
-        self._region.mask = None if mask is None else object_mask(mask, self._rig.sensors[self._plan.reference].camera)
+        parts = self._parts
+        parts.region.mask = None if mask is None else object_mask(mask, parts.camera)
         further = {} if streams is None else checks.mapping("streams", streams, '{"left/depth": array}')
-        frames = self._frames.frame_set(time_s, given | dict(further))
+        frames = parts.frames.frame_set(time_s, given | dict(further))
         estimate = next(self._track([frames]))
         # A tracker that has lost its object advises to bring it back; here it is the image that is to blame.
-        reasons = estimate.reasons and self._frames.without_return(frames)
+        reasons = estimate.reasons and parts.frames.without_return(frames)
         return replace(estimate, reasons=(*reasons, *estimate.reasons)) if reasons else estimate
 
     def replay(self, recording: Replayable) -> Iterator[Estimate]:
@@ -198,22 +148,23 @@ class Tracker:
         """
         if not isinstance(recording, Replayable):
             raise ArgumentError(f"recording = {recording!r}: must be a recording, open_recording(path)")
-        if missing := missing_streams(self._rig.sensors.values(), recording.streams):
-            raise ArgumentError(f"{recording.path} has no {', '.join(missing)}; it has {', '.join(recording.streams)}")
-        synchroniser = wiring.synchroniser(self._settings, self._name, self._rig.sensors.values())
-        self._region.mask = None
-        return self._track(synchroniser.group(recording.frames()))
+        if missing := missing_streams(self._parts.rig.sensors.values(), recording.streams):
+            lacking = f"recording = {recording.path}: must have {', '.join(missing)}"
+            raise ArgumentError(f"{lacking}; it has {', '.join(recording.streams)}")
+        self._parts.region.mask = None
+        frames = (item for item in Recording(recording.path).frames() if isinstance(item, Frame))
+        return self._track(self._parts.synchroniser().group(frames))
 
     def reinitialize(self) -> None:
         """Looks for the object anew in the next frame; safe from any thread."""
-        self._session.reinitialize()
+        self._parts.session.reinitialize()
 
     def warm_up(self) -> None:
         """Compiles the kernels on all cores: up to a minute once per installation, then about a second per process."""
-        warm_up(self._rig, self._plan)
+        warm_up(self._parts.rig, self._parts.plan)
 
     def _track(self, frame_sets: Iterable[FrameSet]) -> Iterator[Estimate]:
-        tracked = track_sets(self._session, frame_sets, time.monotonic_ns, self._budget_ns)
+        tracked = track_sets(self._parts.session, frame_sets, time.monotonic_ns, self._parts.budget_ns)
         try:
             while (found := self._next(tracked)) is not None:
                 yield found
@@ -221,6 +172,14 @@ class Tracker:
             raise ArgumentError(str(error)) from None
 
     def _next(self, tracked: Iterator[TrackedSet]) -> Estimate | None:
+        session = self._parts.session
         with one_blas_thread:
             one = next(tracked, None)
-            return one and with_mesh(one.estimate, self._session.mesh, self._session.mesh_version)
+            return one and with_mesh(one.estimate, session.mesh, session.mesh_version)
+
+
+class RigTracker(Tracker):
+    """A tracker that a rig file describes, in place of arguments."""
+
+    def __init__(self, parts: TrackerParts):
+        self._parts = parts

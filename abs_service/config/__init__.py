@@ -1,6 +1,6 @@
 """The configuration of a rig: TOML on disk, checked and frozen in memory.
 
-Only commands see these objects; everything behind them takes plain arguments.
+Only commands, the public face, the composition root and the evaluation see these objects; parts take plain arguments.
 """
 
 from abs_service.config.errors import ConfigError

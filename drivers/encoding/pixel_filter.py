@@ -65,12 +65,8 @@ def encode(pixels: NDArray[np.generic], mosaic: bool) -> tuple[Filter, bytes]:
     """
     planes = _split(_as_integers(pixels), mosaic)
     chosen = _choose(planes)
-    return chosen, _compressed(planes, chosen)
-
-
-def encode_with(chosen: Filter, pixels: NDArray[np.generic], mosaic: bool) -> bytes:
-    """Compressed pixels, prepared with a given filter; arguments as of `encode`."""
-    return _compressed(_split(_as_integers(pixels), mosaic), chosen)
+    joined = b"".join(_to_bytes(plane) for plane in _filtered(planes, chosen))
+    return chosen, zstandard.ZstdCompressor(compression_params=_PARAMETERS).compress(joined)
 
 
 def decode(data: bytes, chosen: Filter, shape: tuple[int, ...], dtype: np.dtype, mosaic: bool) -> NDArray[np.generic]:
@@ -104,11 +100,6 @@ def decode(data: bytes, chosen: Filter, shape: tuple[int, ...], dtype: np.dtype,
         planes[0] += planes[1]
         planes[2] += planes[1]
     return _joined(planes, shape, mosaic).view(dtype)
-
-
-def _compressed(planes: list[Samples], chosen: Filter) -> bytes:
-    joined = b"".join(_to_bytes(plane) for plane in _filtered(planes, chosen))
-    return zstandard.ZstdCompressor(compression_params=_PARAMETERS).compress(joined)
 
 
 def _as_integers(pixels: NDArray[np.generic]) -> Samples:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from abs_service.pairing.observation import Observation
+from abs_service.tracker.estimates.estimate import Status
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.nurbs import Settings
 from abs_service.tracker.objectives.likelihood import Settings as Likelihood
@@ -84,6 +85,7 @@ def test_whole_frame(benchmark, vertices):
         tracking.track(frame_set(SIMULATION.expose(k)[0], k), lambda: True)
     exposures = [frame_set(SIMULATION.expose(k)[0], k) for k in range(FIRST, FIRST + 20)]
     following = iter(exposures)
-    benchmark.pedantic(
+    estimate = benchmark.pedantic(
         lambda: tracking.track(next(following), lambda: True), rounds=1 if benchmark.disabled else len(exposures)
     )
+    assert estimate.status == Status.TRACKING

@@ -13,15 +13,14 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from mpl_toolkits.mplot3d.axes3d import Axes3D
 from numpy.typing import NDArray
 
-from abs_service import config, wiring
-from abs_service.pairing.synchroniser import Synchroniser
-from abs_service.tracker.estimates.estimate import Estimate
+import abs_service as a
 from abs_service.tracking.log.truth import closest_points
-from abs_service.tracking.observer import streams
-from abs_service.tracking.session import TrackingSession
-from calib.rig import Rig
+from drivers.contract.frame import Frame
 from drivers.simulated import address
 from drivers.simulated.simulation import Simulation
+
+#: The demo rig; `a.load_rig` takes any file, this one comes with the service.
+DEMO = Path(__file__).parents[2] / "abs_service" / "config" / "demo.toml"
 
 #: The demo rig's world, as a depth and a colour camera of today see it.
 URI = "simulated://sheet?seed=1&tof=640x480&color=640x480&texture=paper"
@@ -35,45 +34,48 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("picture", type=Path)
     path = parser.parse_args().picture
-    settings = config.load_default()
     simulation = address.parse(URI).build()
-    rig = wiring.rig(settings, "sheet", {name: head.camera for name, head in simulation.heads.items()})
-    tracking = TrackingSession(rig, wiring.plan(settings, "sheet"))
-    synchroniser = Synchroniser(settings.reference("sheet"), streams(rig.sensors.values()), 1)
-    estimates = [
-        tracking.track(frame_set, lambda: True)
-        for k in range(SHOWN + 1)
-        for frame in simulation.expose(k)[0]
-        for frame_set in synchroniser.add(frame)
-    ]
-    if tracking.mesh is None:
+    cameras = {name: head.camera for name, head in simulation.heads.items()}
+    tracker = a.load_rig(DEMO).tracker("sheet", cameras=cameras, geometry="radial")
+    estimate = [_track(tracker, simulation, k) for k in range(SHOWN + 1)][-1]
+    if not len(estimate.faces):
         raise RuntimeError("the demo rig sees no object")
     figure = Figure(figsize=(14, 3.6), layout="constrained")
     near, seen, mesh = (figure.add_subfigure(place) for place in figure.add_gridspec(1, 3))  # whose titles are in line
-    _draw_images((near, seen), simulation, rig, estimates[-1], tracking.mesh.faces)
-    _draw_mesh(mesh, simulation, estimates[-1].vertices.astype(float), tracking.mesh.faces)
+    _draw_images((near, seen), simulation, estimate)
+    _draw_mesh(mesh, simulation, estimate.vertices.astype(float), estimate.faces)
     figure.savefig(path, dpi=90)
 
 
-def _draw_images(
-    figures: tuple[SubFigure, SubFigure], simulation: Simulation, rig: Rig, estimate: Estimate, faces: NDArray[np.int32]
-) -> None:
-    images = {frame.key: frame for frame in simulation.expose(SHOWN)[0]}
+def _track(tracker: a.Tracker, simulation: Simulation, k: int) -> a.Estimate:
+    images = _images(simulation, k)
+    depth, amplitude = (images["tof", stream].si() for stream in ("depth", "amplitude"))
+    color = images["color", "color"]
+    return tracker.track(depth, time_s=k / simulation.rate_hz, amplitude=amplitude, image=color.data)
+
+
+def _images(simulation: Simulation, k: int) -> dict[tuple[str, str], Frame]:
+    """Images of exposure `k` by sensor and stream."""
+    return {frame.key: frame for frame in simulation.expose(k)[0]}
+
+
+def _draw_images(figures: tuple[SubFigure, SubFigure], simulation: Simulation, estimate: a.Estimate) -> None:
+    images = _images(simulation, SHOWN)
     near, seen = (figure.add_subplot() for figure in figures)
     distance = images["tof", "depth"].si()
     middle = float(np.median(np.linalg.norm(estimate.vertices, axis=1)))
     near.imshow(distance, cmap="viridis", vmin=middle - 0.06, vmax=middle + 0.06, interpolation="nearest")
     figures[0].suptitle("time of flight: distance", fontsize=11)
-    _crop(near, rig, "tof", estimate)
+    _crop(near, simulation, "tof", estimate)
     seen.imshow(images["color", "color"].data, interpolation="nearest")
-    u, v = rig.sensors["color"].camera.project(estimate.vertices).T
-    seen.triplot(u, v, faces, color="white", linewidth=0.6)
+    u, v = simulation.heads["color"].camera.project(estimate.vertices).T
+    seen.triplot(u, v, estimate.faces, color="white", linewidth=0.6)
     figures[1].suptitle("colour, with the tracked mesh", fontsize=11)
-    _crop(seen, rig, "color", estimate)
+    _crop(seen, simulation, "color", estimate)
 
 
-def _crop(axes: Axes, rig: Rig, sensor: str, estimate: Estimate) -> None:
-    pixels = rig.sensors[sensor].camera.project(estimate.vertices)
+def _crop(axes: Axes, simulation: Simulation, sensor: str, estimate: a.Estimate) -> None:
+    pixels = simulation.heads[sensor].camera.project(estimate.vertices)
     low, high = pixels.min(axis=0), pixels.max(axis=0)
     margin = 0.15 * (high - low).max()
     axes.set(xlim=(low[0] - margin, high[0] + margin), ylim=(high[1] + margin, low[1] - margin))

@@ -33,10 +33,3 @@ def test_its_workflow_installs_the_client_and_runs_the_tests():
     commands = [step["run"] for step in workflow["jobs"]["test"]["steps"] if "run" in step]
     assert "#subdirectory=client" in commands[0]
     assert commands[-1] == "pytest"
-
-
-def test_its_readme_installs_first_what_is_on_no_package_index():
-    lines = (FOLDER / "README.md").read_text("utf-8").splitlines()
-    first, own = [line.partition("#")[0].split() for line in lines if line.startswith("pip install")]
-    assert first == ["pip", "install", "path/to/clone/client", "path/to/clone"]
-    assert own == ["pip", "install", "-e", '".[test]"']

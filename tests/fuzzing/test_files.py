@@ -27,6 +27,7 @@ from calib.formats.content import Hints
 from calib.noise.base import NoiseError
 from calib.noise.fit import maps
 from drivers.contract.device import DeviceError
+from drivers.contract.text import printable
 from drivers.encoding.foreign_recording import ForeignRecordingError
 from drivers.encoding.mcap_file import McapFile
 from drivers.image_folder import image_file
@@ -175,6 +176,7 @@ def test_a_damaged_file_is_read_or_refused(target: Target, tmp_path: Path) -> No
         try:
             target.read(path)
         except target.errors as error:
-            str(error)
+            said = str(error)
+            assert said == printable(said) != ""
 
     search(damaged(target.valid), check)

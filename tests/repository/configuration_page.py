@@ -105,7 +105,8 @@ def _keys(path: str, kind: type) -> list[Key]:
     if issubclass(kind, BaseModel):
         defaults = {name: field.get_default(call_default_factory=True) for name, field in kind.model_fields.items()}
     else:
-        defaults = {field.name: field.default for field in dataclasses.fields(kind)}
+        own_first = sorted(dataclasses.fields(kind), key=lambda field: field.name not in kind.__annotations__)
+        defaults = {field.name: field.default for field in own_first}
         parts = {field.name: field.metadata["parts"] for field in dataclasses.fields(kind) if field.metadata}
         hints |= {name: Annotated[Any, values.Plugin(package)] for name, package in parts.items()}
     meanings = {name: text for one in reversed(kind.__mro__) for name, text in _described(one)}

@@ -1,19 +1,12 @@
-"""The pages of docs/: those that code and messages name exist, and troubleshooting has what a tracker says."""
+"""The pages of docs/ and the files that they name exist."""
 
 import re
 import subprocess
-from dataclasses import replace
 from pathlib import Path
 
 import yaml
 
-from abs_service.tracker.estimates import status
-from abs_service.tracker.estimates.shape_quality import ShapeQuality
-from abs_service.tracker.terms.sensor_fit import Remainder, RimFit, SensorFit
-from abs_service.tracker.terms.vertex_counts import VertexCounts
-
 ROOT = Path(__file__).parents[2]
-TROUBLESHOOTING = (ROOT / "docs" / "how-to" / "troubleshooting.md").read_text(encoding="utf-8")
 
 
 def test_every_page_that_a_file_names_exists():
@@ -58,32 +51,6 @@ def test_every_page_of_the_four_parts_is_in_the_navigation():
 def test_every_decision_has_a_number_of_its_own():
     pages = sorted(path.name for path in (ROOT / "docs" / "decisions").glob("[0-9]*.md"))
     assert [name[:4] for name in pages] == [f"{number:04}" for number in range(len(pages))]
-
-
-def test_troubleshooting_has_every_reason_of_a_status():
-    counts = VertexCounts(400, 10, 90, missing=300)
-    nothing_right = SensorFit("tof", 100, 300, 100, 10, -1.0, 1.0, RimFit(20, 10, 10), counts, Remainder(0.9, 0.0))
-    doubtful = replace(nothing_right, inliers=50)
-    out_of_sight = replace(nothing_right, inliers=100, occluded=50)
-    surprised = replace(nothing_right, remainder=Remainder(), is_surprised=True)
-    within = replace(nothing_right, rim=RimFit(20, 0, 20))
-    bad = ShapeQuality(folded_share=0.5, deviation_m=1.0, single_frame_deviation_m=1.0)
-    found = [
-        status.judge([fit], ["color"], bad, 9.9, status.Settings())[1]
-        for fit in (nothing_right, doubtful, out_of_sight, surprised, within)
-    ]
-    assert [len(reasons) for reasons in found] == [8, 8, 8, 8, 8]
-    found.append(
-        status.judge([nothing_right], (), ShapeQuality(single_frame_deviation_m=1.0), 0.0, status.Settings())[1]
-    )
-    reasons = {reason for of in found for reason in of}
-    assert len(reasons) == 14
-    page = _without_numbers(TROUBLESHOOTING)
-    assert [reason for reason in reasons if _without_numbers(reason.partition(" so far")[0]) not in page] == []
-
-
-def _without_numbers(text: str) -> str:
-    return re.sub(r"\d+", "#", " ".join(text.split()))
 
 
 def _tracked(*patterns: str) -> list[str]:

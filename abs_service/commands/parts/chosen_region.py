@@ -76,8 +76,12 @@ def in_polygon(region: RegionSettings, polygon: tuple[Pixel, ...]) -> RegionSett
         case nearest.Settings():
             return replace(region, polygon=polygon)
         case seed.Settings() | distance.Settings():
-            kept = region.maximum_step_m, region.minimum_pixels, region.within
-            return nearest.Settings(*kept, polygon)
+            return nearest.Settings(
+                maximum_step_m=region.maximum_step_m,
+                minimum_pixels=region.minimum_pixels,
+                within=region.within,
+                polygon=polygon,
+            )
         case _:
             return nearest.Settings(polygon=polygon)
 

@@ -1,1 +1,1 @@
-"""Terms: negative log-likelihood of one sensor's image, one file per kind of sensor."""
+"""Terms: negative log-likelihood of one sensor's image: depth, pictures or a light barrier; and their parts."""

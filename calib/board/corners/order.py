@@ -42,6 +42,12 @@ def cells(lattice: Lattice) -> Lattice:
     return 0.25 * (lattice[1:, 1:] + lattice[:-1, 1:] + lattice[1:, :-1] + lattice[:-1, :-1])
 
 
+def brightness(places: Lattice, levels: Grey) -> NDArray[np.floating]:
+    """Brightness (rows, columns) at places (rows, columns, 2) [px] of an image."""
+    u, v = np.moveaxis(places, -1, 0)
+    return map_coordinates(levels.astype(np.float32), [v, u], order=1, mode="nearest")
+
+
 def _ways(lattice: Lattice) -> list[Lattice]:
     """Possible orders of the points, all right-handed."""
     seen = lattice if is_right_handed(lattice) else lattice[:, ::-1]
@@ -51,10 +57,9 @@ def _ways(lattice: Lattice) -> list[Lattice]:
 
 def _first_is_black(lattice: Lattice, levels: Grey) -> bool:
     """True if the square after the first corner is black, like the one in the board's corner."""
-    u, v = np.moveaxis(cells(lattice), -1, 0)
-    brightness = map_coordinates(levels.astype(np.float32), [v, u], order=1, mode="nearest")
-    black = np.indices(brightness.shape).sum(axis=0) % 2 == 0
-    return bool(brightness[black].mean() < brightness[~black].mean())
+    squares = brightness(cells(lattice), levels)
+    black = np.indices(squares.shape).sum(axis=0) % 2 == 0
+    return bool(squares[black].mean() < squares[~black].mean())
 
 
 def _rightwards(lattice: Lattice) -> float:

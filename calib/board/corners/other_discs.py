@@ -3,9 +3,9 @@
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import map_coordinates
 
 from calib.board.corners.errors import OtherBoardError
+from calib.board.corners.order import brightness
 from calib.board.corners.search import count_of_discs, find
 from calib.board.corners.to_8bit import Grey
 from calib.board.target import AsymmetricCircles, Circles
@@ -26,12 +26,12 @@ def require_end(points: NDArray[np.float64], levels: Grey) -> None:
     Raises:
         OtherBoardError: one more row or column follows.
     """
-    between, discs = (_brightness(places, levels) for places in (_between(points), points))
+    between, discs = (brightness(places, levels) for places in (_between(points), points))
     middle = (np.median(between) + np.median(discs)) / 2
     for lattice, words in ((points, "rows"), (points.transpose(1, 0, 2), "columns")):
         for side in (lattice, lattice[::-1]):
             beyond = (side[0] + side[1] - side[2])[None]  # in a grid with shifted rows as well
-            dark, bright = _brightness(beyond, levels) < middle, _brightness(_between(beyond), levels) > middle
+            dark, bright = brightness(beyond, levels) < middle, brightness(_between(beyond), levels) > middle
             inside = np.all((beyond >= 0) & (beyond <= np.array(levels.shape[::-1]) - 1), axis=-1)
             if inside.sum() >= _MIN_DISCS and dark[inside].mean() >= _ROW and bright[inside[:, 1:]].mean() >= _ROW:
                 rows, columns = points.shape[:2]
@@ -44,12 +44,6 @@ def require_end(points: NDArray[np.float64], levels: Grey) -> None:
 def _between(lattice: NDArray[np.float64]) -> NDArray[np.float64]:
     """Middles between neighbours along the rows (rows, columns - 1, 2)."""
     return (lattice[:, 1:] + lattice[:, :-1]) / 2
-
-
-def _brightness(places: NDArray[np.float64], levels: Grey) -> NDArray[np.floating]:
-    """Brightness (rows, columns) at places (rows, columns, 2) [px]."""
-    u, v = np.moveaxis(places, -1, 0)
-    return map_coordinates(levels.astype(np.float32), [v, u], order=1, mode="nearest")
 
 
 def other_discs(target: Circles | AsymmetricCircles, levels: Grey) -> str:

@@ -5,11 +5,10 @@ from collections.abc import Callable, Iterator
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import map_coordinates
 
 from calib.board.april_grid import AprilGrid
 from calib.board.corners.april_tags import find_april_grid
-from calib.board.corners.order import cells
+from calib.board.corners.order import brightness, cells
 from calib.board.corners.to_8bit import Grey, local_contrast
 from calib.board.target import AsymmetricCircles, Charuco, Chessboard, Circles, Target
 
@@ -136,17 +135,11 @@ def _by_sectors(target: Chessboard, levels: Grey) -> Found:
 
 def _alternates(lattice: NDArray[np.float64], levels: Grey) -> bool:
     """True if of any two neighbouring cells between the corners one is dark and one bright, as on a chessboard."""
-    brightness = _brightness(lattice, levels)
-    signs = 1 - 2.0 * (np.indices(brightness.shape).sum(axis=0) % 2)
-    steps = [signs[1:] * np.diff(brightness, axis=0), signs[:, 1:] * np.diff(brightness, axis=1)]
+    squares = brightness(cells(lattice), levels)
+    signs = 1 - 2.0 * (np.indices(squares.shape).sum(axis=0) % 2)
+    steps = [signs[1:] * np.diff(squares, axis=0), signs[:, 1:] * np.diff(squares, axis=1)]
     rises = np.concatenate([step.ravel() for step in steps])
     return bool((rises > 0).all() or (rises < 0).all())
-
-
-def _brightness(lattice: NDArray[np.float64], levels: Grey) -> NDArray[np.floating]:
-    """Brightness (rows - 1, columns - 1) in the middle of the cells between corners (rows, columns, 2)."""
-    u, v = np.moveaxis(cells(lattice), -1, 0)
-    return map_coordinates(levels.astype(np.float32), [v, u], order=1, mode="nearest")
 
 
 def chessboard_size(levels: Grey) -> tuple[int, int]:
@@ -161,9 +154,9 @@ def chessboard_size(levels: Grey) -> tuple[int, int]:
         return 0, 0
     rim = ((1, 1), (1, 1), (0, 0))
     beyond = 0.5 * (np.pad(corners, rim, "reflect", reflect_type="odd") + np.pad(corners, rim, "edge"))  # half squares
-    brightness = _brightness(beyond, levels)
+    found = brightness(cells(beyond), levels)
     sizes = []
-    for squares in (brightness, brightness.T):
+    for squares in (found, found.T):
         contrasts = np.median(np.abs(np.diff(squares, axis=1)), axis=1)
         ends = contrasts[[0, -1]] < _FRAME * np.median(contrasts[1:-1])
         sizes.append(len(squares) - 1 - int(ends.sum()))

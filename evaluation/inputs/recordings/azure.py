@@ -1,29 +1,26 @@
 """One frame of an Azure Kinect: two cameras with the factory's calibration, warped into each other and tracked."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+import abs_service as a
 from abs_service.report.content import Column, Section, Table
 from abs_service.tracker.detection.depth_view import DepthView
 from abs_service.tracker.detection.regions import nearest
-from abs_service.tracker.models import nurbs
-from abs_service.tracking.session import TrackingSession
-from calib.camera import Camera
-from calib.noise.constant import Constant
-from calib.noise.images.color import GaussianColor
-from calib.rig import Rig, Sensor
 from calib.warp.pictures import PictureLookup
-from drivers.contract.frame import Frame, FrameSet, Kind
+from drivers.contract.frame import Frame, Kind
 from drivers.opening import open_recording
 from evaluation.experiment import Findings, at_least, at_most
 from evaluation.inputs.recordings.agreement import agreement
-from evaluation.sequences import demo_plan
 
 FOLDER = "tof_azure_kinect_pyk4a"
+
+#: At which the one exposure is shown again and again.
+RATE_HZ = 30.0
 
 #: Shift that separates edges of the infra-red from edges of the colours [px].
 SHIFT = 8
@@ -31,13 +28,16 @@ SHIFT = 8
 #: σ of this camera's distances within its range, by its data sheet at most [m].
 SIGMA_M = 0.005
 
+#: Smallest surface that the nearest one is looked for among [pixels].
+MIN_PIXELS = 3000
+
 
 @dataclass(frozen=True, eq=False)
 class AzureExposure:
     """The first exposure: its frames by kind and the cameras by sensor."""
 
     frames: Mapping[Kind, Frame]
-    cameras: Mapping[str, Camera]
+    cameras: Mapping[str, a.Camera]
 
     @property
     def distance(self) -> NDArray[np.float32]:
@@ -91,16 +91,18 @@ def findings(folder: Path) -> Findings:
     """Registration of colours and amplitudes, and residuals of a surface tracked on the repeated frame."""
     exposure = read(folder)
     ratio = edges_agree(exposure)
-    noises = {"depth": Constant(SIGMA_M), "color": GaussianColor(15.0)}
-    rig = Rig("azure", {name: Sensor(name, exposure.cameras[name], noise) for name, noise in noises.items()})
-    plan = demo_plan(nurbs.Settings((6, 6)), reference="depth", region=nearest.Settings(minimum_pixels=3000))
-    tracking = TrackingSession(rig, plan)
-    estimate = [tracking.track(_again(exposure, k), lambda: True) for k in range(3)][-1]
-    if tracking.mesh is None:
+    depth, color = (exposure.cameras[name] for name in ("depth", "color"))
+    tracker = a.Tracker(
+        depth, a.Nurbs(6, 6), noise=a.noise.Constant(SIGMA_M), color=color,
+        region={"type": "nearest", "minimum_pixels": MIN_PIXELS},
+    )  # fmt: skip
+    depth_m, image = exposure.frames[Kind.DEPTH].si(), exposure.rgb
+    estimate = [tracker.track(depth_m, time_s=k / RATE_HZ, image=image) for k in range(3)][-1]
+    if not len(estimate.faces):
         raise RuntimeError(", ".join(estimate.reasons))
-    camera = exposure.cameras["depth"]
-    mask = plan.region.build().select(DepthView.of(exposure.distance, camera))
-    found = agreement(estimate.vertices, tracking.mesh.faces, exposure.distance, mask, camera)
+    region = nearest.Settings(minimum_pixels=MIN_PIXELS).build()
+    mask = region.select(DepthView.of(exposure.distance, depth))
+    found = agreement(estimate.vertices, estimate.faces, exposure.distance, mask, depth)
     columns = (Column("nearest surface"), Column("pixels", format="d"), Column("forward", "mm", ".2f"))
     columns += (Column("backward", "mm", ".2f"), Column("covered", "%", ".1f"), Column("status"))
     row = (f"{np.median(exposure.distance[mask]):.2f} m away", int(mask.sum()), found.forward_mm, found.backward_mm)
@@ -114,9 +116,3 @@ def findings(folder: Path) -> Findings:
         (Section("Azure Kinect: one frame", (text, table)),),
         {"azure": {"edges": ratio, "forward_mm": found.forward_mm, "backward_mm": found.backward_mm}},
     )
-
-
-def _again(exposure: AzureExposure, k: int) -> FrameSet:
-    """The exposure once more, k frames later."""
-    frames = [replace(frame, t_host_ns=frame.t_host_ns + k * 33_333_333) for frame in exposure.frames.values()]
-    return FrameSet(k, frames[0].t_host_ns, {frame.key: frame for frame in frames})

@@ -12,23 +12,17 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.detection.regions.mask import Mask
+import abs_service as a
 from abs_service.tracker.detection.segments.depth_segments import connected_surfaces
-from abs_service.tracker.models import nurbs
-from abs_service.tracker.optimizers import hybrid
 from abs_service.tracker.synthesis.rasterization.raster import Raster
-from abs_service.tracking.session import TrackingSession
-from calib.camera import Camera
 from calib.noise import constant, measured
 from calib.noise.base import DepthNoise
 from calib.noise.fit import quality
 from calib.noise.fit.quality import Quality
 from calib.noise.fit.samples import Samples, from_images
-from calib.rig import Rig, Sensor
 from calib.sequences import plane_residuals
-from drivers.contract.frame import Frame, FrameSet, Kind
+from drivers.contract.frame import Frame, Kind
 from drivers.o3r.buffers import SENSOR, O3rBuffers
-from evaluation.sequences import demo_plan
 
 #: Neighbouring pixels whose distances differ by more show different surfaces [m].
 MAX_STEP_M = 0.015
@@ -38,9 +32,12 @@ MIN_PIXELS = 700
 PARTS = 10
 
 #: The box has edges that a smaller margin does not reach around.
-MODEL = nurbs.Settings((6, 6), margin=0.2)
+MODEL = a.Nurbs(6, 6, margin=0.2)
 #: The mesh begins where the frame says; there is nothing to look for farther away.
-SEARCH = hybrid.Settings(restarts=0)
+SEARCH = {"type": "hybrid", "restarts": 0}
+
+#: The noise models that are compared.
+Noise = constant.Constant | measured.Measured
 
 CLAIMED = "the sensor's own σ as it is"
 ONE = "one σ for all pixels"
@@ -52,7 +49,7 @@ class O3rExposure:
     """The frames of one exposure by what they hold, and what took them."""
 
     frames: Mapping[Kind, Frame]
-    camera: Camera
+    camera: a.Camera
 
     def image(self, kind: Kind) -> NDArray[np.float64]:
         """One of them (height, width) in SI units, NaN without return."""
@@ -67,16 +64,6 @@ class Row:
     model: DepthNoise
     quality: Quality
     pixels: int
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Surface:
-    """The settings of a region: one surface of the frame."""
-
-    pixels: NDArray[np.bool_]
-
-    def build(self) -> Mask:
-        return Mask(self.pixels)
 
 
 def read(folder: Path) -> O3rExposure:
@@ -114,7 +101,7 @@ def _row(name: str, results: list[tuple[DepthNoise, Samples]]) -> Row:
     return Row(name, model, Quality(*means), int(weights.sum()))
 
 
-def noises(exposure: O3rExposure) -> dict[str, DepthNoise]:
+def noises(exposure: O3rExposure) -> dict[str, Noise]:
     """The noise models, fitted to how pixels deviate from planes through their neighbours."""
     distance, own = exposure.image(Kind.DEPTH), exposure.image(Kind.DEVIATION)
     aside = plane_residuals.normalized(distance, np.ones_like(distance), exposure.camera.rays())
@@ -129,7 +116,7 @@ def _without(exposure: O3rExposure, hidden: NDArray[np.bool_]) -> O3rExposure:
     return replace(exposure, frames={**exposure.frames, Kind.DEPTH: replace(depth, data=data)})
 
 
-def _hidden(seen: O3rExposure, noise: DepthNoise, whole: O3rExposure) -> Iterator[Samples]:
+def _hidden(seen: O3rExposure, noise: Noise, whole: O3rExposure) -> Iterator[Samples]:
     """Pixels of every surface that the tracker did not see, with its mesh as the true surface."""
     labels = connected_surfaces(seen.frames[Kind.DEPTH].si(), MAX_STEP_M).labels
     sizes = np.bincount(labels.ravel())
@@ -141,13 +128,12 @@ def _hidden(seen: O3rExposure, noise: DepthNoise, whole: O3rExposure) -> Iterato
         yield from_images(np.where(there, distance, np.nan), found, own).take(there.ravel())
 
 
-def _rendered(exposure: O3rExposure, noise: DepthNoise, surface: NDArray[np.bool_]) -> NDArray[np.float64]:
+def _rendered(exposure: O3rExposure, noise: Noise, surface: NDArray[np.bool_]) -> NDArray[np.float64]:
     """Radial distances (height, width) [m] of the mesh that the tracker makes of some pixels; NaN beside it."""
-    rig = Rig("o3r", {SENSOR: Sensor(SENSOR, exposure.camera, noise)})
-    plan = demo_plan(MODEL, reference=SENSOR, region=_Surface(surface), vertices=300, optimizer=SEARCH)
-    tracking, frames = TrackingSession(rig, plan), {frame.key: frame for frame in exposure.frames.values()}
-    estimate = tracking.track(FrameSet(0, exposure.frames[Kind.DEPTH].t_host_ns, frames), lambda: True)
-    if tracking.mesh is None:
+    tracker = a.Tracker(exposure.camera, MODEL, noise=noise, vertices=300, optimizer=SEARCH, geometry="radial")
+    own = exposure.image(Kind.DEVIATION) if noise.uses_amplitude else None
+    estimate = tracker.track(exposure.image(Kind.DEPTH), time_s=0.0, deviation_m=own, mask=surface)
+    if not len(estimate.faces):
         raise RuntimeError(f"{np.count_nonzero(surface)} pixels: {', '.join(estimate.reasons)}")
-    image = Raster(exposure.camera, tracking.mesh.faces).render(np.ascontiguousarray(estimate.vertices.T))
+    image = Raster(exposure.camera, estimate.faces).render(np.ascontiguousarray(estimate.vertices.T))
     return np.where(np.isfinite(image), image, np.nan).astype(np.float64)

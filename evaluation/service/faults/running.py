@@ -11,7 +11,6 @@ from typing import Any, Protocol
 
 import tomli_w
 from absmsg.v1.frame_info_pb2 import FrameInfo
-from mcap.reader import make_reader
 
 from abs_service.bus import keys
 from abs_service.recording.recovery import RecoveryError, leftovers, recover
@@ -19,6 +18,7 @@ from evaluation.experiment import UnavailableError
 from evaluation.service.faults.listener import DEPTH, Listener
 from evaluation.service.live.rig import TRACKER, demo_table, endpoint_of
 from evaluation.service.live.service import Service
+from evaluation.service.messages import recorded_messages
 
 NAME = "faults"
 #: The first start on a machine compiles the kernels [s].
@@ -140,11 +140,8 @@ class RunningRig:
             for path in leftovers(folder):
                 with suppress(RecoveryError, OSError):
                     recover(path)
-            for path in folder.glob("*.mcap"):
-                with path.open("rb") as stream:
-                    messages = make_reader(stream).iter_messages(f"/{keys.info(DEPTH)}", log_time_order=False)
-                    infos = (FrameInfo.FromString(message.data) for *_, message in messages)
-                    found |= {info.header.stamp.ToNanoseconds() for info in infos}
+            infos = (FrameInfo.FromString(one.data) for _, one in recorded_messages(folder, [keys.info(DEPTH)]))
+            found |= {info.header.stamp.ToNanoseconds() for info in infos}
         return found
 
     @staticmethod

@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 from absmsg.v1.deformation_state_pb2 import DeformationState
 from absmsg.v1.deformed_mesh_pb2 import DeformedMesh, MeshTopology
-from mcap.reader import make_reader
 from numpy.typing import NDArray
 
 from abs_service.bus import keys
 from abs_service.recording.recording_file import ESTIMATES
 from abs_service.tracking.log.truth import TruthComparison
 from evaluation.service.frame_budget.rig import TRACKER
+from evaluation.service.messages import recorded_messages
 
 #: Positions (rows, columns, 3) [m] of the true surface at an exposure.
 Truth = Callable[[int], NDArray[np.float32]]
@@ -62,11 +62,9 @@ def recorded(folder: Path, head: str) -> dict[int, TrackedFrame]:
     states: dict[int, DeformationState] = {}
     meshes: dict[int, DeformedMesh] = {}
     topologies: dict[int, MeshTopology] = {}
-    topics = {f"/{topic}": place for topic, place in _places(states, meshes, topologies).items()}
-    for path in sorted(folder.glob(f"*{ESTIMATES}.mcap")):
-        with path.open("rb") as stream:
-            for _, channel, message in make_reader(stream).iter_messages(list(topics)):
-                topics[channel.topic](message.data)
+    places = _places(states, meshes, topologies)
+    for topic, message in recorded_messages(folder, places, ESTIMATES):
+        places[topic](message.data)
     exposures = {t: k for t, state in states.items() for k in _exposure(state, head)}
     return {
         exposures[t]: TrackedFrame(

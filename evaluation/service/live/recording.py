@@ -3,7 +3,7 @@
 from collections.abc import Collection, Mapping
 from pathlib import Path
 
-from mcap.reader import make_reader
+from evaluation.service.messages import recorded_messages
 
 
 def sequence_numbers(folder: Path, topics: Collection[str]) -> Mapping[str, frozenset[int]]:
@@ -14,12 +14,8 @@ def sequence_numbers(folder: Path, topics: Collection[str]) -> Mapping[str, froz
         topics: as on the bus, such as `tof/depth/image`.
     """
     found: dict[str, set[int]] = {topic: set() for topic in topics}
-    for path in sorted(folder.glob("*.mcap")):
-        with path.open("rb") as stream:
-            # In the order of the file: sorting by time would keep whole chunks of images in memory.
-            messages = make_reader(stream).iter_messages([f"/{topic}" for topic in topics], log_time_order=False)
-            for _, channel, message in messages:
-                found[channel.topic.removeprefix("/")].add(message.sequence)
+    for topic, message in recorded_messages(folder, topics):
+        found[topic].add(message.sequence)
     return {topic: frozenset(seqs) for topic, seqs in found.items()}
 
 

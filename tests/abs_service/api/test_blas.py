@@ -1,7 +1,6 @@
 """A program's BLAS has one thread while a frame is computed, and its own number before and after."""
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
 
@@ -10,7 +9,9 @@ from threadpoolctl import threadpool_info, threadpool_limits
 
 import abs_service as a
 from abs_service.api.blas import one_blas_thread
+from drivers.contract.device import Truth
 from drivers.contract.frame import Frame
+from drivers.replay import Recording
 
 SAMPLE = Path(__file__).parents[3] / "recordings" / "sample.mcap"
 
@@ -23,24 +24,6 @@ def threads() -> set[int]:
 def two_threads() -> Iterator[None]:
     with threadpool_limits(2, user_api="blas"):
         yield
-
-
-@dataclass
-class Looking:
-    """A recording whose reader looks at BLAS whenever the tracker asks for an image."""
-
-    recording: a.Recording
-    path: Path = SAMPLE
-    seen: list[set[int]] = field(default_factory=list)
-
-    @property
-    def streams(self) -> Mapping[str, int]:
-        return self.recording.streams
-
-    def frames(self) -> Iterator[Frame]:
-        for frame in self.recording.frames():
-            self.seen.append(threads())
-            yield frame
 
 
 def test_the_last_one_inside_gives_the_threads_back():
@@ -57,10 +40,18 @@ def test_an_error_inside_gives_the_threads_back():
     assert threads() == {2}
 
 
-def test_a_frame_is_computed_with_one_thread():
+def test_a_frame_is_computed_with_one_thread(monkeypatch: pytest.MonkeyPatch):
+    """The reader of the recording looks whenever the tracker asks for an image."""
+    seen: list[set[int]] = []
+
+    def frames(recording: Recording, read=Recording.frames) -> Iterator[Frame | Truth]:
+        for frame in read(recording):
+            seen.append(threads())
+            yield frame
+
+    monkeypatch.setattr(Recording, "frames", frames)
     recording = a.open_recording(SAMPLE)
-    looking = Looking(recording)
-    for _ in islice(recording.rig.tracker().replay(looking), 3):
+    for _ in islice(recording.rig.tracker().replay(recording), 3):
         assert threads() == {2}
-    assert looking.seen
-    assert set.union(*looking.seen) == {1}
+    assert seen
+    assert set.union(*seen) == {1}

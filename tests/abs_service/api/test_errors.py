@@ -94,7 +94,10 @@ def test_what_a_noise_model_depends_on_must_be_given(noise, missing):
         ({"range_m": 0}, r"^Tracker: range_m = 0: must be greater than 0"),
         ({"no_return": {"share": 1.5}}, r"^Tracker: no_return\.share = 1\.5: must be less than 1"),
         ({"priors": {"strech": 0.1}}, r"^Tracker: priors\.strech: unknown key, did you mean \"stretch\"\?"),
-        ({"color_noise": a.noise.Color()}, r"color_noise is given without the camera: color=Camera"),
+        (
+            {"color_noise": a.noise.Color()},
+            r"color_noise = .*\(sigma=15\.0\): must be None without .*color=Camera",
+        ),
         ({"color": CAMERA, "color_noise": a.noise.Color(0)}, r"^Tracker: color_noise\.sigma = 0: must be greater"),
         ({"geometry": "euclidean"}, r"geometry = 'euclidean': must be \"z\" or \"radial\""),
         ({"bayer": "rgbg"}, r"bayer = 'rgbg': must be one of rggb, bggr, grbg, gbrg"),
@@ -193,7 +196,7 @@ def test_a_call_with_something_else_is_refused(call, argument, message):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"name": 5}, r"name = 5: the rig has sheet"),
+        ({"name": 5}, r"name = 5: must be a tracker of the rig, sheet"),
         ({"cameras": 5}, r"cameras = 5: must be a dict such as"),
         ({"cameras": {"tof": 5}}, r"cameras\['tof'\] = 5: must be a camera"),
         ({"budget_ms": "x"}, r"budget_ms = 'x': must be more than 0"),

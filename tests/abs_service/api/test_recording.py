@@ -49,7 +49,7 @@ def test_images_are_arrays_in_si_units():
 
 def test_images_of_some_streams_only():
     assert {image.stream for image in a.open_recording(SAMPLE).images("color/color")} == {"color/color"}
-    with pytest.raises(a.ArgumentError, match=r"sample\.mcap has no stream 'tof/color'; it has tof/depth, tof/ampl"):
+    with pytest.raises(a.ArgumentError, match=r"streams = 'tof/color': must be in .*sample\.mcap, which has tof/depth"):
         a.open_recording(SAMPLE).images("tof/color")
 
 
@@ -101,13 +101,13 @@ def test_a_file_that_is_no_recording_is_refused(tmp_path):
 
 
 def test_estimates_of_a_tracker_that_was_not_recorded():
-    with pytest.raises(a.ArgumentError, match=r"sample\.mcap has no estimates; `abs-service replay` makes them"):
+    with pytest.raises(a.ArgumentError, match=r"tracker = 'sheet': .*\.mcap has no estimates; `abs-service replay`"):
         a.open_recording(SAMPLE).estimates("sheet")
 
 
 def test_a_recording_without_an_image_that_the_tracker_uses():
     camera = a.Camera(88, 72, fx=100, fy=100, cx=44, cy=36)
-    with pytest.raises(a.ArgumentError, match=r"sample\.mcap has no depth/depth; it has tof/depth, tof/amplitude"):
+    with pytest.raises(a.ArgumentError, match=r"sample\.mcap: must have depth/depth; it has tof/depth, tof/ampl"):
         list(a.Tracker(camera, a.Rigid()).replay(a.open_recording(SAMPLE)))
 
 
@@ -118,7 +118,7 @@ def test_every_rig_file_of_the_examples_can_be_loaded(path):
     assert set(rig.noise) <= set(rig.sensors)
     for name in rig.trackers:
         if not set(rig.cameras) >= set(rig.sensors):
-            with pytest.raises(a.ArgumentError, match=r'sensor ".+" of tracker ".+" has no camera in the rig file'):
+            with pytest.raises(a.ArgumentError, match=r'cameras = {}: must have one of ".+", a sensor of tracker ".+"'):
                 rig.tracker(name)
 
 
@@ -145,9 +145,9 @@ def test_a_rig_file_says_where_its_cameras_are(tmp_path):
 
 def test_a_name_that_the_rig_does_not_have():
     rig = a.load_rig(ROOT / "examples" / "rigs" / "two_trackers.toml")
-    with pytest.raises(a.ArgumentError, match=rf"name = 'x': the rig has {', '.join(rig.trackers)}"):
+    with pytest.raises(a.ArgumentError, match=rf"name = 'x': must be a tracker of the rig, {', '.join(rig.trackers)}"):
         rig.tracker("x")
-    with pytest.raises(a.ArgumentError, match="name = '': the rig has"):
+    with pytest.raises(a.ArgumentError, match="name = '': must be a tracker of the rig, "):
         rig.tracker()
 
 

@@ -115,6 +115,7 @@ def test_a_slow_subscriber_neither_blocks_the_publisher_nor_others(buses, blocke
     assert begun.qsize() == 1, "all others arrived while the slow subscriber still handles its first message"
 
 
+@pytest.mark.realtime
 def test_a_stopped_subscriber_does_not_block_the_publisher(buses, endpoint):
     _, sender, receiver = buses
     program = f"""

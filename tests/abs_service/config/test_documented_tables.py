@@ -9,8 +9,6 @@ from pathlib import Path
 import pytest
 
 from abs_service.config import plugins
-from abs_service.config.tables.service import TrackerTable
-from abs_service.tracker.optimizers.base import Stop
 
 ROOT = Path(__file__).parents[3]
 PACKAGES = {
@@ -65,13 +63,3 @@ def test_a_path_starts_from_the_folder_of_the_rig_file(part, name, key):
 def test_every_part_has_a_row(part):
     rows = re.findall(r"^\| `(\w+)` \|", PAGES[part], re.MULTILINE)
     assert set(documented(part)) <= set(rows)
-
-
-@pytest.mark.parametrize("key", ["budget_evaluations", "budget_ms"])
-def test_the_budget_is_as_the_page_says(key):
-    assert f"| `{key}` | {round(TrackerTable.model_fields[key].default)} |" in PAGES["optimizer"]
-
-
-def test_every_reason_to_stop_is_named():
-    for stop in set(Stop) - {Stop.NOTHING}:
-        assert f"`{stop.name}`" in PAGES["optimizer"]

@@ -185,6 +185,7 @@ def lines_until(stream, word):
 
 
 @pytest.mark.slow
+@pytest.mark.realtime
 def test_ctrl_c_ends_a_running_rig_in_order_and_in_time(rig_file, tmp_path, launch):
     process = launch("run", rig_file, stdout=-1)
     lines_until(process.stdout, ".mcap 1")  # recording: its size begins with a 1

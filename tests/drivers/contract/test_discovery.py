@@ -53,8 +53,7 @@ def test_a_failing_or_hanging_driver_does_not_hide_the_others(monkeypatch: pytes
     points = [EntryPoint(name, f"external_{name}", "drivers") for name in searches]
     monkeypatch.setattr(opening, "entry_points", lambda group: points)
     monkeypatch.setattr(opening, "available", lambda: list(searches))
-    monkeypatch.setattr(opening, "_GRACE_S", 0.0)
-    broken, hanging, working = opening.discover(0.2)
+    broken, hanging, working = opening.discover(0.2, grace_s=0.0)
     ending.set()
     assert (broken.availability, hanging.availability) == (Availability.FAULTY, Availability.FAULTY)
     assert "OSError('no bus')" in broken.reason

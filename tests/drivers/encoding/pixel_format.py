@@ -5,13 +5,29 @@ import numpy as np
 from drivers.encoding.pixel_filter import Predictor
 
 
+def encode_plainly(pixels, chosen, mosaic):
+    """Content of the Zstandard frame for pixels, the inverse of `decode_plainly`."""
+    size = pixels.dtype.itemsize
+    image = pixels.view(f"<u{size}").astype(object)  # numbers without a range
+    if chosen.green_subtracted:
+        image = np.stack([(image[..., c] - (image[..., 1] if c != 1 else 0)) % 256 for c in range(3)], axis=-1)
+    joined = b""
+    for place in _planes(image, mosaic):
+        stored = []
+        for (row, column), sample in np.ndenumerate(place):
+            difference = (int(sample) - _predicted(place, row, column, chosen.predictor)) % 256**size
+            if size > 1:
+                signed = difference - 256**size * (2 * difference >= 256**size)
+                difference = 2 * signed if signed >= 0 else -2 * signed - 1
+            stored.append(difference.to_bytes(size, "big"))
+        joined += b"".join(bytes(sample[byte] for sample in stored) for byte in range(size))
+    return joined
+
+
 def decode_plainly(joined, chosen, shape, size, mosaic):
     """Pixels as unsigned integers of `size` bytes, from what the Zstandard frame holds."""
     image = np.zeros(shape, f"<u{size}")
-    if mosaic:
-        places = [image[row::2, column::2] for row in (0, 1) for column in (0, 1)]
-    else:
-        places = [image] if image.ndim == 2 else [image[..., channel] for channel in range(shape[2])]
+    places = _planes(image, mosaic)
     begin = 0
     for place in places:
         count = place.size
@@ -27,6 +43,13 @@ def decode_plainly(joined, chosen, shape, size, mosaic):
         for channel in (0, 2):
             image[..., channel] += image[..., 1]
     return image
+
+
+def _planes(image, mosaic):
+    """Views of the planes of an image."""
+    if mosaic:
+        return [image[row::2, column::2] for row in (0, 1) for column in (0, 1)]
+    return [image] if image.ndim == 2 else [image[..., channel] for channel in range(image.shape[2])]
 
 
 def _predicted(plane, row, column, predictor):

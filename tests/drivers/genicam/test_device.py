@@ -1,6 +1,8 @@
 """The committee's simulated producer through the real harvesters, addresses, and the message without a producer."""
 
+import itertools
 import time
+from collections.abc import Iterator
 from contextlib import AbstractContextManager
 
 import numpy as np
@@ -11,7 +13,6 @@ from drivers.contract.errors import translated_sdk_errors
 from drivers.contract.frame import Kind, Reference
 from drivers.genicam import library, opening
 from drivers.genicam.address import parse
-from drivers.genicam.device import _Run
 from drivers.genicam.link import Part, Shot
 from tests.drivers.conformance.bench import streaming
 from tests.drivers.conformance.benches.genicam import QUERY, viky
@@ -58,13 +59,14 @@ def test_the_ball_of_a_simulated_camera_has_a_height_where_it_has_a_colour(monke
 
 
 class Stamped:
-    """A link to a camera that stamps, and whose images are composed here; every third one gets lost."""
+    """A link to a camera that stamps, and whose images with these numbers are composed here."""
 
     uri = "genicam://1"
 
-    def __init__(self) -> None:
+    def __init__(self, numbers: Iterator[int]) -> None:
         self.nodes = node_map(BLAZE)
-        self._number = 0
+        self._numbers = numbers
+        self._taken = 0
 
     def translated_errors(self) -> AbstractContextManager[None]:
         return translated_sdk_errors(self.uri, "")
@@ -76,16 +78,17 @@ class Stamped:
     def close(self) -> None: ...
 
     def take(self) -> Shot:
-        self._number += 2 if self._number % 3 == 1 else 1
-        part = Part("Coord3D_C16", 4, 3, memoryview(np.full((3, 4), self._number, np.uint16).tobytes()))
-        return Shot(self._number, self.now_ns(), (part,))
+        self._taken += 1
+        part = Part("Coord3D_C16", 4, 3, memoryview(np.full((3, 4), self._taken, np.uint16).tobytes()))
+        return Shot(next(self._numbers), self.now_ns(), (part,))
 
     def now_ns(self) -> int:
-        return self._number * 33_000_000
+        return self._taken * 33_000_000
 
 
 def test_stamps_of_the_camera_are_mapped_and_its_exposure_is_told() -> None:
-    link = Stamped()
+    numbers = itertools.compress(itertools.count(1), itertools.cycle((1, 0, 1)))  # every third one gets lost
+    link = Stamped(numbers)
     info = DeviceInfo(link.uri, "model", "1")
     delay_ns = 5_000_000_000
     device = opening.of_link(link, info, parse(link.uri), lambda: link.now_ns() + delay_ns)  # pyright: ignore[reportArgumentType]
@@ -103,6 +106,12 @@ def test_stamps_of_the_camera_are_mapped_and_its_exposure_is_told() -> None:
 
 
 def test_numbers_of_16_bits_begin_anew_without_a_gap() -> None:
-    run = _Run()
-    assert [run.count(number) for number in (65533, 65534, 1, 3)] == [0, 0, 1, 1]
-    assert run.seq == 6
+    opened_with, *run = 65530, 65533, 65534, 1, 3  # 0 is no number
+    link = Stamped(itertools.chain([opened_with], run, itertools.count(4)))
+    info = DeviceInfo(link.uri, "model", "1")
+    device = opening.of_link(link, info, parse(link.uri), link.now_ns)  # pyright: ignore[reportArgumentType]
+    streams = len(device.capabilities.streams)
+    with streaming(device) as sink:
+        assert sink.receives(5 * streams)
+    assert [frame.seq for frame in sink.frames if frame.kind == Kind.DEPTH][:5] == [1, 2, 4, 6, 7]
+    assert device.counters["missing"] == 2 * streams

@@ -19,8 +19,6 @@ from abs_service.report.provenance import DataFile, Provenance
 from calib.camera import Camera
 from calib.files import limited, nested
 
-#: What a camera table is put on when all of it is there.
-
 
 class StoredCalibrationError(Exception):
     """A file that lacks a part of a calibration."""

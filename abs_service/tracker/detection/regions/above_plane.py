@@ -1,26 +1,26 @@
 """The object on the dominant plane, such as a table, or before one, such as a wall."""
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 from annotated_types import Ge, Gt
 from numpy.typing import NDArray
 
-from abs_service.tracker.detection.depth_view import DepthView, Step, limited
+from abs_service.tracker.detection.depth_view import DepthView, limited
 from abs_service.tracker.detection.initial_detection import DetectionError
 from abs_service.tracker.detection.plausibility import lining
 from abs_service.tracker.detection.segments.depth_segments import deepest_pixel, large_surfaces, surface_at
 from abs_service.tracker.detection.segments.dominant_plane import CLEARANCE_M, above_plane
-from abs_service.tracker.detection.segments.within import Polygon, Restricted, restricted
+from abs_service.tracker.detection.segments.surface_settings import SurfaceSettings
+from abs_service.tracker.detection.segments.within import Restricted, restricted
 
 #: A surface with less than this share of a wall's pixels is ignored.
 SPECK = 0.02
 
 
 @dataclass(frozen=True)
-class Settings:
+class Settings(SurfaceSettings):
     """TOML keys of the region.
 
     Attributes:
@@ -28,10 +28,6 @@ class Settings:
             distances there.
         seed: column and row of a pixel of the object [px]; without it, the object is the largest connected surface,
             unless that may be a wall or a floor.
-        maximum_step_m: largest difference in distance between neighbouring pixels of one surface [m]; "auto": 0.04, or
-            five standard deviations of the distance by the noise model, or 3.5 widths of a pixel on the surface, where
-            that is more.
-        minimum_pixels: minimum number of pixels of a surface; smaller ones are ignored as noise.
         within: mask image as of the region `mask`; pixels outside are ignored, except for finding the plane.
         polygon: corners (column, row) of a polygon around the object [px], three or more; pixels outside are ignored,
             except for finding the plane.
@@ -39,10 +35,6 @@ class Settings:
 
     clearance_m: Annotated[float, Gt(0)] = CLEARANCE_M
     seed: tuple[Annotated[int, Ge(0)], Annotated[int, Ge(0)]] | None = None
-    maximum_step_m: Step = "auto"
-    minimum_pixels: Annotated[int, Ge(16)] = 200
-    within: Path | None = None
-    polygon: Polygon | None = None
 
     def build(self) -> Restricted:
         """The region; DetectionError if `within` is missing or no image."""

@@ -1,40 +1,30 @@
 """The largest connected surface within a range of distances."""
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 from annotated_types import Ge, Gt
 from numpy.typing import NDArray
 
-from abs_service.tracker.detection.depth_view import DepthView, Step, limited
+from abs_service.tracker.detection.depth_view import DepthView, limited
 from abs_service.tracker.detection.initial_detection import DetectionError
 from abs_service.tracker.detection.segments.depth_segments import large_surfaces
-from abs_service.tracker.detection.segments.within import Polygon, Restricted, restricted
+from abs_service.tracker.detection.segments.surface_settings import SurfaceSettings
+from abs_service.tracker.detection.segments.within import Restricted, restricted
 
 
 @dataclass(frozen=True)
-class Settings:
+class Settings(SurfaceSettings):
     """TOML keys of the region.
 
     Attributes:
         maximum_m: largest radial distance of the object [m].
         minimum_m: smallest radial distance of the object [m].
-        maximum_step_m: largest difference in distance between neighbouring pixels of one surface [m]; "auto": 0.04, or
-            five standard deviations of the distance by the noise model, or 3.5 widths of a pixel on the surface, where
-            that is more.
-        minimum_pixels: minimum number of pixels of a surface; smaller ones are ignored as noise.
-        within: mask image as of the region `mask`; pixels outside are ignored.
-        polygon: corners (column, row) of a polygon around the object [px], three or more; pixels outside are ignored.
     """
 
     maximum_m: Annotated[float, Gt(0)]
     minimum_m: Annotated[float, Ge(0)] = 0.0
-    maximum_step_m: Step = "auto"
-    minimum_pixels: Annotated[int, Ge(16)] = 200
-    within: Path | None = None
-    polygon: Polygon | None = None
 
     def __post_init__(self) -> None:
         if not self.minimum_m < self.maximum_m:

@@ -1,41 +1,25 @@
 """The nearest connected surface: an object before a background."""
 
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Annotated
 
 import cv2
 import numpy as np
-from annotated_types import Ge
 from numpy.typing import NDArray
 
-from abs_service.tracker.detection.depth_view import DepthView, Step
+from abs_service.tracker.detection.depth_view import DepthView
 from abs_service.tracker.detection.initial_detection import DetectionError
 from abs_service.tracker.detection.plausibility import is_scene
 from abs_service.tracker.detection.segments.depth_segments import large_surfaces
-from abs_service.tracker.detection.segments.within import Polygon, Restricted, restricted
+from abs_service.tracker.detection.segments.surface_settings import SurfaceSettings
+from abs_service.tracker.detection.segments.within import Restricted, restricted
 
 #: A piece of the scene is torn off where returns are missing: within so many pixels, the scene goes on.
 TORN_PX = 5
 
 
 @dataclass(frozen=True)
-class Settings:
-    """TOML keys of the region.
-
-    Attributes:
-        maximum_step_m: largest difference in distance between neighbouring pixels of one surface [m]; "auto": 0.04, or
-            five standard deviations of the distance by the noise model, or 3.5 widths of a pixel on the surface, where
-            that is more.
-        minimum_pixels: minimum number of pixels of a surface; smaller ones are ignored as noise.
-        within: mask image as of the region `mask`; pixels outside are ignored.
-        polygon: corners (column, row) of a polygon around the object [px], three or more; pixels outside are ignored.
-    """
-
-    maximum_step_m: Step = "auto"
-    minimum_pixels: Annotated[int, Ge(16)] = 200
-    within: Path | None = None
-    polygon: Polygon | None = None
+class Settings(SurfaceSettings):
+    """TOML keys of the region."""
 
     def build(self) -> Restricted:
         """The region; DetectionError if `within` is missing or no image."""

@@ -1,25 +1,25 @@
 """The connected surface at a pixel, of a colour, or that moves."""
 
-from dataclasses import dataclass
-from pathlib import Path
+from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
 import numpy as np
 from annotated_types import Ge, Gt, Le
 from numpy.typing import NDArray
 
-from abs_service.tracker.detection.depth_view import DepthView, Step
+from abs_service.tracker.detection.depth_view import DepthView
 from abs_service.tracker.detection.initial_detection import DetectionError
 from abs_service.tracker.detection.plausibility import is_scene
 from abs_service.tracker.detection.segments.color_growth import grown_by_color
 from abs_service.tracker.detection.segments.seeds import ColorSeed, MotionSeed, PixelSeed, Seed, Seeded, SurfaceLimits
-from abs_service.tracker.detection.segments.within import Polygon, Restricted, restricted
+from abs_service.tracker.detection.segments.surface_settings import SurfaceSettings
+from abs_service.tracker.detection.segments.within import Restricted, restricted
 
 Level = Annotated[int, Ge(0), Le(255)]
 
 
 @dataclass(frozen=True)
-class Settings:
+class Settings(SurfaceSettings):
     """TOML keys of the region.
 
     Attributes:
@@ -30,12 +30,7 @@ class Settings:
         grow: edges at which the object ends: steps in distance ("depth"), or edges of its colours, too ("color").
         minimum_motion_m: least change towards the sensor of a surface that has moved [m]; it is four standard
             deviations of the distances at least.
-        maximum_step_m: largest difference in distance between neighbouring pixels of one surface [m]; "auto": 0.04, or
-            five standard deviations of the distance by the noise model, or 3.5 widths of a pixel on the surface, where
-            that is more.
         minimum_pixels: minimum number of pixels of a surface, and of what moved or has the colour; less is noise.
-        within: mask image as of the region `mask`; pixels outside are ignored.
-        polygon: corners (column, row) of a polygon around the object [px], three or more; pixels outside are ignored.
     """
 
     pixel: tuple[Annotated[int, Ge(0)], Annotated[int, Ge(0)]] | None = None
@@ -43,10 +38,7 @@ class Settings:
     motion_s: Annotated[float, Ge(0.5)] | None = None
     grow: Literal["depth", "color"] = "depth"
     minimum_motion_m: Annotated[float, Gt(0)] = 0.02
-    maximum_step_m: Step = "auto"
-    minimum_pixels: Annotated[int, Ge(16)] = 16
-    within: Path | None = None
-    polygon: Polygon | None = None
+    minimum_pixels: Annotated[int, Ge(16)] = field(default=16, kw_only=True)
 
     def __post_init__(self) -> None:
         self._seed()

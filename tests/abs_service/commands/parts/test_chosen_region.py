@@ -17,12 +17,13 @@ from tests.abs_service.tracking.driving import default_plan, drive, rig_of, simu
 PIXEL = (111, 133)
 POLYGON = ((80, 90), (160, 90), (120, 170))
 MASK = Path("/rigs/mask.png")
+NEAREST = nearest.Settings(maximum_step_m=0.02, minimum_pixels=100, within=MASK, polygon=POLYGON)
 
 
 @pytest.mark.parametrize(
     ("region", "chosen"),
     [
-        (nearest.Settings(0.02, within=MASK), seed.Settings(PIXEL, maximum_step_m=0.02, within=MASK)),
+        (nearest.Settings(maximum_step_m=0.02, within=MASK), seed.Settings(PIXEL, maximum_step_m=0.02, within=MASK)),
         (distance.Settings(1.2, maximum_step_m=0.03), seed.Settings(PIXEL, maximum_step_m=0.03)),
         (above_plane.Settings(0.005), above_plane.Settings(0.005, PIXEL)),
         (above_plane.Settings(seed=(1, 2)), above_plane.Settings(seed=PIXEL)),
@@ -51,8 +52,8 @@ def kept(chosen):
 @pytest.mark.parametrize(
     ("region", "chosen"),
     [
-        (nearest.Settings(0.02, 100, MASK), nearest.Settings(0.02, 100, MASK, POLYGON)),
-        (distance.Settings(1.2, maximum_step_m=0.03), nearest.Settings(0.03, polygon=POLYGON)),
+        (replace(NEAREST, polygon=None), NEAREST),
+        (distance.Settings(1.2, maximum_step_m=0.03), nearest.Settings(maximum_step_m=0.03, polygon=POLYGON)),
         (above_plane.Settings(0.005, (1, 2)), above_plane.Settings(0.005, polygon=POLYGON)),
         (seed.Settings(motion_s=2.0, minimum_pixels=30), nearest.Settings(minimum_pixels=30, polygon=POLYGON)),
         (box.Settings((0, 0, 0), (1, 1, 1)), nearest.Settings(polygon=POLYGON)),

@@ -1,34 +1,40 @@
 """Options that are numbers refuse what is none of theirs, in every command, as argparse refuses it."""
 
-import argparse
+from argparse import ArgumentParser
 from collections.abc import Iterator
+from contextlib import redirect_stderr, suppress
 from importlib import import_module
+from io import StringIO
 
 import pytest
 
 from abs_service import cli
+from abs_service.commands import completion
 from abs_service.supervision.exit_codes import Exit
 
 
-def numeric_options(name="", commands=cli.COMMANDS, module="abs_service.commands") -> Iterator[tuple[str, str]]:
+def numeric_options() -> Iterator[tuple[str, str]]:
     """Command and option of all that take one number or several."""
-    for each in commands:
-        whole_name = f"{name} {each}".strip()
-        found = import_module(f"{module}.{cli.MODULES.get(whole_name, each)}")
-        if below := getattr(found, "COMMANDS", {}):
-            yield from numeric_options(whole_name, below, found.__name__)
-            continue
-        for action in cli.command_parser(whole_name, found)._actions:  # noqa: SLF001 - argparse has no other way to list them
-            if action.option_strings and callable(action.type) and is_number(action.type):
-                yield whole_name, action.option_strings[0]
+    for command in completion.found("", cli.COMMANDS, cli.MODULES, "abs_service.commands"):
+        for name in [option.names[0] for option in command.options if option.takes_value]:
+            parser = parser_of(command.words)
+            if refuses(parser, name, "word") and not refuses(parser, name, "5"):
+                yield command.words, name
 
 
-def is_number(read) -> bool:
-    """True for a type of arguments that makes a number of a text."""
-    try:
-        return isinstance(read("5"), int | float)
-    except (argparse.ArgumentTypeError, ValueError):
-        return False
+def parser_of(words: str) -> ArgumentParser:
+    """The parser of a command."""
+    module = import_module("abs_service.commands")
+    for number, word in enumerate(words.split(), 1):
+        module = import_module(f"{module.__name__}.{cli.MODULES.get(' '.join(words.split()[:number]), word)}")
+    return cli.command_parser(words, module)
+
+
+def refuses(parser: ArgumentParser, option: str, value: str) -> bool:
+    """True if a parser says that an option cannot have a value; what else a command needs is said later."""
+    with redirect_stderr(StringIO()) as said, suppress(SystemExit):
+        parser.parse_args([option, *[value] * 6])
+    return f"argument {option}" in said.getvalue()
 
 
 NUMERIC = list(numeric_options())

@@ -41,6 +41,7 @@ def test_a_disk_that_takes_the_beginning_of_every_file_is_tried_ever_more_rarely
 
 
 @pytest.mark.slow
+@pytest.mark.realtime
 def test_meanwhile_nobody_says_that_it_does_not_answer_and_a_healed_one_is_used_at_once(tmp_path, monkeypatch):
     monkeypatch.setattr(Failing, "healed", False)
     monkeypatch.setattr(folder, "takes", lambda _: Failing.healed)

@@ -1,5 +1,6 @@
 """Status of an estimate, with its reasons."""
 
+import re
 from dataclasses import replace
 from typing import Any
 
@@ -135,14 +136,18 @@ def test_measured_surface_beyond_the_mesh_degrades_an_estimate_unless_it_was_hid
 
 
 def test_every_reason_says_what_to_do():
-    folded = ShapeQuality(stretch=0.1, folded_share=0.1, deviation_m=1e-3)
-    off = [replace(on_the_rim(visible=60, outside=30), inliers=0, occluded=99_000, remainder=Remainder(0.9, 0.0))]
-    status, lost = judge(off, (), folded, 3.0, SETTINGS)
-    assert status == Status.LOST
-    assert "it is looked for again" in lost[0]
-    _, degraded = judge([fit(0.5)], (), SHAPE, 0.0, SETTINGS)
-    for reason in (*lost, *degraded):
-        assert len(reason.partition(" – ")[2]) > 20
+    counts = VertexCounts(400, 10, 90, missing=300)
+    nothing_right = SensorFit("tof", 100, 300, 100, 10, -1.0, 1.0, RimFit(20, 10, 10), counts, Remainder(0.9, 0.0))
+    surprised = replace(nothing_right, remainder=Remainder(), is_surprised=True)
+    out_of_sight = replace(nothing_right, inliers=100, occluded=50)
+    cases = nothing_right, replace(nothing_right, inliers=50), out_of_sight, surprised
+    bad = ShapeQuality(folded_share=0.5, deviation_m=1.0, single_frame_deviation_m=1.0)
+    said = [judge([one], (), bad, 9.9, Settings()) for one in (*cases, replace(nothing_right, rim=RimFit(20, 0, 20)))]
+    said += [judge([nothing_right], (), ShapeQuality(single_frame_deviation_m=1.0), 0.0, Settings())]
+    reasons = {reason for _, some in said for reason in some}
+    assert len(facts(tuple(reasons))) == 13
+    assert [reason for reason in reasons if len(re.split(" – |: ", reason, maxsplit=1)[1]) < 20] == []
+    assert all("it is looked for again" in some[0] for status, some in said if status == Status.LOST)
 
 
 def on_the_rim(off_m: float = 0.0, **rim: Any) -> SensorFit:

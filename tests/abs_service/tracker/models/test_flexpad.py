@@ -209,18 +209,13 @@ def test_half_a_size_is_refused(sizes, given):
         Settings(**sizes)
 
 
-@pytest.mark.parametrize(
-    ("sides", "documented"),
-    [
-        ({"e": 0.5, "w": 0.5, "se": 0.5, "nw": 0.5}, 0.09),
-        ({"e": 1.0, "w": 1.0, "se": 1.0, "nw": 1.0}, 0.29),
-        ({"e": 0.5, "w": 0.5, "s": 0.5, "n": 0.5}, 0.04),
-        ({"e": 1.0, "w": 1.0, "s": 1.0, "n": 1.0}, 0.14),
-    ],
-)
-def test_bends_of_several_directions_change_lengths_as_documented(sides, documented):
-    """Largest change of an edge in docs/explanation/models.md; sums of isometric bends are so only to first order."""
-    assert 0.8 * documented < np.abs(stretches(bend(**sides))).max() < documented
+@pytest.mark.parametrize("sides", [("e", "w", "se", "nw"), ("e", "w", "s", "n")])
+def test_bends_of_several_directions_change_lengths_to_second_order_only(sides):
+    """Sums of isometric bends are isometric to first order: half the bends change lengths by about a quarter."""
+    half, whole = (np.abs(stretches(bend(**dict.fromkeys(sides, value)))).max() for value in (0.5, 1.0))
+    print(f"{' + '.join(sides)}: edges change by up to {half:.1%} at 0.5, {whole:.1%} at 1")
+    assert 3 < whole / half < 5
+    assert whole < 0.3
 
 
 COLLAPSED = bend(e=1, w=1, s=1, n=1, se=-1, nw=-1, sw=-1, ne=-1)

@@ -2,7 +2,6 @@
 
 import logging
 import threading
-import time
 
 import pytest
 
@@ -59,9 +58,8 @@ def test_a_process_that_ends_does_not_wait_for_long(tmp_path, capsys, monkeypatc
     monkeypatch.setattr(log_file, "END_S", 0.05)
     file, handler = stuck()
     log(handler, 2)
-    begin_s = time.monotonic()
     handler.close()
-    assert time.monotonic() - begin_s < 1.0
+    assert not Stuck.answers.is_set()  # the file still stands still
     assert capsys.readouterr().err.endswith("it stands still, 3 records are missing\n")
     Stuck.answers.set()
     assert eventually(lambda: (tmp_path / "log").read_text().count("\n") == 3)

@@ -69,7 +69,6 @@ class Recorder:
 
 def test_the_last_mesh_is_seen_also_if_none_follows(monkeypatch):
     """As when the rig is gone and the mesh turns grey, in a pause of a recording, or after a step in it."""
-    monkeypatch.setattr("abs_service.display.page.scene.scene._light", lambda scene: None)
     monkeypatch.setattr("abs_service.display.page.scene.scene.glb", lambda vertices, faces, colors: tuple(colors[0]))
     server = Recorder()
     scene = Scene(cast(Any, server))

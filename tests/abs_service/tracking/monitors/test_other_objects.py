@@ -1,4 +1,4 @@
-"""Objects after a loss: the tracked one is found again wherever and however bent it is; others are refused."""
+"""After a loss the object is found again wherever it is, however it is bent; another thing is refused."""
 
 import dataclasses
 

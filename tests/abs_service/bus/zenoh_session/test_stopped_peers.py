@@ -66,7 +66,8 @@ def test_a_hundred_connections_that_say_nothing_keep_nobody_from_the_router(open
     with ExitStack() as stack:
         for _ in range(120):  # zenoh lets a hundred of them wait, for 10 s
             stack.enter_context(socket.create_connection((host, int(port))))
-        client(endpoint).close()
+        with closing(client(endpoint)) as session:
+            assert len(session.info.routers_zid()) == 1
 
 
 def client(endpoint):
