@@ -127,7 +127,7 @@ class TrackingSession:
         warned = (*self._warnings, *self._appearance_monitor.warnings)
         if estimate.status == Status.TRACKING:
             self._learn(self._tracker, estimate, observation)
-            return replace(estimate, reasons=(), warnings=warned)
+            return replace(estimate, warnings=warned) if warned else estimate
         reasons = (*estimate.reasons, *(f"looked for the object again: {reason}" for reason in failure.reasons))
         return replace(estimate, reasons=reasons, warnings=warned)
 

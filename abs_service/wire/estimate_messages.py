@@ -233,5 +233,4 @@ def _upper_of(dimension: int) -> NDArray[np.intp]:
 
 def _upper(covariance: NDArray[np.float64]) -> bytes:
     """The six different entries of symmetric matrices (n, 3, 3), row by row."""
-    rows, columns = np.triu_indices(3)
-    return covariance[:, rows, columns].astype("<f4").tobytes()
+    return covariance.reshape(-1, 9)[:, _upper_of(3)].astype("<f4").tobytes()

@@ -42,7 +42,7 @@ class StructuredLight:
 
     def mean(self, x: NDArray[np.float64], a: NDArray[np.float64], p: Pixels) -> NDArray[np.float64]:
         """Zero mean offset [m]."""
-        return np.zeros_like(x)
+        return np.zeros(x.shape)
 
     def deviation(self, x: NDArray[np.float64], a: NDArray[np.float64], p: Pixels) -> NDArray[np.float64]:
         """Standard deviation σ(x) [m]."""

@@ -86,6 +86,24 @@ def write_pixels(
         _render(model, measured[block], a[block], (p[0][block], p[1][block]), texture)
 
 
+def normalizers(
+    model: DepthNoise, measured: NDArray[np.float64], a: NDArray[np.float64], p: Found
+) -> NDArray[np.float32]:
+    """Negative logarithms of the normaliser, n0 of `write_texture`, of single pixels with a return (n,).
+
+    Args:
+        model, measured, a, p: as in `write_pixels`.
+    """
+    center = np.maximum(measured - model.mean(measured, a, p), MIN_DISTANCE_M)
+    return _logarithms(model.deviation(center, a, p))[0] + np.float32(LOG_SQRT_2PI)
+
+
+def _logarithms(*values: NDArray[np.float64]) -> tuple[NDArray[np.float32], ...]:
+    """Logarithms in single precision; NumPy takes those of many numbers at once, the compiler does not."""
+    with np.errstate(over="ignore"):  # farther than 1 km, single precision has no room for every model's deviation
+        return tuple(np.log(one.astype(np.float32)) for one in values)
+
+
 def _blocks(shape: tuple[int, ...]) -> Iterator[tuple[int, slice]]:
     """First row and rows of the blocks of a part of an image (rows, columns)."""
     rows = max(1, _BLOCK // max(shape[1], 1))
@@ -115,10 +133,8 @@ def _render(
     center = measured - offset
     nodes = np.maximum(center + _NODES_M, MIN_DISTANCE_M)
     deviation = model.deviation(nodes, a, p)
-    # NumPy takes logarithms of many numbers at once, the compiler does not.
-    with np.errstate(over="ignore"):  # farther than 1 km, single precision has no room for every model's deviation
-        normalizer = np.log(deviation[1].astype(np.float32)) + np.float32(LOG_SQRT_2PI)
-        growth = np.log((deviation[2] / deviation[0]).astype(np.float32))
+    spread, growth = _logarithms(deviation[1], deviation[2] / deviation[0])
+    normalizer = spread + np.float32(LOG_SQRT_2PI)
     _write_texels(*p, center, model.mean(nodes, a, p) - offset, deviation, normalizer, growth, texture)
 
 

@@ -22,10 +22,9 @@ from scipy.linalg import eigh
 from abs_service.report.content import Column, Section, Table
 from abs_service.tracker.estimates.estimate import Estimate
 from abs_service.tracker.models.base import DeformationModel, SparseJacobian
-from abs_service.tracker.posterior.covariance.vertex_covariance import propagated
 from abs_service.tracker.posterior.priors.change_metric import ChangeMetric
 from abs_service.tracker.posterior.priors.stretch_prior import StretchPrior
-from abs_service.tracker.terms.linearization import stack
+from abs_service.tracker.terms.linearization import propagated, stack
 from calib.noise.images.color import GaussianColor
 from evaluation.experiment import Context, Findings, at_least, at_most
 from evaluation.sequences import demo_plan, demo_rig, expose, simulate, track, with_noise

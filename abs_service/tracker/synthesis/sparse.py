@@ -1,7 +1,7 @@
 """Sparse direct synthesis: one value per vertex (section 3.1), forward distortion, compared in the input domain."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 from typing import NamedTuple
 
@@ -115,7 +115,7 @@ class SparseView:
         rows, columns = np.divmod(np.maximum(pixel - (stride + 1), 0), stride)
         front, hidden = front_at(rows, columns), np.empty_like(view.hidden)
         hide(predicted.vertices[0], predicted.normals[0], self.camera.center, front, distance, pixel, hidden)
-        return replace(view, hidden=hidden)
+        return ObservedSparseView(self.camera, self._sampling, self._attributes, view.gradients, hidden)
 
     def unoccluded(self, predicted: Surface) -> "ObservedSparseView":
         """The view of all vertices, whatever may be before them."""

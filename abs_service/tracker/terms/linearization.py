@@ -74,13 +74,12 @@ class Linearization:
         total += self.jacobian.T @ self.jacobian  # of one matrix: half the products
 
     def leverage(self, covariance: NDArray[np.float64]) -> NDArray[np.float64]:
-        """diag(J Σ Jᵀ) (m,) of a covariance Σ (dim, dim) of theta, contiguous."""
+        """diag(J Σ Jᵀ) (m,) of a covariance Σ (dim, dim) of theta."""
         return np.vecdot(self.jacobian @ covariance, self.jacobian)
 
     def add_scores(self, clusters: NDArray[np.int64], scores: NDArray[np.float64]) -> None:
         """Adds the score Jᵀr of every residual to that of its cluster (m,), one of the rows of `scores` (…, dim)."""
-        is_member = np.arange(len(scores))[:, None] == clusters
-        scores += is_member.astype(np.float64) @ (self.residual[:, None] * self.jacobian)
+        chain_rule.add_dense_scores(clusters, self.residual, self.jacobian, scores)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -142,10 +141,10 @@ class PointLinearization:
         """Sum of the derivatives (s, dim) of the residuals that share an error, times that error's deviation."""
         return self.transposed_times(self.shared, self.sparse_jacobian.dimension).T
 
-    def leverage(self, covariance: NDArray[np.float64]) -> NDArray[np.float64]:
-        """diag(J Σ Jᵀ) (m,) of a covariance Σ (dim, dim) of theta, contiguous."""
+    def leverage(self, at_points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """diag(J Σ Jᵀ) (m,), from the covariances (n, 3, 3) of the points by a covariance Σ of theta."""
         result = np.empty(len(self.residual))
-        chain_rule.find_leverages(self.rows, self.points, self.sparse_jacobian.blocks, covariance, result)
+        chain_rule.find_leverages(self.rows, self.points, at_points, result)
         return result
 
     def add_scores(self, clusters: NDArray[np.int64], scores: NDArray[np.float64]) -> None:
@@ -155,6 +154,13 @@ class PointLinearization:
 
 #: Linearised residuals whose errors have one origin; those of a sensor are of one or several.
 Part = Linearization | PointLinearization
+
+
+def propagated(sparse_jacobian: SparseJacobian, covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Covariance D Σ Dᵀ (n, 3, 3) of every point, from its Jacobian D and the covariance Σ (dim, dim) of theta."""
+    result = np.empty((len(sparse_jacobian.local), 3, 3))
+    chain_rule.propagate(sparse_jacobian.blocks, np.ascontiguousarray(covariance), result)
+    return result
 
 
 def add_gradients(parts: Sequence[PointLinearization], total: NDArray[np.float64]) -> None:

@@ -147,12 +147,11 @@ class HeightSensor:
         pixel: tuple[NDArray[np.int64], NDArray[np.int64]],
         wanted: NDArray[np.bool_],
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """σ and mean offset (n,) [m] of the vertices' own pixels; NaN where not wanted or not known."""
-        known = wanted & (np.isfinite(amplitude) | (not self._noise.uses_amplitude))
-        arguments = distance[known], amplitude[known], (pixel[0][known], pixel[1][known])
-        deviation, mean = np.full((2, len(distance)), np.nan)
-        deviation[known], mean[known] = self._noise.deviation(*arguments), self._noise.mean(*arguments)
-        return deviation, mean
+        """σ and mean offset (n,) [m] of the vertices' own pixels; the latter is NaN where not wanted or not known."""
+        known = np.isfinite(amplitude)
+        arguments = distance, np.where(known, amplitude, 0.0), pixel
+        usable = wanted & known if self._noise.uses_amplitude else wanted
+        return self._noise.deviation(*arguments), np.where(usable, self._noise.mean(*arguments), np.nan)
 
 
 @kernel

@@ -6,6 +6,7 @@ import pytest
 from calib.noise.base import log_density, subtract_mean_offset
 from calib.noise.gaussian_polynomial import GaussianPolynomial
 from calib.noise.structured_light import StructuredLight
+from calib.noise.texture import normalizers
 from calib.noise.tof_amplitude import TofAmplitude
 from drivers.simulated.sensors.time_of_flight import SIGMA_POLYNOMIAL
 from tests.calib.noise.texels import negative_log_density, render_texture
@@ -35,6 +36,14 @@ def test_it_is_eq_18_within_three_deviations(name, allowed, distance):
         exact = -log_density(model, measured, x, a, p)
         rendered = np.diagonal(negative_log_density(texels, texels[:, 0] - x))
         np.testing.assert_allclose(rendered, exact, atol=allowed)
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_normalizers_of_single_pixels_are_those_of_the_texture(name):
+    distance, amplitude = np.array([[0.7, 1.6, 3.0]], np.float32), np.array([[500.0, 3000.0, 9000.0]], np.float32)
+    p = (np.zeros(3, int), np.arange(3))
+    found = normalizers(MODELS[name], distance[0].astype(float), amplitude[0].astype(float), p)
+    np.testing.assert_array_equal(found, render_texture(MODELS[name], distance, amplitude, UNIFORM)[1, 1:4, 6])
 
 
 def test_where_nothing_returned_and_around_the_image_it_is_uniform():

@@ -67,8 +67,8 @@ class DesignEffects:
         clusters = np.empty(len(places), np.int64)
         scores = np.zeros((_find_clusters(places, 1 / self._side_m, clusters), len(inverse)))
         part.add_scores(clusters, scores)
-        # The squared length of a single score is r² h.
-        return np.array([np.vdot(scores @ inverse, scores), np.vdot(part.residual**2, leverage)], np.float64)
+        # Of a matrix times itself, half is computed. The squared length of a single score is r² h.
+        return np.array([np.vdot(scores.T @ scores, inverse), np.vdot(part.residual**2, leverage)], np.float64)
 
 
 @kernel

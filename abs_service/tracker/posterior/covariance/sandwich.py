@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.posterior.linearized_cost import Sensed
-from abs_service.tracker.terms.linearization import add_squares
+from abs_service.tracker.terms.linearization import PointLinearization, add_squares, propagated
 
 #: Lower bound of 1 − h; below it, rounding errors dominate.
 MIN_KEPT = 1e-6
@@ -26,8 +26,12 @@ PerResidual = Sequence[NDArray[np.float64]]
 
 def leverages(inverse: NDArray[np.float64], sensed: Sensed) -> PerResidual:
     """Leverage h = diag(J Σ Jᵀ) of every residual, from Σ (dim, dim)."""
-    inverse = np.ascontiguousarray(inverse)
-    return [source.leverage(inverse) for source in sensed]
+    samples = {source.sparse_jacobian for source in sensed if isinstance(source, PointLinearization)}
+    at_points = {one: propagated(one, inverse) for one in samples}
+    return [
+        source.leverage(at_points[source.sparse_jacobian] if isinstance(source, PointLinearization) else inverse)
+        for source in sensed
+    ]
 
 
 def gradient_covariance(

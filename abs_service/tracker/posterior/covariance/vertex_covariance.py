@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.models.base import DeformationModel, JacobianBlocks, SparseJacobian
+from abs_service.tracker.models.base import DeformationModel
 from abs_service.tracker.posterior.covariance.appearance_misfit import (
     AppearanceMisfit,
     NoDisplacement,
@@ -17,6 +17,7 @@ from abs_service.tracker.posterior.covariance.misfit import Misfit
 from abs_service.tracker.posterior.covariance.parallax import FittedParallax, NoParallax, Parallax
 from abs_service.tracker.posterior.frame_posterior import FramePosterior
 from abs_service.tracker.posterior.optimum import Optimum
+from abs_service.tracker.terms.linearization import propagated
 from calib.jit import kernel
 
 
@@ -63,41 +64,6 @@ class VertexCovariance:
         along = along + self._displacement.variance(optimum)
         add_errors(optimum.surface.normals[0], across + self._mesh_noise.variance, along, covariance)
         return covariance
-
-
-def propagated(sparse_jacobian: SparseJacobian, covariance: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Covariance D Σ Dᵀ (n, 3, 3) of every vertex, from its Jacobian D and the covariance Σ (dim, dim) of Θ."""
-    result = np.empty((len(sparse_jacobian.local), 3, 3))
-    _propagate(sparse_jacobian.blocks, np.ascontiguousarray(covariance), result)
-    return result
-
-
-@kernel
-def _propagate(jacobian: JacobianBlocks, covariance: NDArray[np.float64], result: NDArray[np.float64]) -> None:
-    """See `propagated`; points of a group that follow each other share one product of matrices."""
-    group, parameters, local = jacobian
-    n, _, k = local.shape
-    part, first = np.empty((k, k)), 0
-    while first < n:
-        own, last = parameters[group[first]], first + 1
-        while last < n and group[last] == group[first]:
-            last += 1
-        for i in range(k):
-            line = covariance[own[i]]
-            for j in range(k):
-                part[i, j] = line[own[j]]
-        rows = local[first:last].reshape((3 * (last - first), k))
-        products = np.empty((3 * (last - first), k))
-        np.dot(rows, part, products)
-        for v in range(last - first):
-            square = result[first + v]
-            for i in range(3):
-                for j in range(i, 3):
-                    total = 0.0
-                    for d in range(k):
-                        total += products[3 * v + i, d] * rows[3 * v + j, d]
-                    square[i, j] = square[j, i] = total
-        first = last
 
 
 @kernel

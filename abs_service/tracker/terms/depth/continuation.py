@@ -16,6 +16,7 @@ from abs_service.tracker.synthesis.rasterization.raster import Raster
 from abs_service.tracker.synthesis.window import WHOLE
 from abs_service.tracker.terms.sensor_fit import Remainder
 from calib.camera import Camera
+from calib.jit import kernel
 
 #: About how many columns the grid has.
 COLUMNS = 80
@@ -80,15 +81,47 @@ class CoarseContinuation:
     def _share(self, shown: NDArray[np.bool_], surface: Surface) -> float:
         """Share of the pixels beside the mesh in those and the ones on it; NaN without any."""
         distance = self._raster.render(surface.vertices[0])
-        on_mesh = np.isfinite(distance)
-        explained = int(np.count_nonzero(on_mesh & shown))
+        off = np.empty(distance.shape, np.uint8)
+        explained, mean_m = find_explained(distance, shown, off)
         if not explained:
             return float("nan")
-        pixel_m = float(distance[on_mesh].mean()) / self._focal
-        away_m = pixel_m * cv2.distanceTransform((~on_mesh).view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_3)
-        beside = shown & (away_m > max(self._gap_m, pixel_m)) & (away_m <= self._reach_m)
-        left = int(np.count_nonzero(beside))
+        pixel_m = mean_m / self._focal
+        away = cv2.distanceTransform(off, cv2.DIST_L2, cv2.DIST_MASK_3)
+        left = count_within(away, shown, max(self._gap_m / pixel_m, 1.0), self._reach_m / pixel_m)
         return left / (left + explained)
+
+
+@kernel
+def find_explained(
+    distance: NDArray[np.float32], shown: NDArray[np.bool_], off: NDArray[np.uint8]
+) -> tuple[int, float]:
+    """Number of pixels (rows, columns) on the mesh that show the object, and mean distance of those on the mesh [m].
+
+    Args:
+        distance: of the mesh [m], infinite off it.
+        shown: pixels that show the object.
+        off: result, 1 off the mesh, else 0.
+    """
+    explained, on_mesh, total = 0, 0, 0.0
+    for row in range(distance.shape[0]):
+        for column in range(distance.shape[1]):
+            is_on = np.isfinite(distance[row, column])
+            off[row, column] = 0 if is_on else 1
+            if is_on:
+                total += distance[row, column]
+                on_mesh += 1
+                explained += 1 if shown[row, column] else 0
+    return explained, total / on_mesh
+
+
+@kernel
+def count_within(away: NDArray[np.float32], shown: NDArray[np.bool_], least: float, most: float) -> int:
+    """Number of pixels (rows, columns) that show the object, farther from the mesh than a distance, up to another."""
+    count = 0
+    for row in range(away.shape[0]):
+        for column in range(away.shape[1]):
+            count += 1 if shown[row, column] and least < away[row, column] <= most else 0
+    return count
 
 
 def _every(camera: Camera, step: int) -> Camera:

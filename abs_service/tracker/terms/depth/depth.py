@@ -11,7 +11,6 @@ from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.synthesis.window import corner
 from abs_service.tracker.terms.base import NO_OCCLUDERS, Bounds, Prediction
 from abs_service.tracker.terms.depth.classification.classifier import Classifier
-from abs_service.tracker.terms.depth.classification.visibility import where
 from abs_service.tracker.terms.depth.continuation import Continuation, NoContinuation
 from abs_service.tracker.terms.depth.depth_cost import missing_cost
 from abs_service.tracker.terms.depth.fluctuation import Fluctuation
@@ -68,7 +67,8 @@ class DepthTerm:
         expected = np.ascontiguousarray(rendered[window])
         seen = self._classifier.classify(distance, expected, window, self._texels.shape)
         outline = self._outline.observe(distance, seen, expected, predicted, window)
-        free_m = where(~outline.doubtful, seen.free_m)
+        free_m = seen.free_m.copy()
+        free_m[outline.doubtful] = 0
         masked = seen.foreground | seen.hole | outline.doubtful
         return ObservedDepth(
             sensor=self.sensor,

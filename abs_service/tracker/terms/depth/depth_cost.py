@@ -64,10 +64,28 @@ def missing_cost(law: NoReturn, predicted: Surface, center: NDArray[np.float64],
         center: of the camera (3,) [m].
         maximum: upper bound [nats].
     """
-    sight = predicted.vertices[0] - center[:, None]
-    distance = np.linalg.norm(sight, axis=0)
-    cosine = -np.einsum("in,in->n", predicted.normals[0], sight) / distance
-    return np.clip(-law.log_odds(distance, np.clip(cosine, 0, 1)), 0, maximum)[None].astype(np.float32)
+    distance, cosine = np.empty((2, predicted.vertices.shape[2]))
+    _look(predicted.vertices[0], predicted.normals[0], center, distance, cosine)
+    return np.clip(-law.log_odds(distance, cosine), 0, maximum)[None].astype(np.float32)
+
+
+@kernel
+def _look(
+    vertices: NDArray[np.float32],
+    normals: NDArray[np.float32],
+    center: NDArray[np.float64],
+    distance: NDArray[np.float64],
+    cosine: NDArray[np.float64],
+) -> None:
+    """Distances (n,) of vertices (3, n) from a centre (3,) [m], and cosines of their incidence, 0 to 1."""
+    for v in range(distance.size):
+        square, along = 0.0, 0.0
+        for i in range(3):
+            sight = np.float64(vertices[i, v]) - center[i]
+            square += sight * sight
+            along += normals[i, v] * sight
+        distance[v] = np.sqrt(square)
+        cosine[v] = min(max(-along / distance[v], 0.0), 1.0)
 
 
 def median_inlier_cost(texels: NDArray[np.float32], shown: NDArray[np.bool_]) -> float:

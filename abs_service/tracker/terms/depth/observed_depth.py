@@ -13,13 +13,14 @@ from abs_service.tracker.terms.base import Bounds, facing
 from abs_service.tracker.terms.depth.depth_cost import FREE_SCALE_M, DepthResiduals, depth_cost, normalize
 from abs_service.tracker.terms.depth.fluctuation import Fluctuation
 from abs_service.tracker.terms.depth.outline.base import ObservedOutline
-from abs_service.tracker.terms.depth.pixel_classes import PixelClasses
+from abs_service.tracker.terms.depth.pixel_classes import BEYOND, COVERED, DOUBTFUL, LOST, UNKNOWN, PixelClasses
 from abs_service.tracker.terms.depth.texels import Texels
 from abs_service.tracker.terms.gradients import color_rows, depth_rows
 from abs_service.tracker.terms.linearization import Part, PointLinearization, of_anything
 from abs_service.tracker.terms.patches import Patches
 from abs_service.tracker.terms.sensor_fit import Remainder, SensorFit, summarize
 from abs_service.tracker.terms.vertex_counts import VertexMasks
+from calib.jit import kernel
 
 #: Nearer to the object than this, a sample in free space is pulled back no more stiffly [m].
 MIN_FREE_M = 0.005
@@ -85,7 +86,7 @@ class ObservedDepth:
 
     def _linearize_measured(self, surface: Surface, samples: SparseJacobian, seen: Synthesis) -> PointLinearization:
         found = self.residuals.get(seen, self._residuals)
-        use = np.flatnonzero(found.cost < self.bounds.outlier - self.bounds.inlier)
+        use = (found.cost < self.bounds.outlier - self.bounds.inlier).nonzero()[0]
         vertices, normals = (
             seen.interpolation.spread(values) for values in (surface.vertices[0].T, surface.normals[0].T)
         )
@@ -106,20 +107,17 @@ class ObservedDepth:
         distances = np.ascontiguousarray(free_m[1:-1, 1:-1, None])
         weight = 1 / np.sqrt(FREE_SCALE_M * np.maximum(away[out], MIN_FREE_M))
         rows = color_rows(distances, self.view.camera, vertices[out])[:, 0] * weight[:, None]
-        return PointLinearization(
-            away[out] * weight, rows, np.flatnonzero(out), samples, vertices, of_surface=of_anything
-        )
+        return PointLinearization(away[out] * weight, rows, out.nonzero()[0], samples, vertices, of_surface=of_anything)
 
     def fit(self, surface: Surface) -> SensorFit:
         """Agreement of the sensor with a population of one."""
         seen = self.view.synthesize(surface)
         residual, _, cost = self.residuals.get(seen, self._residuals)
-        measured, pixel = cost < np.inf, np.where(self.classes.beyond.ravel()[seen.pixel[0]], 0, seen.pixel[0])
+        measured, pixel = cost < np.inf, np.where(self.classes.at(seen.pixel[0]).has(BEYOND), 0, seen.pixel[0])
         classes = self.classes.at(pixel)
         free = (classes.free_m > 0) & (pixel > 0)
-        masks = VertexMasks(
-            pixel, facing(seen, surface, self.view.camera.center), classes.lost, classes.covered, classes.doubtful
-        )
+        front = facing(seen, surface, self.view.camera.center)
+        masks = VertexMasks(pixel, front, *(classes.has(bit) for bit in (LOST, COVERED, DOUBTFUL)))
         mean = -float(self._measured_cost(seen)[0]) / residual.size
         size = np.where(free, np.inf, np.abs(residual))
         found = summarize(self.sensor, masks, measured | free, size, mean)
@@ -147,13 +145,10 @@ class ObservedDepth:
         seen = self.view.synthesize(surface)
         if seen.pixel.shape[1] != surface.vertices.shape[2]:
             return np.zeros((2, 1))
-        residual, inverse, cost = self.residuals.get(seen, self._residuals)
-        classes = self.classes.at(np.maximum(seen.pixel[0], 0))
-        deviation = 1 / np.maximum(inverse, 1e-9)
-        signed = np.clip(residual * deviation, -MAX_MISFIT_M, MAX_MISFIT_M)
-        usable, measured = (seen.pixel[0] > 0) & ~classes.unknown, cost < np.inf
-        distance = np.where(measured, signed, classes.free_m.astype(np.float64))
-        return np.stack([distance, np.where(measured, deviation, 0.0)]) * usable
+        found = np.zeros((2, seen.pixel.shape[1]))
+        classes = self.classes.bits.ravel(), self.classes.free_m.ravel()
+        write_misfit(seen.pixel[0], self.residuals.get(seen, self._residuals), *classes, found)
+        return found
 
     def learn(self, surface: Surface) -> None:
         """Learns how much the distances fluctuate."""
@@ -165,3 +160,31 @@ class ObservedDepth:
         found = DepthResiduals(*np.empty((3, seen.pixel.shape[1])))
         normalize(seen.pixel[0], seen.distance[0], self.texels.at(seen.pixel), found)
         return found
+
+
+@kernel
+def write_misfit(
+    pixel: NDArray[np.int32],
+    residuals: DepthResiduals,
+    bits: NDArray[np.uint8],
+    free_m: NDArray[np.float32],
+    found: NDArray[np.float64],
+) -> None:
+    """Writes what `ObservedDepth.misfit` returns into zeros (2, n).
+
+    Args:
+        pixel: of the samples (n,), see `Synthesis`.
+        residuals: of the same.
+        bits, free_m: the classes of all pixels, flattened, see `PixelClasses`.
+        found: result.
+    """
+    for v in range(pixel.size):
+        at = pixel[v]
+        if at <= 0 or bits[at] & UNKNOWN:
+            continue
+        if residuals.cost[v] < np.inf:
+            found[1, v] = 1 / max(residuals.inverse_deviation[v], 1e-9)
+            distance = residuals.normalized[v] * found[1, v]
+            found[0, v] = min(max(distance, -MAX_MISFIT_M), MAX_MISFIT_M)
+        else:
+            found[0, v] = free_m[at]

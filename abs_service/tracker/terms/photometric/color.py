@@ -1,6 +1,6 @@
 """Term of a colour sensor: measured colours compared with those of the vertices."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from abs_service.pairing.images import ColorImage, Image, Window
 from abs_service.tracker.models.base import SparseJacobian, Surface
-from abs_service.tracker.synthesis.base import ObservedView, Resampling, Synthesis, Synthesizer
+from abs_service.tracker.synthesis.base import ObservedView, Resampling, Synthesis, Synthesizer, once
 from abs_service.tracker.synthesis.perspective import project_with_jacobian
 from abs_service.tracker.terms.base import NO_OCCLUDERS, Bounds, Prediction, facing
 from abs_service.tracker.terms.gradients import noiseless_color_rows
@@ -117,6 +117,7 @@ class ObservedColor:
         pixels: the same with a border of one pixel, as samples read them.
         inverse: inverse deviations (n or 1, 3) of the samples' colours.
         normalizer: cost (n or 1,) of a colour that agrees exactly.
+        shone: what was synthesised of populations of one, see `once`.
     """
 
     sensor: str
@@ -128,6 +129,7 @@ class ObservedColor:
     pixels: CopiedPixels
     inverse: NDArray[np.float32]
     normalizer: NDArray[np.float32]
+    shone: dict[Surface, Synthesis] = field(default_factory=dict)
 
     @property
     def occluders(self) -> NDArray[np.float64]:
@@ -140,7 +142,7 @@ class ObservedColor:
 
     def _synthesize(self, surface: Surface) -> Synthesis:
         """The colours of a population as this frame's exposure shows them."""
-        return self.illumination.shine(self.view.synthesize(surface), surface)
+        return once(self.shone, surface, lambda one: self.illumination.shine(self.view.synthesize(one), one))
 
     def _cost_of(self, seen: Synthesis) -> NDArray[np.float64]:
         """Cost (population,) of what is synthesised."""

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.terms.median import median
+from calib.jit import kernel
 
 #: Values between which a colour is neither noise nor saturated [8-bit levels].
 DARKEST, BRIGHTEST = 16.0, 250.0
@@ -32,19 +33,39 @@ def gains(measured: NDArray[np.floating], expected: NDArray[np.floating]) -> NDA
         measured: values at the predicted samples (m, channels) [8-bit levels]; NaN where unknown.
         expected: appearance of these samples (m, channels) [8-bit levels]; NaN where unknown.
     """
-    of_image, own = np.ascontiguousarray(measured.T), np.ascontiguousarray(expected.T)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        usable = (np.minimum(own, of_image) > DARKEST) & (np.maximum(own, of_image) < BRIGHTEST)
-        ratios = of_image / own
-    known = [ratio[chosen] for ratio, chosen in zip(ratios, usable)]
-    result = np.array([_gain(some) if len(some) >= MIN_SAMPLES else np.nan for some in known], np.float32)
-    wanting = np.isnan(result)
-    if wanting.all() or np.nanmax(result) > MAX_TINT * np.nanmin(result):
-        wanting[:] = True
-    if wanting.any():
-        is_enough = np.count_nonzero(usable.any(axis=0)) >= MIN_SAMPLES
-        result[wanting] = _gain(np.concatenate(known)) if is_enough else 1.0
-    return result
+    channels, samples = expected.shape[1], len(expected)
+    ratios, count = np.empty((channels, samples), np.result_type(measured, expected)), np.zeros(channels + 1, np.int64)
+    find_ratios(np.ascontiguousarray(measured), np.ascontiguousarray(expected), ratios, count)
+    known = [ratio[:number] for ratio, number in zip(ratios, count.tolist())]
+    result = [_gain(some) if len(some) >= MIN_SAMPLES else None for some in known]
+    own = [gain for gain in result if gain is not None]
+    if len(own) < channels or max(own) > MAX_TINT * min(own):
+        shared = _gain(np.concatenate(known)) if count[channels] >= MIN_SAMPLES else 1.0
+        is_exposure = bool(own) and max(own) <= MAX_TINT * min(own)
+        result = [gain if gain is not None and is_exposure else shared for gain in result]
+    return np.array(result, np.float32)
+
+
+@kernel
+def find_ratios(
+    measured: NDArray[np.floating],
+    expected: NDArray[np.floating],
+    ratios: NDArray[np.floating],
+    count: NDArray[np.int64],
+) -> None:
+    """Ratios of values (m, channels) that are neither noise nor saturated, of every channel (channels, m).
+
+    Adds their numbers to zeros, and that of the samples with any (channels + 1,).
+    """
+    for v in range(measured.shape[0]):
+        any_usable = 0
+        for c in range(measured.shape[1]):
+            value, own = measured[v, c], expected[v, c]
+            if value > DARKEST and own > DARKEST and value < BRIGHTEST and own < BRIGHTEST:  # False for NaN
+                ratios[c, count[c]] = value / own
+                count[c] += 1
+                any_usable = 1
+        count[measured.shape[1]] += any_usable
 
 
 def _gain(ratios: NDArray[np.floating]) -> float:

@@ -62,7 +62,7 @@ def matched(
     """Residuals of the places in the image, two for each sample, whose patch is found there; see `Term.match`."""
     of_samples = np.argmax(seen.interpolation.spread(np.eye(int(patches.max()) + 1)[patches]), axis=1)
     shift = _shifts(seen, (shape[0], shape[1]), of_samples, costs)
-    found = np.flatnonzero(np.isfinite(shift[:, 0]))
+    found = np.isfinite(shift[:, 0]).nonzero()[0]
     vertices = seen.interpolation.spread(surface.vertices[0].T)
     return found_at(camera, vertices, found, shift[found], seen.interpolation.follow(sparse_jacobian))
 

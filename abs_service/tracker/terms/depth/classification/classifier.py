@@ -49,14 +49,16 @@ class Classifier:
         """
         missing, silhouette = np.isnan(distance), np.isfinite(expected)
         beyond, single = self._beyond_view.observe(missing, silhouette, window), dropouts(missing)
-        beyond |= self._nearest_range.observe(distance, missing & ~(single | beyond), silhouette, window)
-        beyond |= self._fixed_edges.observe(missing, missing & ~(single | beyond), silhouette, window)
+        areas = missing & ~single
+        beyond |= self._nearest_range.observe(distance, areas & ~beyond, silhouette, window)
+        beyond |= self._fixed_edges.observe(missing, areas & ~beyond, silhouette, window)
+        areas &= ~beyond
         if not self._begun:
             self._step = separating_step(distance, silhouette)
         # A flat thing that is lifted ends as others do, and its surface may be steep then.
         is_flat = self._step < MAX_STEP_M and not separates(MAX_STEP_M, distance, silhouette)
         step = self._step if is_flat else MAX_STEP_M
-        surfaces, areas = surfaces_of(distance, step), missing & ~(single | beyond)
+        surfaces = surfaces_of(distance, step)
         # What the surface goes on beyond is a hole, not the background. If there is none at first, none is looked for.
         hole = interruptions(surfaces, areas, silhouette) if self._is_interrupted else np.False_
         if not self._begun:

@@ -10,9 +10,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.pairing.images import Window, limits
+from abs_service.pairing.images import Window
 from abs_service.tracker.synthesis.window import corner
 from abs_service.tracker.terms.depth.classification.neighbourhood import grown
+from calib.jit import kernel
 
 #: Pixels this near to the predicted mesh may be on the object's outline: a mesh ends up to a cell inside.
 NEAR_PX = 16
@@ -104,12 +105,7 @@ class FixedEdges:
 
     def _compare(self, missing: NDArray[np.bool_], window: Window) -> None:
         """Finds the places at which the outline is another one, or out of the window."""
-        top, bottom, left, right = limits(window, self._shape)
-        low, high = np.minimum(self._last, self._next), np.maximum(self._last, self._next)
-        self._is_fixed &= (low >= (top, left)).all(axis=1) & (high < (bottom, right)).all(axis=1)
-        known = np.flatnonzero(self._is_fixed)
-        last, beside = (tuple((at[known] - (top, left)).T) for at in (self._last, self._next))
-        self._is_fixed[known] = ~missing[last] & missing[beside]
+        compare_places(self._last, self._next, missing, corner(window), self._is_fixed)
 
     def _settle(self) -> None:
         """Finds the places at which the object may end, or the field of view."""
@@ -158,6 +154,28 @@ class FixedEdges:
     def _is_refuted(self, edge: Edge) -> bool:
         """True if there has been a return beyond an edge."""
         return bool(np.count_nonzero(self._returned & edge.far) >= MIN_RETURNS)
+
+
+@kernel
+def compare_places(
+    last: NDArray[np.intp],
+    beside: NDArray[np.intp],
+    missing: NDArray[np.bool_],
+    corner: tuple[int, int],
+    is_fixed: NDArray[np.bool_],
+) -> None:
+    """Sets False at places where returns do not end as they did, or that are out of the window.
+
+    Args:
+        last, beside: last pixels with a return and those beyond (k, 2), in the image.
+        missing: pixels without return (rows, columns) in the window, which begins at a corner (row, column).
+        is_fixed: (k,).
+    """
+    (height, width), (top, left) = missing.shape, corner
+    for k in range(is_fixed.size):
+        y, x, next_y, next_x = last[k, 0] - top, last[k, 1] - left, beside[k, 0] - top, beside[k, 1] - left
+        inside = min(y, next_y) >= 0 and max(y, next_y) < height and min(x, next_x) >= 0 and max(x, next_x) < width
+        is_fixed[k] = is_fixed[k] and inside and not missing[y, x] and missing[next_y, next_x]
 
 
 def _outline(

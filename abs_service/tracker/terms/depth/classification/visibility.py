@@ -120,7 +120,9 @@ def classify(
     if missing.any():
         hole, past = _holes(missing & ~(single | beyond), np.isfinite(predicted), near / focal, empty)
         hole |= beyond
-    away = _depth_inside(~shown) * near / np.float32(focal)
+    away = _depth_inside(~shown)
+    away *= near
+    away /= np.float32(focal)
     return Visibility(shown, foreground, hole, single, nothing | beyond, where(behind | past, away), nothing, nothing)
 
 

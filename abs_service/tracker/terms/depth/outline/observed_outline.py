@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from abs_service.tracker.memo import Memo
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.perspective import project_with_jacobian
-from abs_service.tracker.terms.depth.outline.rim import Edges, LocatedEdges, OutlineImage, by_side, chain
+from abs_service.tracker.terms.depth.outline.rim import Edges, LocatedEdges, OutlineImage, chain
 from abs_service.tracker.terms.depth.outline.rim_classes import MAX_GAP_STEPS
 from abs_service.tracker.terms.depth.outline.rim_cost import MAX_DEVIATIONS
 from abs_service.tracker.terms.depth.outline.rim_match import shift_to_outline
-from abs_service.tracker.terms.depth.outline.rim_motion import displacement, motion
+from abs_service.tracker.terms.depth.outline.rim_motion import by_side, displacement, motion
 from abs_service.tracker.terms.depth.outline.rim_normal import across_rim
 from abs_service.tracker.terms.depth.outline.round_outline import without_turn
 from abs_service.tracker.terms.linearization import Linearization, PointLinearization
@@ -73,7 +73,7 @@ class ObservedRimOutline:
         points = self.edges.points(surface)
         values, gradients = self.image.look_at(points)
         residual, points = values / self.deviation, points[0].T
-        use = np.flatnonzero(np.abs(residual) < MAX_DEVIATIONS)
+        use = (np.abs(residual) < MAX_DEVIATIONS).nonzero()[0]
         by_place = project_with_jacobian(self.image.camera, points[use].astype(np.float64))[1]
         shown = across_rim(gradients[use], self.along[use])
         shown = without_turn(shown, by_place, points[use]) if self.is_round else shown

@@ -57,7 +57,7 @@ class Raggedness:
             directions: unit ones out of the mesh, in the image (k, 2).
             places: of the edges in the image (k, 2) [px].
         """
-        known = np.flatnonzero(~np.isnan(away))
+        known = (~np.isnan(away)).nonzero()[0]
         near = np.count_nonzero(np.abs(away[known]) < LIMIT_PX)
         if self._maximum <= self._minimum or near < max(MIN_OF_A_SIDE, len(known) / 2):
             return

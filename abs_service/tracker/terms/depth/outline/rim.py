@@ -236,10 +236,3 @@ def extrapolate_rim(vertices: NDArray[np.float32], edges: Edges, points: NDArray
         for v in range(outer.size):
             end = of_vertices[outer[v]]
             points[0, i, v] = end + beyond[v] * (end - of_vertices[inner[v]])
-
-
-def by_side(directions: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Masks (4, k) of image directions (k, 2) that are nearest to right, down, left and up."""
-    # A whole turn more, so that integers cut to the quarter below.
-    quarter = (np.arctan2(directions[:, 1], directions[:, 0]) * (2 / np.pi) + 4.5).astype(np.intp) % 4
-    return quarter == np.arange(4)[:, None]

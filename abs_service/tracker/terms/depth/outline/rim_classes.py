@@ -12,6 +12,7 @@ from abs_service.tracker.terms.depth.outline.rim import Rim, read
 from abs_service.tracker.terms.depth.outline.round_side import is_round_side
 from abs_service.tracker.terms.sensor_fit import MIN_RIM
 from calib.camera import Camera
+from calib.jit import kernel
 
 #: The object continues beyond the outermost vertices by no more than so many times their distance from the next ones.
 MAX_GAP_STEPS = 2.0
@@ -111,7 +112,9 @@ def turns_away(camera: Camera, surface: Surface, outer: NDArray[np.intp], inner:
 
     Extrapolated to the end of the surface, which lies about as far outside the outer vertex as the inner one inside.
     """
-    return 2 * _cosine(camera, surface, outer) - _cosine(camera, surface, inner) < MIN_COSINE
+    result = np.empty(len(outer), np.bool_)
+    _turn_away(surface.vertices[0], surface.normals[0], camera.center, outer, inner, result)
+    return result
 
 
 def _are_few(classes: NDArray[np.uint8]) -> bool:
@@ -193,8 +196,23 @@ def _leaves(camera: Camera, points: NDArray[np.float64], distance: NDArray[np.fl
     return np.abs(np.median(off[known][near], axis=1)) > LEAVES_M if known.any() else np.zeros(len(points), np.bool_)
 
 
-def _cosine(camera: Camera, surface: Surface, which: NDArray[np.intp]) -> NDArray[np.float64]:
-    """Cosine (k,) between line of sight and normal of vertices."""
-    sight = surface.vertices[0].T[which].astype(np.float64) - camera.center
-    along = np.einsum("ki,ki->k", surface.normals[0].T[which].astype(np.float64), sight)
-    return np.abs(along) / np.linalg.norm(sight, axis=1)
+@kernel
+def _turn_away(
+    vertices: NDArray[np.float32],
+    normals: NDArray[np.float32],
+    center: NDArray[np.float64],
+    outer: NDArray[np.intp],
+    inner: NDArray[np.intp],
+    result: NDArray[np.bool_],
+) -> None:
+    """See `turns_away`; vertices and normals (3, n)."""
+    for k in range(outer.size):
+        beyond = 0.0
+        for v, share in ((outer[k], 2.0), (inner[k], -1.0)):
+            square, along = 0.0, 0.0
+            for i in range(3):
+                sight = np.float64(vertices[i, v]) - center[i]
+                square += sight * sight
+                along += normals[i, v] * sight
+            beyond += share * abs(along) / np.sqrt(square)
+        result[k] = beyond < MIN_COSINE

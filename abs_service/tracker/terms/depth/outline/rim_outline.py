@@ -70,6 +70,7 @@ class RimOutline:
         self._rim = rim
         self._edges = Edges(rim.outer, rim.inner, np.zeros(len(rim.outer), np.float32))
         self._first, self._was_cut = np.zeros((len(rim.outer), 2)), np.zeros(len(rim.outer), np.bool_)
+        self._is_cut, self._free, self._covered, self._of_vertices = self._was_cut, self._edges, self._edges, b""
         self._raggedness = Raggedness(deviation, ragged)
         self._min_off_px = max(OFF_PX, MAX_DEVIATIONS * deviation)
         self._images, self._is_round, self._size = 0, False, (camera.width, camera.height)
@@ -90,7 +91,9 @@ class RimOutline:
         if not self._images:
             self._classify(image, predicted, distance)
         is_cut = self._find_cut(predicted, seen.beyond, window)
-        edges, hidden = self._in_sight(predicted, is_cut, expected, window)
+        if not (self._images and np.array_equal(is_cut, self._is_cut)):
+            self._sort(is_cut, predicted.vertices.shape[2])
+        edges, hidden = self._in_sight(predicted, expected, window)
         located = image.locate(edges, predicted)
         self._is_round = self._is_round if self._images else is_round(self._camera, located.points, away, first)
         self._images += 1
@@ -102,7 +105,7 @@ class RimOutline:
             edges=edges,
             is_sure=self._are_ends(edges, predicted, located.places, distance, seen.unsettled, window),
             hidden=hidden,
-            covered=self._covered(is_cut),
+            covered=self._covered,
             along=rim_directions(located.places, located.directions),
             is_round=self._is_round,
             deviation=deviation,
@@ -110,14 +113,22 @@ class RimOutline:
             lost_at=partial(self._read, seen.lost, window),
             doubtful=doubtful,
             kernel=self._kernel,
-            classes=self._of_vertices(predicted.vertices.shape[2], is_cut),
+            classes=self._of_vertices,
             located=Memo({predicted: located}),
         )
 
-    def _covered(self, is_cut: NDArray[np.bool_]) -> Edges:
-        """Edges beyond which something hid the object in the first image, or that its border cuts, or the view (k,)."""
+    def _sort(self, is_cut: NDArray[np.bool_], vertices: int) -> None:
+        """Sorts the edges, of which the view cuts some (k,): at those, the mesh of so many vertices ends at a border.
+
+        Covered are edges beyond which something hid the object in the first image, or that its border cuts, or the
+        view.
+        """
         hides = (self.classes == RimClass.OCCLUDED) | (self.classes == RimClass.BORDER)
-        return self._edges.some(np.flatnonzero(hides | is_cut))
+        self._is_cut, self._covered = is_cut, self._edges.some((hides | is_cut).nonzero()[0])
+        self._free = self._edges.some(((self.classes == RimClass.FREE) & ~is_cut).nonzero()[0])
+        found = np.zeros(vertices, np.uint8)
+        found[self._rim.outer] = 1 + np.where(is_cut, np.uint8(RimClass.BORDER), self.classes)
+        self._of_vertices = found.tobytes()
 
     def _read(
         self, part: NDArray[np.float32] | NDArray[np.bool_], window: Window, places: NDArray[np.float64]
@@ -126,22 +137,13 @@ class RimOutline:
         first = np.array(corner(window)[::-1], np.float32)
         return read(part.astype(np.float32, copy=False), first, places, self._size)
 
-    def _in_sight(
-        self, predicted: Surface, is_cut: NDArray[np.bool_], expected: NDArray[np.float32], window: Window
-    ) -> tuple[Edges, int]:
+    def _in_sight(self, predicted: Surface, expected: NDArray[np.float32], window: Window) -> tuple[Edges, int]:
         """Free edges that the predicted mesh does not hide, and the number of those that it hides; see `observe`."""
-        free = self._edges.some(np.flatnonzero((self.classes == RimClass.FREE) & ~is_cut))
-        ends = free.ends(predicted)
+        ends = self._free.ends(predicted)
         in_front = self._read(expected, window, project_with_jacobian(self._camera, ends)[0])
         behind = in_front < np.linalg.norm(ends - self._camera.center, axis=1) - HIDDEN_BEHIND_M
         hidden = behind & (in_front > -np.inf)
-        return free.some(np.flatnonzero(~hidden)), int(np.count_nonzero(hidden))
-
-    def _of_vertices(self, count: int, is_cut: NDArray[np.bool_]) -> bytes:
-        """Classes of all `count` vertices, as in `RimFit`; edges (k,) that are cut now end at a border."""
-        found = np.zeros(count, np.uint8)
-        found[self._rim.outer] = 1 + np.where(is_cut, np.uint8(RimClass.BORDER), self.classes)
-        return found.tobytes()
+        return self._free.some((~hidden).nonzero()[0]), int(np.count_nonzero(hidden))
 
     def _classify(self, image: OutlineImage, predicted: Surface, distance: NDArray[np.float32]) -> None:
         """Finds the free edges in the first image, and the gaps between them and the end of the object."""

@@ -2,10 +2,23 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from abs_service.tracker.terms.base import Bounds, Prediction
 from abs_service.tracker.terms.depth.depth import DepthTerm
+from abs_service.tracker.terms.depth.depth_cost import Residuals
 from abs_service.tracker.terms.depth.fluctuation import MIN_FRAMES, MIN_VERTICES, Fluctuation
+from abs_service.tracker.terms.depth.observed_depth import MAX_MISFIT_M, write_misfit
+from abs_service.tracker.terms.depth.pixel_classes import (
+    BEYOND,
+    COVERED,
+    DOUBTFUL,
+    LOST,
+    Masks,
+    PixelClasses,
+    join_classes,
+)
 from calib.camera import Camera
 from calib.noise.constant import Constant
 from tests.abs_service.tracker.scenes import as_surface, depth_image, sparse
@@ -74,3 +87,31 @@ def test_what_is_learnt_of_a_frame_counts_from_the_next_one_on():
         scales.append(frame.scale)
     assert scales[0] == 1
     assert scales[-1] == pytest.approx(4, rel=0.2)
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_the_misfit_of_a_vertex_is_what_its_pixel_shows(seed: int):
+    generator, n = np.random.default_rng(seed), 40
+    pixel = generator.integers(-1, 30, n).astype(np.int32)
+    cost = np.where(generator.random(n) < 0.3, np.inf, 1.0)
+    residuals = Residuals(generator.standard_normal(n) * 30, generator.uniform(100, 500, n), cost)
+    bits = generator.choice([0, 0, 0, LOST, COVERED, BEYOND, DOUBTFUL, LOST + BEYOND], 30).astype(np.uint8)
+    free_m = generator.uniform(0, 0.1, 30).astype(np.float32)
+    at, found = np.maximum(pixel, 0), np.zeros((2, n))
+    signed = np.clip(residuals.normalized / residuals.inverse_deviation, -MAX_MISFIT_M, MAX_MISFIT_M)
+    expected = [
+        np.where(cost < np.inf, signed, free_m[at]),
+        np.where(cost < np.inf, 1 / residuals.inverse_deviation, 0),
+    ]
+    write_misfit(pixel, residuals, bits, free_m, found)
+    np.testing.assert_allclose(found, expected * ((pixel > 0) & np.isin(bits, [0, BEYOND])[at]))
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_the_classes_of_a_pixel_are_joined_to_bits(seed: int):
+    masks, bits = Masks(*(np.random.default_rng(seed).random((5, 4, 6)) < 0.3)), np.empty((4, 6), np.uint8)
+    join_classes(masks, bits)
+    found, lost = PixelClasses(bits, np.zeros((4, 6), np.float32)), masks.hole | masks.dropout
+    by_bit = ((LOST, lost), (COVERED, masks.foreground), (BEYOND, masks.beyond), (DOUBTFUL, masks.doubtful))
+    for bit, mask in by_bit:
+        np.testing.assert_array_equal(found.has(bit), mask)

@@ -2,12 +2,14 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from abs_service.pairing.images import BAYER_ORDERS, ONE_CHANNEL, ChannelImage
 from abs_service.tracker.objectives import likelihood
 from abs_service.tracker.terms.base import Prediction
 from abs_service.tracker.terms.photometric.channel import ChannelTerm
-from abs_service.tracker.terms.photometric.exposure import gains
+from abs_service.tracker.terms.photometric.exposure import BRIGHTEST, DARKEST, find_ratios, gains
 from abs_service.tracker.terms.photometric.illumination import Exposed, Passive
 from calib.noise.images.bayer import GaussianBayer
 from calib.noise.images.grey import GaussianGrey
@@ -81,3 +83,16 @@ def test_a_darker_image_of_one_value_per_pixel_costs_no_more_where_exposure_adap
         costs.append(float(term.cost(surface)[0]))
     assert (costs[1] > costs[0] + 100) == remains
     assert remains or costs[1] == pytest.approx(costs[0], abs=1.0)
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_ratios_are_those_of_values_that_are_neither_noise_nor_saturated(seed: int):
+    generator = np.random.default_rng(seed)
+    measured, expected = generator.uniform(0, 300, (2, 20, 3))
+    measured[generator.random((20, 3)) < 0.2] = np.nan
+    ratios, count = np.full((3, 20), np.nan), np.zeros(4, np.int64)
+    find_ratios(measured, expected, ratios, count)
+    usable = (np.fmin(measured, expected) > DARKEST) & (np.fmax(measured, expected) < BRIGHTEST) & (measured > 0)
+    assert count.tolist() == [*usable.sum(axis=0), usable.any(axis=1).sum()]
+    for channel, chosen in enumerate(usable.T):
+        np.testing.assert_allclose(ratios[channel, : count[channel]], (measured / expected)[chosen, channel])

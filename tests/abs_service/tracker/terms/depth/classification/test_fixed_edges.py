@@ -2,11 +2,13 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import abs_service as a
 from abs_service.tracker.detection.dropouts import dropouts
 from abs_service.tracker.synthesis.window import WHOLE
-from abs_service.tracker.terms.depth.classification.fixed_edges import LATER_IMAGES, FixedEdges
+from abs_service.tracker.terms.depth.classification.fixed_edges import LATER_IMAGES, FixedEdges, compare_places
 from calib.camera import Camera
 
 HEIGHT, WIDTH = 120, 160
@@ -130,3 +132,16 @@ def test_an_outline_that_has_not_changed_does_not_hold_a_board(
         distance = np.where(on, 0.7 + 0.1 * x**2 + 0.0015 * noise, np.nan)
         status.append(tracker.track(distance, time_s=k / 30, mask=on).status)
     assert status == [expected] * 14
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(0, 30))
+def test_places_stay_fixed_while_returns_end_there(seed: int, count: int):
+    generator, (top, left) = np.random.default_rng(seed), (3, 5)
+    missing = generator.random((6, 8)) < 0.5
+    last, beside = generator.integers(0, 16, (2, count, 2))
+    is_fixed = generator.random(count) < 0.8
+    whole = np.full((20, 20), -1)
+    whole[top : top + 6, left : left + 8] = missing
+    expected = is_fixed & (whole[tuple(last.T)] == 0) & (whole[tuple(beside.T)] == 1)
+    compare_places(last, beside, missing, (top, left), is_fixed)
+    np.testing.assert_array_equal(is_fixed, expected)

@@ -6,6 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import abs_service as a
+from abs_service.tracker.models.base import Surface
+from abs_service.tracker.terms.depth.outline.rim_classes import MIN_COSINE, turns_away
+from abs_service.tracker.terms.depth.outline.rim_motion import by_side
 from abs_service.tracker.terms.depth.outline.rim_normal import EDGES, FACING, MIN_EDGES, across_rim, rim_directions
 from tests.abs_service.tracker.terms.depth.outline.pixelated import (
     HEIGHT,
@@ -74,3 +77,25 @@ def test_the_directions_match_numpy(seed: int, count: int):
     found = rim_directions(places, directions)
     np.testing.assert_allclose(np.abs(np.vecdot(found, expected)), np.vecdot(expected, expected), atol=1e-6)
     np.testing.assert_allclose(np.vecdot(found, found), np.vecdot(expected, expected), atol=1e-12)
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(0, 40))
+def test_edges_face_the_nearest_side_of_the_image(seed: int, count: int):
+    directions = np.random.default_rng(seed).standard_normal((count, 2))
+    right, down = directions.T
+    expected = [right > abs(down), down > abs(right), -right > abs(down), -down > abs(right)]
+    np.testing.assert_array_equal(by_side(directions), np.reshape(expected, (4, count)))
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_a_surface_turns_away_at_its_rim_as_the_cosines_there_and_inside_say(seed: int):
+    generator, camera = np.random.default_rng(seed), a.Camera(WIDTH, HEIGHT, fx=270, fy=270, cx=159.5, cy=119.5)
+    vertices = generator.uniform((-1, -1, 1), (1, 1, 3), (30, 3))
+    normals = generator.standard_normal((30, 3))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    surface = Surface(*(np.ascontiguousarray(part.T[None], np.float32) for part in (vertices, normals)))
+    outer, inner = np.arange(15), np.arange(15, 30)
+    cosine = np.abs(np.vecdot(normals, vertices)) / np.linalg.norm(vertices, axis=1)
+    beyond = 2 * cosine[outer] - cosine[inner]
+    sure = np.abs(beyond - MIN_COSINE) > 1e-5
+    np.testing.assert_array_equal(turns_away(camera, surface, outer, inner)[sure], (beyond < MIN_COSINE)[sure])
