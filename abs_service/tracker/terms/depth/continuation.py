@@ -86,7 +86,7 @@ class CoarseContinuation:
         if not explained:
             return float("nan")
         pixel_m = mean_m / self._focal
-        away = cv2.distanceTransform(off, cv2.DIST_L2, cv2.DIST_MASK_3)
+        away = np.asarray(cv2.distanceTransform(off, cv2.DIST_L2, cv2.DIST_MASK_3), np.float32)
         left = count_within(away, shown, max(self._gap_m / pixel_m, 1.0), self._reach_m / pixel_m)
         return left / (left + explained)
 

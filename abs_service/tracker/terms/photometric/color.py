@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.pairing.images import ColorImage, Image, Window
+from abs_service.tracker.memo import Memo
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import ObservedView, Resampling, Synthesis, Synthesizer, once
 from abs_service.tracker.synthesis.perspective import project_with_jacobian
@@ -117,7 +118,7 @@ class ObservedColor:
         pixels: the same with a border of one pixel, as samples read them.
         inverse: inverse deviations (n or 1, 3) of the samples' colours.
         normalizer: cost (n or 1,) of a colour that agrees exactly.
-        shone: what was synthesised of populations of one, see `once`.
+        shone: syntheses of populations of one, see `once`.
     """
 
     sensor: str
@@ -129,7 +130,7 @@ class ObservedColor:
     pixels: CopiedPixels
     inverse: NDArray[np.float32]
     normalizer: NDArray[np.float32]
-    shone: dict[Surface, Synthesis] = field(default_factory=dict)
+    shone: Memo[Surface, Synthesis] = field(init=False, default_factory=Memo[Surface, Synthesis])
 
     @property
     def occluders(self) -> NDArray[np.float64]:
