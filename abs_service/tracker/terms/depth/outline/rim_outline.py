@@ -6,6 +6,7 @@ image (`rim_classes`).
 """
 
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +20,9 @@ from abs_service.tracker.synthesis.window import WHOLE, corner
 from abs_service.tracker.terms.depth.classification.fixed_edges import MARGIN
 from abs_service.tracker.terms.depth.classification.outline_distance import inwards
 from abs_service.tracker.terms.depth.classification.visibility import Visibility
-from abs_service.tracker.terms.depth.outline.observed_outline import ObservedRimOutline
+from abs_service.tracker.terms.depth.outline.observed_outline import GapErrors, ObservedRimOutline, by_pixels
 from abs_service.tracker.terms.depth.outline.raggedness import Raggedness
-from abs_service.tracker.terms.depth.outline.rim import Edges, OutlineImage, Rim, read
+from abs_service.tracker.terms.depth.outline.rim import Edges, OutlineImage, Rim, by_side, read
 from abs_service.tracker.terms.depth.outline.rim_classes import RimClass, classify_rim, turns_away
 from abs_service.tracker.terms.depth.outline.rim_cost import MAX_DEVIATIONS, rim_cost
 from abs_service.tracker.terms.depth.outline.rim_gap import exact_gap
@@ -43,6 +44,24 @@ BESIDE_PX = 2.0
 
 #: Steps (column, row) towards the right, lower, left and upper side of the image.
 _TO_SIDES = np.array([[1, 0], [0, 1], [-1, 0], [0, -1]])
+
+
+class SortedEdges(NamedTuple):
+    """The edges of a rim by their class.
+
+    Attributes:
+        is_cut: True for those (k,) that the view cuts.
+        free: the free ones.
+        taken: errors of the first image that these have in their gaps.
+        covered: edges beyond which something hid the object in the first image, or that its border cut, or the view.
+        classes: of every vertex, as in `RimFit`.
+    """
+
+    is_cut: NDArray[np.bool_]
+    free: Edges
+    taken: GapErrors
+    covered: Edges
+    classes: bytes
 
 
 class RimOutline:
@@ -70,8 +89,9 @@ class RimOutline:
         self._rim = rim
         self._edges = Edges(rim.outer, rim.inner, np.zeros(len(rim.outer), np.float32))
         self._first, self._was_cut = np.zeros((len(rim.outer), 2)), np.zeros(len(rim.outer), np.bool_)
-        self._is_cut, self._free, self._covered, self._of_vertices = self._was_cut, self._edges, self._edges, b""
         self._raggedness = Raggedness(deviation, ragged)
+        self._taken = GapErrors(np.zeros((4, len(rim.outer))), np.zeros(4), deviation)
+        self._sorted = SortedEdges(self._was_cut, self._edges, self._taken, self._edges, b"")
         self._min_off_px = max(OFF_PX, MAX_DEVIATIONS * deviation)
         self._images, self._is_round, self._size = 0, False, (camera.width, camera.height)
 
@@ -91,10 +111,10 @@ class RimOutline:
         if not self._images:
             self._classify(image, predicted, distance)
         is_cut = self._find_cut(predicted, seen.beyond, window)
-        if not (self._images and np.array_equal(is_cut, self._is_cut)):
-            self._sort(is_cut, predicted.vertices.shape[2])
-        edges, hidden = self._in_sight(predicted, expected, window)
-        located = image.locate(edges, predicted)
+        if not (self._images and np.array_equal(is_cut, self._sorted.is_cut)):
+            self._sorted = self._sort(is_cut, predicted.vertices.shape[2])
+        which, hidden = self._in_sight(predicted, expected, window)
+        located = image.locate(edges := self._sorted.free.some(which), predicted)
         self._is_round = self._is_round if self._images else is_round(self._camera, located.points, away, first)
         self._images += 1
         self._raggedness.update(located.away, located.directions, located.places)  # counts from the next frame on
@@ -105,30 +125,27 @@ class RimOutline:
             edges=edges,
             is_sure=self._are_ends(edges, predicted, located.places, distance, seen.unsettled, window),
             hidden=hidden,
-            covered=self._covered,
+            covered=self._sorted.covered,
             along=rim_directions(located.places, located.directions),
             is_round=self._is_round,
+            taken=self._sorted.taken.some(which).grown(edges.lengths(self._camera, predicted, located.places)),
             deviation=deviation,
             off_px=off_px,
             lost_at=partial(self._read, seen.lost, window),
             doubtful=doubtful,
             kernel=self._kernel,
-            classes=self._of_vertices,
+            classes=self._sorted.classes,
             located=Memo({predicted: located}),
         )
 
-    def _sort(self, is_cut: NDArray[np.bool_], vertices: int) -> None:
-        """Sorts the edges, of which the view cuts some (k,): at those, the mesh of so many vertices ends at a border.
-
-        Covered are edges beyond which something hid the object in the first image, or that its border cuts, or the
-        view.
-        """
+    def _sort(self, is_cut: NDArray[np.bool_], vertices: int) -> "SortedEdges":
+        """The edges, of which the view cuts some (k,): at those, the mesh of so many vertices ends at a border."""
         hides = (self.classes == RimClass.OCCLUDED) | (self.classes == RimClass.BORDER)
-        self._is_cut, self._covered = is_cut, self._edges.some((hides | is_cut).nonzero()[0])
-        self._free = self._edges.some(((self.classes == RimClass.FREE) & ~is_cut).nonzero()[0])
+        free = ((self.classes == RimClass.FREE) & ~is_cut).nonzero()[0]
         found = np.zeros(vertices, np.uint8)
         found[self._rim.outer] = 1 + np.where(is_cut, np.uint8(RimClass.BORDER), self.classes)
-        self._of_vertices = found.tobytes()
+        covered = self._edges.some((hides | is_cut).nonzero()[0])
+        return SortedEdges(is_cut, self._edges.some(free), self._taken.some(free), covered, found.tobytes())
 
     def _read(
         self, part: NDArray[np.float32] | NDArray[np.bool_], window: Window, places: NDArray[np.float64]
@@ -137,13 +154,15 @@ class RimOutline:
         first = np.array(corner(window)[::-1], np.float32)
         return read(part.astype(np.float32, copy=False), first, places, self._size)
 
-    def _in_sight(self, predicted: Surface, expected: NDArray[np.float32], window: Window) -> tuple[Edges, int]:
-        """Free edges that the predicted mesh does not hide, and the number of those that it hides; see `observe`."""
-        ends = self._free.ends(predicted)
+    def _in_sight(
+        self, predicted: Surface, expected: NDArray[np.float32], window: Window
+    ) -> tuple[NDArray[np.intp], int]:
+        """Indices of free edges that the predicted mesh does not hide, and the number of those that it hides."""
+        ends = self._sorted.free.ends(predicted)
         in_front = self._read(expected, window, project_with_jacobian(self._camera, ends)[0])
         behind = in_front < np.linalg.norm(ends - self._camera.center, axis=1) - HIDDEN_BEHIND_M
         hidden = behind & (in_front > -np.inf)
-        return self._free.some((~hidden).nonzero()[0]), int(np.count_nonzero(hidden))
+        return (~hidden).nonzero()[0], int(np.count_nonzero(hidden))
 
     def _classify(self, image: OutlineImage, predicted: Surface, distance: NDArray[np.float32]) -> None:
         """Finds the free edges in the first image, and the gaps between them and the end of the object."""
@@ -154,6 +173,10 @@ class RimOutline:
         gap = exact_gap(self._camera, outer, outer - inner, gap, image.look)
         self._edges = Edges(self._rim.outer, self._rim.inner, gap)
         self._first = self._beside(predicted)
+        places = self._camera.project(self._edges.points(predicted)[0].T.astype(np.float64))
+        length = np.maximum(self._edges.lengths(self._camera, predicted, places), 1.0)
+        has_gap = by_side(image.look(places)[1]) & (gap > 0)
+        self._taken = self._taken._replace(shares=has_gap / length, coherence=by_pixels(places, has_gap))
 
     def _beside(self, surface: Surface) -> NDArray[np.float64]:
         """Places (k, 2) in the image of a population of one, `BESIDE_PX` outside the edges."""
