@@ -98,20 +98,34 @@ def lining(surface: NDArray[np.bool_], measured: NDArray[np.bool_]) -> int:
         surface: its pixels (height, width).
         measured: pixels (height, width) with a return.
     """
+    below = _below_border(surface, measured)
+    length = int(np.count_nonzero((below > BELOW_BORDER_PX - 1) & (below <= BELOW_BORDER_PX)))
+    return length if length > LINING * np.sqrt(np.count_nonzero(surface)) else 0
+
+
+def at_border(surface: NDArray[np.bool_], measured: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Pixels (height, width) of a surface at the border of what is measured, where that is about the image's.
+
+    Arguments as of `lining`.
+    """
+    below = _below_border(surface, measured)
+    return (below > 0) & (below <= BELOW_BORDER_PX)
+
+
+def _below_border(surface: NDArray[np.bool_], measured: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """Depth (height, width) [px] of a surface's pixels below the border of all that is measured; 0 elsewhere."""
     margin_y, margin_x = (round(SCENE_MARGIN * size) + BELOW_BORDER_PX for size in surface.shape)
     near = surface.copy()
     near[margin_y : surface.shape[0] - margin_y, margin_x : surface.shape[1] - margin_x] = False
     if not near.any():
-        return 0
+        return np.zeros(surface.shape, np.float32)
     # The ends of the rows have the hull of all that is measured, which takes a hundred times as long.
     rows = np.flatnonzero(measured.any(axis=1))
     first, last = measured[rows].argmax(axis=1), surface.shape[1] - 1 - measured[rows, ::-1].argmax(axis=1)
     ends = np.concatenate([np.stack([first, rows], 1), np.stack([last, rows], 1)]).astype(np.int32)
     # Surrounded by one pixel, so that the image's border is an edge as well.
     hull = cv2.fillConvexPoly(np.zeros(np.add(surface.shape, 2), np.uint8), cv2.convexHull(ends + 1), 1)
-    below = cv2.distanceTransform(hull, cv2.DIST_L2, cv2.DIST_MASK_5)[1:-1, 1:-1]
-    length = int(np.count_nonzero(near & (below > BELOW_BORDER_PX - 1) & (below <= BELOW_BORDER_PX)))
-    return length if length > LINING * np.sqrt(np.count_nonzero(surface)) else 0
+    return np.where(near, cv2.distanceTransform(hull, cv2.DIST_L2, cv2.DIST_MASK_5)[1:-1, 1:-1], 0).astype(np.float32)
 
 
 def doubts(detection: InitialDetection, mesh: Mesh, images: Mapping[str, Image], rig: Rig) -> tuple[str, ...]:

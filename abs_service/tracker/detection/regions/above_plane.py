@@ -10,13 +10,22 @@ from numpy.typing import NDArray
 from abs_service.tracker.detection.depth_view import DepthView, limited
 from abs_service.tracker.detection.initial_detection import DetectionError
 from abs_service.tracker.detection.plausibility import lining
-from abs_service.tracker.detection.segments.depth_segments import deepest_pixel, large_surfaces, surface_at
-from abs_service.tracker.detection.segments.dominant_plane import CLEARANCE_M, above_plane
+from abs_service.tracker.detection.segments.depth_segments import (
+    deepest_pixel,
+    is_within_reach,
+    large_surfaces,
+    surface_at,
+)
+from abs_service.tracker.detection.segments.dominant_plane import CLEARANCE_M, above_plane, heights_above_plane
+from abs_service.tracker.detection.segments.reaching_in import is_lone_arm, resting, without_arms
 from abs_service.tracker.detection.segments.surface_settings import SurfaceSettings
 from abs_service.tracker.detection.segments.within import Restricted, restricted
 
-#: A surface with less than this share of a wall's pixels is ignored.
+#: A surface with less than this share of the pixels of the largest one, a wall or an arm, is ignored.
 SPECK = 0.02
+
+#: The plane ends at this percentile of its distances: some pixels of what is beyond lie in the plane as well.
+PLANE_PERCENT = 95
 
 
 @dataclass(frozen=True)
@@ -27,7 +36,8 @@ class Settings(SurfaceSettings):
         clearance_m: height above the plane up to which a pixel belongs to it [m]; several standard deviations of the
             distances there.
         seed: column and row of a pixel of the object [px]; without it, the object is the largest connected surface,
-            unless that may be a wall or a floor.
+            unless that may be a wall or a floor. Without `within` and `polygon`, arms that reach in over the image's
+            border are left out; see `without_arms`.
         within: mask image as of the region `mask`; pixels outside are ignored, except for finding the plane.
         polygon: corners (column, row) of a polygon around the object [px], three or more; pixels outside are ignored,
             except for finding the plane.
@@ -38,25 +48,38 @@ class Settings(SurfaceSettings):
 
     def build(self) -> Restricted:
         """The region; DetectionError if `within` is missing or no image."""
-        if self.seed is None and self.within is None and self.polygon is None:
-            return restricted(self._unaided, None, None)
+        if self.within is None and self.polygon is None:
+            return restricted(self._unlimited, None, None)
         return Restricted(self._above, restricted(self._selected, self.within, self.polygon).select)
 
-    def _unaided(self, view: DepthView) -> NDArray[np.bool_]:
-        """Pixels (height, width) of the object in a view of which nothing is known; DetectionError if in doubt."""
-        labels, large = self._surfaces(self._above(view))
-        largest = labels == large[0]
-        if lining(largest, view.measured):
-            self._refuse_background(largest, [labels == label for label in large[1:]], view)
-        return largest
+    def _unlimited(self, view: DepthView) -> NDArray[np.bool_]:
+        """Pixels (height, width) of the object in an entire view; DetectionError if there is none, or in doubt."""
+        height = heights_above_plane(view, self.clearance_m)
+        with np.errstate(invalid="ignore"):
+            plane, above = np.abs(height) <= self.clearance_m, limited(view, height > self.clearance_m)
+        if self.seed is not None:
+            thing = self._selected(above)
+            rests = resting(thing, plane, view)
+            alone = without_arms(thing, rests, view.measured)
+            return alone if is_within_reach(self.seed, alone) else thing
+        labels, large = self._surfaces(above)
+        things = _before_background([labels == label for label in large], plane, view)
+        if lining(things[0], view.measured):
+            self._refuse_background(things[0], things[1:], view)
+            return things[0]
+        for thing in things:
+            rests, is_speck = resting(thing, plane, view), _is_speck(thing, things[0])
+            if not (is_speck or is_lone_arm(thing, rests, height, view)):
+                return without_arms(thing, rests, view.measured)
+        return things[0]
 
-    def _refuse_background(self, piece: NDArray[np.bool_], others: list[NDArray[np.bool_]], view: DepthView) -> None:
-        """DetectionError if one of the other surfaces is a thing before `piece`, the largest one, and no speck."""
-        pixels, away = np.count_nonzero(piece), np.median(view.distance[piece])
+    def _refuse_background(self, largest: NDArray[np.bool_], others: list[NDArray[np.bool_]], view: DepthView) -> None:
+        """DetectionError if one of the other surfaces is a thing before the largest one, and no speck."""
+        pixels, away = np.count_nonzero(largest), np.median(view.distance[largest])
         medians = {
             float(np.median(view.distance[other])): other
             for other in others
-            if np.count_nonzero(other) >= SPECK * pixels and not lining(other, view.measured)
+            if not (_is_speck(other, largest) or lining(other, view.measured))
         }
         if medians and min(medians) < away:
             row, column = deepest_pixel(medians[min(medians)])
@@ -90,3 +113,22 @@ class Settings(SurfaceSettings):
 
     def _nothing(self, error: DetectionError) -> DetectionError:
         return DetectionError(f"more than clearance_m = {self.clearance_m:g} m above the plane: {error}")
+
+
+def _before_background(
+    surfaces: list[NDArray[np.bool_]], plane: NDArray[np.bool_], view: DepthView
+) -> list[NDArray[np.bool_]]:
+    """The surfaces, the largest first, without those that are larger than all things but beyond the plane's end.
+
+    Such a wall lies along the image's border. All of them if the others are specks.
+    """
+    end = np.percentile(view.distance[plane], PLANE_PERCENT)
+    for k, surface in enumerate(surfaces):
+        if not (lining(surface, view.measured) and np.median(view.distance[surface]) > end):
+            return surfaces if _is_speck(surface, surfaces[0]) else surfaces[k:]
+    return surfaces
+
+
+def _is_speck(surface: NDArray[np.bool_], largest: NDArray[np.bool_]) -> bool:
+    """True if a surface is too small beside the largest one to be a thing."""
+    return bool(np.count_nonzero(surface) < SPECK * np.count_nonzero(largest))

@@ -108,6 +108,12 @@ def surface_at(
     return labels == labels[row, column]
 
 
+def is_within_reach(pixel: tuple[int, int], surface: NDArray[np.bool_]) -> bool:
+    """True if a surface (height, width) has a pixel within `REACH_PX` of a pixel, its column and row."""
+    rows, columns = np.nonzero(surface)
+    return bool(np.hypot(columns - pixel[0], rows - pixel[1]).min(initial=np.inf) <= REACH_PX)
+
+
 def deepest_pixel(surface: NDArray[np.bool_]) -> tuple[int, int]:
     """Row and column of a surface's pixel (height, width) that is farthest inside it."""
     depth = cv2.distanceTransform(np.pad(surface, 1).view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)[1:-1, 1:-1]

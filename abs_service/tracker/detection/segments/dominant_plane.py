@@ -19,7 +19,13 @@ MAX_PIXELS = 20_000
 
 
 def above_plane(view: DepthView, clearance_m: float) -> NDArray[np.bool_]:
-    """Pixels (height, width) above the dominant plane, on the camera's side.
+    """Pixels (height, width) above the dominant plane, see `heights_above_plane`."""
+    with np.errstate(invalid="ignore"):
+        return heights_above_plane(view, clearance_m) > clearance_m
+
+
+def heights_above_plane(view: DepthView, clearance_m: float) -> NDArray[np.float64]:
+    """Heights (height, width) above the dominant plane, towards the camera's side [m]; NaN without return.
 
     The random generator is seeded, so that the same image has the same plane.
 
@@ -35,13 +41,12 @@ def above_plane(view: DepthView, clearance_m: float) -> NDArray[np.bool_]:
     height = (1 - points_s @ q) / np.linalg.norm(q)
     with np.errstate(invalid="ignore"):
         share = np.count_nonzero(np.abs(height) <= clearance_m) / np.count_nonzero(view.measured)
-        above = height > clearance_m
     if share < MIN_SHARE:
         raise DetectionError(
             f"no plane: the largest has {share:.0%} of the returns within clearance_m = {clearance_m:g} m, "
             f"{MIN_SHARE:.0%} needed"
         )
-    return above
+    return height
 
 
 def _dominant_plane(view: DepthView, tolerance: float) -> NDArray[np.float64]:

@@ -230,6 +230,9 @@ def test_a_real_sponge_is_found_on_its_table(toy):
     sponge = mask.Settings(path).build().select(view)
     with pytest.raises(DetectionError, match=r"has 16% of all returns and lies along the image's border"):
         above_plane.Settings().build().select(view)  # hand, arm and body are connected to it
+    held = above_plane.Settings(seed=(111, 133)).build().select(view)  # with the hand, without arm and body
+    assert np.count_nonzero(held & sponge) > 0.85 * np.count_nonzero(sponge)
+    assert np.count_nonzero(held) < 2 * np.count_nonzero(sponge)
     alone = above_plane.Settings(seed=(111, 133), maximum_step_m=0.015).build().select(view)
     assert np.count_nonzero(alone & sponge) > 0.75 * np.count_nonzero(sponge)
     assert np.count_nonzero(alone & ~sponge) < 0.02 * np.count_nonzero(alone)

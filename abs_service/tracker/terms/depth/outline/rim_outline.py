@@ -22,10 +22,11 @@ from abs_service.tracker.terms.depth.classification.outline_distance import inwa
 from abs_service.tracker.terms.depth.classification.visibility import Visibility
 from abs_service.tracker.terms.depth.outline.observed_outline import GapErrors, ObservedRimOutline, by_pixels
 from abs_service.tracker.terms.depth.outline.raggedness import Raggedness
-from abs_service.tracker.terms.depth.outline.rim import Edges, OutlineImage, Rim, by_side, read
+from abs_service.tracker.terms.depth.outline.rim import Edges, OutlineImage, Rim, read
 from abs_service.tracker.terms.depth.outline.rim_classes import RimClass, classify_rim, turns_away
 from abs_service.tracker.terms.depth.outline.rim_cost import MAX_DEVIATIONS, rim_cost
 from abs_service.tracker.terms.depth.outline.rim_gap import exact_gap
+from abs_service.tracker.terms.depth.outline.rim_motion import by_side
 from abs_service.tracker.terms.depth.outline.rim_normal import rim_directions
 from abs_service.tracker.terms.depth.outline.round_outline import is_round
 from calib.camera import Camera
