@@ -36,8 +36,8 @@ class Settings(SurfaceSettings):
         clearance_m: height above the plane up to which a pixel belongs to it [m]; several standard deviations of the
             distances there.
         seed: column and row of a pixel of the object [px]; without it, the object is the largest connected surface,
-            unless that may be a wall or a floor. Without `within` and `polygon`, arms that reach in over the image's
-            border are left out; see `without_arms`.
+            unless that may be a wall or a floor. Without `within` and `polygon`, an arm that reaches in over the
+            image's border is left out.
         within: mask image as of the region `mask`; pixels outside are ignored, except for finding the plane.
         polygon: corners (column, row) of a polygon around the object [px], three or more; pixels outside are ignored,
             except for finding the plane.

@@ -1,4 +1,4 @@
-"""What reaches in over the image's border to an object on a plane, such as an arm, and where it is cut off."""
+"""Arms: surfaces that reach in over the image's border to an object on a plane, and where they are cut off."""
 
 import cv2
 import numpy as np
