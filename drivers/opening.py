@@ -93,8 +93,9 @@ def _result(scheme: str, search: Future[list[Found]], timeout_s: float, grace_s:
     return [Found(DeviceInfo(f"{scheme}://", scheme, ""), Availability.FAULTY, reason, remedy)]
 
 
+@cache
 def entry_points(group: str) -> importlib.metadata.EntryPoints:
-    """Entry points of a group, of all installed distributions."""
+    """Entry points of a group, of all installed distributions; looked for once in a process, as `declared` are."""
     return declared().select(group=group)
 
 

@@ -92,9 +92,9 @@ class Solution:
         """Covariance of all parameters, in the order of `parameters` (n, n)."""
         return self.adjustment.covariance
 
-    @cached_property
-    def parameters(self) -> list[Parameter]:
-        """All free parameters, in the order of the covariance."""
+    @property
+    def values(self) -> list[float]:
+        """Values of all free parameters, in the order of the covariance."""
         layout = self.adjustment.layout
         values = [
             _value(self.state.sensors[sensor], free, name)
@@ -103,8 +103,13 @@ class Solution:
         ]
         for shot in layout.shots:
             values.extend(np.concatenate(pose.to_rotation_vector(self.state.boards[shot])).tolist())
+        return values
+
+    @cached_property
+    def parameters(self) -> list[Parameter]:
+        """All free parameters, in the order of the covariance."""
         sigmas = np.sqrt(np.diag(self.covariance)).tolist()
-        return [Parameter(*each) for each in zip(layout.names, values, sigmas, strict=True)]
+        return [Parameter(*each) for each in zip(self.adjustment.layout.names, self.values, sigmas, strict=True)]
 
     @cached_property
     def views(self) -> list[ViewFit]:

@@ -31,7 +31,7 @@ def deviations(solution: Solution, count: int, generator: np.random.Generator) -
     for _ in range(count):
         drawn = generator.choice(solution.task.shots, len(solution.task.shots)).tolist()
         try:
-            found.append([each.value for each in _solved(solution, drawn).parameters[:free]])
+            found.append(_solved(solution, drawn).values[:free])
         except (NotSolvedError, UndeterminedError):
             continue
     low, high = np.percentile(found, (15.87, 84.13), axis=0)

@@ -22,6 +22,7 @@ from scipy.linalg import eigh
 from abs_service.report.content import Column, Section, Table
 from abs_service.tracker.estimates.estimate import Estimate
 from abs_service.tracker.models.base import DeformationModel, SparseJacobian
+from abs_service.tracker.posterior.priors import settings as priors
 from abs_service.tracker.posterior.priors.change_metric import ChangeMetric
 from abs_service.tracker.posterior.priors.stretch_prior import StretchPrior
 from abs_service.tracker.terms.linearization import propagated, stack
@@ -108,14 +109,14 @@ def run(settings: Settings, context: Context) -> Findings:
 def coverage(uri: str, frames: int, sigma: float = DEMO_SIGMA) -> Coverage:
     """Tracks a simulated device with the default tracker; `sigma`: standard deviation of the colours [levels]."""
     simulation = simulate(uri)
-    rig = with_noise(demo_rig(simulation), "color", GaussianColor(sigma))
-    found = track(rig, demo_plan(), expose(simulation, range(frames)))
+    rig, plan = with_noise(demo_rig(simulation), "color", GaussianColor(sigma)), demo_plan()
+    found = track(rig, plan, expose(simulation, range(frames)))
     rows, predicted, true = [], [], []
     for model, estimate, points in list(zip(found.models, found.estimates, found.material))[1:]:
         error, known = points - estimate.vertices, estimate.covariance
         jacobian = model.sparse_jacobian(estimate.theta).dense
         off = np.asarray(np.linalg.lstsq(jacobian.reshape(error.size, -1), error.ravel())[0], np.float64)
-        sensed = _sensed(known, _prior(model, estimate, jacobian, 1 / simulation.rate_hz))
+        sensed = _sensed(known, _prior(model, estimate, jacobian, plan.priors, 1 / simulation.rate_hz))
         within = [
             inside_region(error, estimate.vertex_covariance),
             inside_region(error, propagated(SparseJacobian.from_dense(jacobian), known)),
@@ -131,10 +132,13 @@ def coverage(uri: str, frames: int, sigma: float = DEMO_SIGMA) -> Coverage:
 
 
 def _prior(
-    model: DeformationModel, estimate: Estimate, jacobian: NDArray[np.float64], interval_s: float
+    model: DeformationModel,
+    estimate: Estimate,
+    jacobian: NDArray[np.float64],
+    settings: priors.Settings,
+    interval_s: float,
 ) -> NDArray[np.float64]:
     """Hessian (dim, dim) of the priors alone at an estimate with the Jacobian (n, 3, dim) of its vertices."""
-    settings = demo_plan().priors
     surface = model.deform(estimate.theta[None])
     parts = StretchPrior(model.mesh, settings.stretch).linearize(surface, SparseJacobian.from_dense(jacobian))
     stretch = stack(parts, jacobian.shape[2]).jacobian

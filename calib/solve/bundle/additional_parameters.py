@@ -44,7 +44,7 @@ def further(
     clusters = np.unique(equations.poses, return_inverse=True)[1][equations.shots_of_rows]
     if len(set(clusters.tolist())) < MIN_POSES:
         return
-    jacobian = equations.jacobian(np.zeros(equations.layout.size))
+    jacobian = equations.base_jacobian
     curvature = (jacobian.T @ jacobian).toarray()
     sizes = np.sqrt(np.diag(curvature))
     curvature = curvature / np.outer(sizes, sizes) + DAMPING * np.eye(len(sizes))

@@ -167,7 +167,7 @@ def _stage(equations: Equations) -> tuple[NDArray[np.float64], bool]:
     """Increments after at most `STEPS` steps in coordinates scaled by the curvature; True if converged."""
     start = np.zeros(equations.layout.size)
     residuals = equations.residuals(start)
-    first = equations.jacobian(start)
+    first = equations.base_jacobian
     # Weighted like the robust loss, so that a few gross errors do not dominate the curvature.
     weights = sparse.diags_array(np.sqrt(robust.influence(residuals) / np.where(residuals == 0, 1, residuals)))
     curvature = require_touched(_normal(weights @ first), equations.layout.names)
@@ -204,9 +204,8 @@ def _cost(residuals: NDArray[np.float64]) -> float:
 
 def _covariance(equations: Equations) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Covariance of the increments, and normalised residuals, at the equations' base."""
-    zero = np.zeros(equations.layout.size)
-    residuals = equations.residuals(zero)
-    curvature = require_determined(_normal(equations.jacobian(zero)), equations.layout.names)
+    residuals = equations.residuals(np.zeros(equations.layout.size))
+    curvature = require_determined(_normal(equations.base_jacobian), equations.layout.names)
     inflation = variance_components.covariance_inflation(equations, residuals)
     return inflation * uncertainty.scaled_inverse(curvature), residuals
 
@@ -214,11 +213,10 @@ def _covariance(equations: Equations) -> tuple[NDArray[np.float64], NDArray[np.f
 def _updated_factors(solved: Adjustment) -> tuple[float, ...]:
     """Updated deviation factors of the groups, from their residuals (variance component estimation)."""
     equations = solved.equations
-    jacobian = equations.jacobian(np.zeros(equations.layout.size))
     found = []
     for group, rows, factor in zip(equations.groups, equations.slices(), solved.factors, strict=True):
         own = solved.residuals[rows]
-        taken = float(np.sum(_normal(jacobian[rows]) * solved.independent))
+        taken = float(np.sum(_normal(equations.base_jacobian[rows]) * solved.independent))
         redundancy = own.size - taken
         grown = 1.0
         if redundancy > 0.2 * own.size:

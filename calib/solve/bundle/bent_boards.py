@@ -37,7 +37,7 @@ def bend_covariance(equations: Equations, residuals: NDArray[np.float64]) -> NDA
         residuals: normalised, there (n,).
     """
     count = equations.layout.board_start
-    columns = shape_columns(equations, equations.jacobian(np.zeros(equations.layout.size)), _bends)
+    columns = shape_columns(equations, equations.base_jacobian, _bends)
     found = [
         (float(one.sizes.item() / one.sigmas.item()) ** 2, one.changes[:count])
         for one in further(equations, residuals, [column[:, None] for column in columns.T])

@@ -95,6 +95,11 @@ class Equations:
         )
 
     @cached_property
+    def base_jacobian(self) -> sparse.csr_array:
+        """`jacobian` without increments, which covariances and checks of a solution ask for again and again."""
+        return self.jacobian(np.zeros(self.layout.size))
+
+    @cached_property
     def ends(self) -> NDArray[np.intp]:
         """First residual of every group, and the total number."""
         return np.cumsum([0, *(len(group.views_of_rows) for group in self.groups)])

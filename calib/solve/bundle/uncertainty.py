@@ -50,8 +50,7 @@ class PoseInformation:
 
 def pose_information(equations: Equations, residuals: NDArray[np.float64]) -> PoseInformation:
     """Information and scores of the poses at the minimum; `residuals` (n,) are normalised."""
-    jacobian = equations.jacobian(np.zeros(equations.layout.size))
-    return information_of(jacobian, equations.layout.board_start, equations, residuals)
+    return information_of(equations.base_jacobian, equations.layout.board_start, equations, residuals)
 
 
 def information_of(

@@ -132,7 +132,7 @@ def shape_errors(solution: Solution, distance: float, needed_px: float) -> list[
 
 def _estimates(solution: Solution, distance: float) -> Iterator[ShapeError]:
     equations = solution.adjustment.equations
-    jacobian = equations.jacobian(np.zeros(equations.layout.size))
+    jacobian = equations.base_jacobian
     columns, bent = shape_columns(equations, jacobian, _displacements), shape_columns(equations, jacobian, bends)
     shapes = (Shape.STRETCH, Shape.SKEW, Shape.TAGS, *(Shape.UNEVEN,) * 2 * len(_UNEVEN), *(Shape.BEND,) * len(_POWERS))
     # A bend looks uneven where boards are tilted alike.

@@ -62,7 +62,7 @@ class FreeShape:
 def free_shape(solution: Solution) -> FreeShape:
     """Solves the shapes of the board and of the lenses along."""
     equations = solution.adjustment.equations
-    jacobian = equations.jacobian(np.zeros(equations.layout.size))
+    jacobian = equations.base_jacobian
     residuals, measured, count = solution.adjustment.residuals, int(equations.ends[-1]), equations.layout.board_start
     added = np.hstack([shape_columns(equations, jacobian, _of_board), _of_lenses(equations, residuals)])
     if equations.layout.size + added.shape[1] > _MAX_SHARE * measured:

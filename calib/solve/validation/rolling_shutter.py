@@ -74,7 +74,7 @@ def noticed(found: Sequence[Motion], needed_px: float) -> list[Motion]:
 
 def _estimates(solution: Solution, distance: float) -> Iterator[Motion]:
     equations = solution.adjustment.equations
-    jacobian = equations.jacobian(np.zeros(equations.layout.size))
+    jacobian = equations.base_jacobian
     bent = shape_columns(equations, jacobian, bends)
     columns = [
         (each.sensor, np.hstack([_whole(each, moved, len(bent)), bent]))

@@ -31,7 +31,6 @@ time.sleep(60)
 
 
 @pytest.mark.slow
-@pytest.mark.realtime
 def test_forty_stopped_subscribers_keep_nobody_from_the_router(endpoint):
     processes = []
     try:
