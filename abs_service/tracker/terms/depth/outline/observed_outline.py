@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,33 +25,6 @@ from abs_service.tracker.terms.sensor_fit import RimFit
 MIN_HANGING = 3
 
 
-#: Deviation of the place of an edge that is known to a pixel [px].
-PIXEL_PX = np.sqrt(1 / 12)
-
-
-class GapErrors(NamedTuple):
-    """Errors that edges share of a first image, in which the gaps between them and the end of the object were measured.
-
-    Attributes:
-        shares: of the error of each side of the first image that the edges have (4, k): 1 for the side that they faced,
-            times how much longer their last cells are in the image; 0 for edges without a gap.
-        coherence: of the errors by whole pixels in it (4,), see `by_pixels`.
-        deviation: σ of the position of the outline, without what wanders [px].
-    """
-
-    shares: NDArray[np.float64]
-    coherence: NDArray[np.float64]
-    deviation: float
-
-    def some(self, which: NDArray[np.intp]) -> "GapErrors":
-        """Those of some of the edges, by their indices (m,)."""
-        return self._replace(shares=self.shares[:, which])
-
-    def grown(self, lengths: NDArray[np.float64]) -> "GapErrors":
-        """Those of edges (k,) whose last cells are so many times as long [px]."""
-        return self._replace(shares=self.shares * lengths)
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class ObservedRimOutline:
     """Distances of the free edges from the outline, normal with zero mean and bounded; see `ObservedOutline`.
@@ -65,7 +37,6 @@ class ObservedRimOutline:
         covered: edges beyond which something hid the object in the first image, or that its border cut.
         along: unit directions of the rim in the image (k, 2) at the free edges, see `rim_directions`.
         is_round: the outline does not show a turn of the object in its plane.
-        taken: errors of the first image that the free edges have in their gaps.
         deviation: σ of the position of the outline [px].
         off_px: an edge that is farther from the outline is off it [px].
         lost_at: positive values (k,) at places (k, 2) in the image in areas that the sensor has lost.
@@ -82,7 +53,6 @@ class ObservedRimOutline:
     covered: Edges
     along: NDArray[np.float64]
     is_round: bool
-    taken: GapErrors
     deviation: float
     off_px: float
     lost_at: Callable[[NDArray[np.float64]], NDArray[np.float64]]
@@ -104,15 +74,14 @@ class ObservedRimOutline:
         values, gradients = self.image.look_at(points)
         residual, points = values / self.deviation, points[0].T
         use = (np.abs(residual) < MAX_DEVIATIONS).nonzero()[0]
-        places, by_place = project_with_jacobian(self.image.camera, points[use].astype(np.float64))
+        by_place = project_with_jacobian(self.image.camera, points[use].astype(np.float64))[1]
         shown = across_rim(gradients[use], self.along[use])
         shown = without_turn(shown, by_place, points[use]) if self.is_round else shown
         right, down = (shown / self.deviation).T[:, :, None]
         rows = right * by_place[:, 0] + down * by_place[:, 1]
         jacobian = np.zeros((len(use), sparse_jacobian.dimension))
         chain(rows, self.edges.some(use), sparse_jacobian.blocks, jacobian)
-        sides, taken = by_side(gradients[use]), self.taken.some(use)
-        shared = shared_by_side(jacobian, residual[use], sides, taken, by_pixels(places, sides), self.deviation)
+        shared = _shared_by_side(jacobian, residual[use], gradients[use])
         return Linearization(residual[use], jacobian, points[use], rows, shared, partial(self._of_ends, surface, use))
 
     def _of_ends(self, surface: Surface, use: NDArray[np.intp], rows: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -192,52 +161,18 @@ class ObservedRimOutline:
         return np.sqrt(np.vecdot(away, away)) / self.image.camera.fx
 
 
-def shared_by_side(
-    jacobian: NDArray[np.float64],
-    residual: NDArray[np.float64],
-    sides: NDArray[np.bool_],
-    taken: GapErrors,
-    coherence: NDArray[np.float64],
-    deviation: float,
+def _shared_by_side(
+    jacobian: NDArray[np.float64], residual: NDArray[np.float64], gradients: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Sums (12, dim) of the rows of edges that share an error, times its deviation: three for each side of the image.
+    """Sums (4, dim) of the rows (k, dim) of edges that face one side of the image, times their shared deviation.
 
-    Where the object ends beside the mesh was measured in the first image, with the same error b of the outline: edges
-    are extrapolated by a gap that is off by b. Of an edge whose last cell is l₀ px long in the first image and l now,
-    b(side now) − b(side at first) l / l₀ is left: nothing, if the mesh has neither turned nor tilted. Three parts do
-    not cancel: that of whole pixels, which is one for all edges along a row or a column, and changes as the mesh moves;
-    that by which the outline wanders from image to image; and what residuals show beyond the deviation: an edge that
-    the mesh cannot follow is not where the outline says.
+    It is one, that of the outline, or what the normalised residuals (k,) show: an edge that the mesh cannot follow is
+    not where the outline says.
 
     Args:
-        jacobian, residual: derivatives (k, dim) and normalised residuals (k,) of the free edges.
-        sides: masks (4, k) of the sides that they face.
-        taken: errors of the first image that they have in their gaps.
-        coherence: of the errors by whole pixels (4,), see `by_pixels`.
-        deviation: σ of the position of the outline [px].
+        jacobian, residual: of the free edges.
+        gradients: image gradients (k, 2) of their distances from the outline, which tell the side.
     """
+    sides = by_side(gradients)
     mean_square = sides @ residual**2 / np.maximum(sides.sum(axis=1), 1)
-    whole, steady = PIXEL_PX**2 / deviation**2, taken.deviation**2 / deviation**2
-    now, at_first = sides @ jacobian, taken.shares @ jacobian
-    changing = np.maximum(mean_square, 1.0) - steady + whole * coherence
-    return np.concatenate(
-        [
-            np.sqrt(max(steady - whole, 0.0)) * (now - at_first),
-            np.sqrt(changing)[:, None] * now,
-            np.sqrt(whole * taken.coherence)[:, None] * at_first,
-        ]
-    )
-
-
-def by_pixels(places: NDArray[np.float64], sides: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Share (4,) of the error by whole pixels, squared, that the edges of each side have in common.
-
-    It is the same where edges are as far into a pixel, across the side. So it is one along a row or a column, and
-    averages out where an edge crosses them.
-
-    Args:
-        places: of the edges in the image (k, 2) [px].
-        sides: masks (4, k) of those that face right, down, left and up.
-    """
-    phases = np.exp(2j * np.pi * places[:, [0, 1, 0, 1]].T) * sides
-    return np.abs(phases.sum(axis=1) / np.maximum(sides.sum(axis=1), 1)) ** 2
+    return np.sqrt(np.maximum(mean_square, 1.0))[:, None] * (sides @ jacobian)

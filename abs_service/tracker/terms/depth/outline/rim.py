@@ -81,11 +81,6 @@ class Edges(NamedTuple):
         """Unit directions out of the mesh in the image (k, 2), at the edges' places (k, 2) [px]."""
         return unit(places - project_with_jacobian(camera, self.starts(surface))[0])
 
-    def lengths(self, camera: Camera, surface: Surface, places: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Distances in the image (k,) of the edges' places (k, 2) from their inner vertices [px]."""
-        away = places - project_with_jacobian(camera, self.starts(surface))[0]
-        return np.sqrt(np.vecdot(away, away))
-
 
 class LocatedEdges(NamedTuple):
     """Edges of a population of one in the image.

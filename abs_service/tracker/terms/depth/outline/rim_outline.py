@@ -20,13 +20,12 @@ from abs_service.tracker.synthesis.window import WHOLE, corner
 from abs_service.tracker.terms.depth.classification.fixed_edges import MARGIN
 from abs_service.tracker.terms.depth.classification.outline_distance import inwards
 from abs_service.tracker.terms.depth.classification.visibility import Visibility
-from abs_service.tracker.terms.depth.outline.observed_outline import GapErrors, ObservedRimOutline, by_pixels
+from abs_service.tracker.terms.depth.outline.observed_outline import ObservedRimOutline
 from abs_service.tracker.terms.depth.outline.raggedness import Raggedness
 from abs_service.tracker.terms.depth.outline.rim import Edges, OutlineImage, Rim, read
 from abs_service.tracker.terms.depth.outline.rim_classes import RimClass, classify_rim, turns_away
 from abs_service.tracker.terms.depth.outline.rim_cost import MAX_DEVIATIONS, rim_cost
 from abs_service.tracker.terms.depth.outline.rim_gap import exact_gap
-from abs_service.tracker.terms.depth.outline.rim_motion import by_side
 from abs_service.tracker.terms.depth.outline.rim_normal import rim_directions
 from abs_service.tracker.terms.depth.outline.round_outline import is_round
 from calib.camera import Camera
@@ -53,14 +52,12 @@ class SortedEdges(NamedTuple):
     Attributes:
         is_cut: True for those (k,) that the view cuts.
         free: the free ones.
-        taken: errors of the first image that these have in their gaps.
         covered: edges beyond which something hid the object in the first image, or that its border cut, or the view.
         classes: of every vertex, as in `RimFit`.
     """
 
     is_cut: NDArray[np.bool_]
     free: Edges
-    taken: GapErrors
     covered: Edges
     classes: bytes
 
@@ -91,8 +88,7 @@ class RimOutline:
         self._edges = Edges(rim.outer, rim.inner, np.zeros(len(rim.outer), np.float32))
         self._first, self._was_cut = np.zeros((len(rim.outer), 2)), np.zeros(len(rim.outer), np.bool_)
         self._raggedness = Raggedness(deviation, ragged)
-        self._taken = GapErrors(np.zeros((4, len(rim.outer))), np.zeros(4), deviation)
-        self._sorted = SortedEdges(self._was_cut, self._edges, self._taken, self._edges, b"")
+        self._sorted = SortedEdges(self._was_cut, self._edges, self._edges, b"")
         self._min_off_px = max(OFF_PX, MAX_DEVIATIONS * deviation)
         self._images, self._is_round, self._size = 0, False, (camera.width, camera.height)
 
@@ -114,8 +110,8 @@ class RimOutline:
         is_cut = self._find_cut(predicted, seen.beyond, window)
         if not (self._images and np.array_equal(is_cut, self._sorted.is_cut)):
             self._sorted = self._sort(is_cut, predicted.vertices.shape[2])
-        which, hidden = self._in_sight(predicted, expected, window)
-        located = image.locate(edges := self._sorted.free.some(which), predicted)
+        edges, hidden = self._in_sight(predicted, expected, window)
+        located = image.locate(edges, predicted)
         self._is_round = self._is_round if self._images else is_round(self._camera, located.points, away, first)
         self._images += 1
         self._raggedness.update(located.away, located.directions, located.places)  # counts from the next frame on
@@ -129,7 +125,6 @@ class RimOutline:
             covered=self._sorted.covered,
             along=rim_directions(located.places, located.directions),
             is_round=self._is_round,
-            taken=self._sorted.taken.some(which).grown(edges.lengths(self._camera, predicted, located.places)),
             deviation=deviation,
             off_px=off_px,
             lost_at=partial(self._read, seen.lost, window),
@@ -146,7 +141,7 @@ class RimOutline:
         found = np.zeros(vertices, np.uint8)
         found[self._rim.outer] = 1 + np.where(is_cut, np.uint8(RimClass.BORDER), self.classes)
         covered = self._edges.some((hides | is_cut).nonzero()[0])
-        return SortedEdges(is_cut, self._edges.some(free), self._taken.some(free), covered, found.tobytes())
+        return SortedEdges(is_cut, self._edges.some(free), covered, found.tobytes())
 
     def _read(
         self, part: NDArray[np.float32] | NDArray[np.bool_], window: Window, places: NDArray[np.float64]
@@ -155,15 +150,13 @@ class RimOutline:
         first = np.array(corner(window)[::-1], np.float32)
         return read(part.astype(np.float32, copy=False), first, places, self._size)
 
-    def _in_sight(
-        self, predicted: Surface, expected: NDArray[np.float32], window: Window
-    ) -> tuple[NDArray[np.intp], int]:
-        """Indices of free edges that the predicted mesh does not hide, and the number of those that it hides."""
+    def _in_sight(self, predicted: Surface, expected: NDArray[np.float32], window: Window) -> tuple[Edges, int]:
+        """Free edges that the predicted mesh does not hide, and the number of those that it hides; see `observe`."""
         ends = self._sorted.free.ends(predicted)
         in_front = self._read(expected, window, project_with_jacobian(self._camera, ends)[0])
         behind = in_front < np.linalg.norm(ends - self._camera.center, axis=1) - HIDDEN_BEHIND_M
         hidden = behind & (in_front > -np.inf)
-        return (~hidden).nonzero()[0], int(np.count_nonzero(hidden))
+        return self._sorted.free.some((~hidden).nonzero()[0]), int(np.count_nonzero(hidden))
 
     def _classify(self, image: OutlineImage, predicted: Surface, distance: NDArray[np.float32]) -> None:
         """Finds the free edges in the first image, and the gaps between them and the end of the object."""
@@ -174,10 +167,6 @@ class RimOutline:
         gap = exact_gap(self._camera, outer, outer - inner, gap, image.look)
         self._edges = Edges(self._rim.outer, self._rim.inner, gap)
         self._first = self._beside(predicted)
-        places = self._camera.project(self._edges.points(predicted)[0].T.astype(np.float64))
-        length = np.maximum(self._edges.lengths(self._camera, predicted, places), 1.0)
-        has_gap = by_side(image.look(places)[1]) & (gap > 0)
-        self._taken = self._taken._replace(shares=has_gap / length, coherence=by_pixels(places, has_gap))
 
     def _beside(self, surface: Surface) -> NDArray[np.float64]:
         """Places (k, 2) in the image of a population of one, `BESIDE_PX` outside the edges."""
