@@ -107,7 +107,10 @@ class FrameBuilder:
     def _time_ns(self, time_s: float) -> int:
         seconds = checks.number("time_s", time_s, "a time in seconds")
         if not abs(seconds) < MAX_TIME_S:
-            raise ArgumentError(f"time_s = {time_s}: must be a time in seconds, less than {MAX_TIME_S:g}")
+            raise ArgumentError(
+                f"time_s = {time_s}: must be a time in seconds, less than {MAX_TIME_S:g}: milliseconds * 1e-3, "
+                "nanoseconds * 1e-9"
+            )
         t_ns = round(seconds * 1e9)
         if self._last_ns is not None and t_ns <= self._last_ns:
             raise ArgumentError(f"time_s = {time_s}: must be later than the frame before, {self._last_ns * 1e-9:g}")

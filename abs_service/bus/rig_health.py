@@ -8,7 +8,7 @@ from absmsg.v1.health_pb2 import Health
 
 from abs_service.bus import keys
 from abs_service.bus.security.mutual_tls import NO_SECURITY, MutualTls, NoSecurity
-from abs_service.bus.session import SessionMode, open_session
+from abs_service.bus.session import ENDPOINT_KEY, SessionMode, open_session
 from drivers.encoding.message_check import parse_valid
 from drivers.encoding.message_content import MessageError
 
@@ -26,7 +26,11 @@ Expected = Callable[[Mapping[str, Health | None]], Iterable[str]]
 
 
 def ask(
-    endpoint: str, rig: str = "*", security: NoSecurity | MutualTls = NO_SECURITY, expected: Expected = lambda _: ()
+    endpoint: str,
+    rig: str = "*",
+    security: NoSecurity | MutualTls = NO_SECURITY,
+    expected: Expected = lambda _: (),
+    key: str = ENDPOINT_KEY,
 ) -> RigHealth:
     """Listens until every component has published its health, but no longer than `PATIENCE_S`.
 
@@ -35,6 +39,7 @@ def ask(
         rig: name of the rig; `*` for every rig there.
         security: of its bus.
         expected: see `Expected`.
+        key: see `open_session`.
 
     Raises:
         BusError: the endpoint is malformed, or nothing answers there within `CONNECT_MS`.
@@ -42,7 +47,7 @@ def ask(
     """
     health: RigHealth = {}
     with (
-        open_session(endpoint, SessionMode.CLIENT, False, CONNECT_MS, security) as session,
+        open_session(endpoint, SessionMode.CLIENT, False, CONNECT_MS, security, key=key) as session,
         session.declare_subscriber(keys.key(rig, keys.health("**"))) as subscriber,
     ):
         deadline_s = time.monotonic() + PATIENCE_S

@@ -23,6 +23,8 @@ _log = logging.getLogger(__name__)
 
 #: Where a rig listens unless it is configured otherwise.
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
+#: Key of the rig file that says so.
+ENDPOINT_KEY = "bus.endpoint"
 #: Timeout of a client's connection to its router [ms].
 CONNECT_TIMEOUT_MS = 3000
 #: Largest pool of a process; what it has no room for goes through sockets.
@@ -68,6 +70,7 @@ def open_session(
     connect_timeout_ms: int = CONNECT_TIMEOUT_MS,
     security: NoSecurity | MutualTls = NO_SECURITY,
     routers: Sequence[str] = (),
+    key: str = ENDPOINT_KEY,
 ) -> zenoh.Session:
     """Opens a session. Close it before the interpreter exits, or zenoh hangs at exit.
 
@@ -78,6 +81,7 @@ def open_session(
         connect_timeout_ms: timeout of a client's connection [ms].
         security: authentication and access rights.
         routers: endpoints of other routers that a router connects to, whenever they are there.
+        key: what gave the endpoint, for messages: a key of the rig file, or an option.
 
     Raises:
         BusError: the endpoint is malformed or in use, its owner refuses this process, or the wall clock is absurd.
@@ -86,7 +90,7 @@ def open_session(
     """
     if not 0 <= (now_s := time.time()) < WALL_CLOCK_S:
         raise BusError(f"the wall clock is set to {datetime.fromtimestamp(now_s, UTC):%Y-%m-%d}: {WALL_CLOCK}")
-    check_endpoint(endpoint, security)
+    check_endpoint(endpoint, security, key)
     for other in routers:
         check_endpoint(other, security, "bus.routers")
     own = security.check(endpoint, mode is SessionMode.ROUTER)
@@ -104,8 +108,8 @@ def open_session(
         refusal = security.refusal(endpoint) if mode is SessionMode.CLIENT else ""
         kind = UnansweredError if mode is SessionMode.CLIENT and not refusal else BusError
         unresolved = connection.unresolved(endpoint) if mode is SessionMode.CLIENT else ""
-        reason = refusal or unresolved or _explain(str(error), mode, connect_timeout_ms)
-        raise kind(f'bus.endpoint = "{endpoint}": {reason}') from error
+        reason = refusal or unresolved or _explain(str(error), mode, connect_timeout_ms, key)
+        raise kind(f'{key} = "{endpoint}": {reason}') from error
 
 
 def is_endpoint(text: str) -> bool:
@@ -120,7 +124,7 @@ def is_endpoint(text: str) -> bool:
     return True
 
 
-def check_endpoint(endpoint: str, security: NoSecurity | MutualTls = NO_SECURITY, key: str = "bus.endpoint") -> str:
+def check_endpoint(endpoint: str, security: NoSecurity | MutualTls = NO_SECURITY, key: str = ENDPOINT_KEY) -> str:
     """Returns `endpoint`, which `key` names in messages, if it can be one.
 
     Raises:
@@ -136,12 +140,11 @@ def check_endpoint(endpoint: str, security: NoSecurity | MutualTls = NO_SECURITY
     return endpoint
 
 
-def _explain(error: str, mode: SessionMode, connect_timeout_ms: int) -> str:
+def _explain(error: str, mode: SessionMode, connect_timeout_ms: int, key: str) -> str:
     if "in use" in error:
-        return (
-            "the address is in use; is another abs-service running? Stop it, or set endpoint in the table [bus] of the "
-            "rig file to another port; `abs-service new` writes a file"
-        )
+        in_file = "set endpoint in the table [bus] of the rig file to another port; `abs-service new` writes a file"
+        instead = in_file if key == ENDPOINT_KEY else f"give {key} another port"
+        return f"the address is in use; is another abs-service running? Stop it, or {instead}"
     if mode is SessionMode.CLIENT:
         return (
             f"nothing answers there within {connect_timeout_ms / 1000:g} s; start `abs-service run`, or compare host "

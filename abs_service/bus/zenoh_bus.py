@@ -13,7 +13,7 @@ from abs_service.bus import keys, links
 from abs_service.bus.contract import EVENTS, Publisher, Qos, Sample, Subscription
 from abs_service.bus.security import link_log
 from abs_service.bus.security.mutual_tls import NO_SECURITY, MutualTls, NoSecurity
-from abs_service.bus.session import SessionMode, open_session
+from abs_service.bus.session import ENDPOINT_KEY, SessionMode, open_session
 from abs_service.bus.zenoh_session.callbacks import from_non_daemon_thread
 from abs_service.bus.zenoh_session.shared_memory import copied
 
@@ -44,10 +44,11 @@ class ZenohBus:
         shared_memory: bool = True,
         security: NoSecurity | MutualTls = NO_SECURITY,
         routers: Sequence[str] = (),
+        key: str = ENDPOINT_KEY,
     ) -> Self:
         """Opens a session and a bus on it; arguments and errors as in `open_session`."""
         keys.check_name(rig)  # before there is a session to be closed
-        bus = cls(open_session(endpoint, mode, shared_memory, security=security, routers=routers), rig)
+        bus = cls(open_session(endpoint, mode, shared_memory, security=security, routers=routers, key=key), rig)
         if mode is SessionMode.CLIENT:
             on_link = links.RouterLog(endpoint, security.refusal).on_event
         else:

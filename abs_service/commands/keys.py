@@ -22,6 +22,7 @@ from pathlib import Path
 from abs_service.bus.security import roles
 from abs_service.bus.security.mutual_tls import MutualTls
 from abs_service.commands.parts.options import OptionError, whole
+from abs_service.recording.disk import folder
 from abs_service.supervision.exit_codes import Exit
 
 AUTHORITY = "authority"
@@ -59,7 +60,7 @@ def run(arguments: argparse.Namespace) -> int:
     if out.exists():
         raise OptionError(f"{out}: exists, and nothing is overwritten; choose another folder")
     try:
-        out.parent.mkdir(parents=True, exist_ok=True)
+        folder.make(out.parent)
         with tempfile.TemporaryDirectory(prefix=".keys-", dir=out.parent) as temporary:
             made = Path(temporary) / "made"
             made.mkdir(mode=0o700)

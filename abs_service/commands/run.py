@@ -137,7 +137,7 @@ def effective(rig: config.ServiceConfig, arguments: argparse.Namespace) -> confi
         }
     routers = rig.bus.routers
     if arguments.connect:
-        routers = (*routers, check_endpoint(arguments.connect, key="--connect"))
+        routers = (*routers, check_endpoint(arguments.connect, rig.bus.security(), "--connect"))
     changes = {
         "name": keys.check_name(rig.name if arguments.rig is None else arguments.rig),
         "bus": rig.bus.model_copy(update={"routers": routers}),

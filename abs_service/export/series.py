@@ -28,10 +28,13 @@ def write(estimates: Iterable[Estimate], path: Path) -> int:
     A file's number is that of the estimate, so a number is missing where there is no mesh. Vertices are in metres.
 
     Raises:
-        ExportError: such files are there already.
+        ExportError: such files are there already, or a file where their folder should be.
         OSError: the folder or a file cannot be written.
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except FileExistsError as error:
+        raise ExportError(f"--out {path}: {error.filename} is no folder") from None
     if there := sorted(path.parent.glob(f"{path.stem}_[0-9]*{path.suffix}")):
         raise ExportError(f"{there[0]} is there already; name another folder with --out")
     number = 0

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from abs_service.report.content import Cell, Column, Level, Picture, Report, Table, to_json
+from calib.files import atomic
 
 if TYPE_CHECKING:
     import jinja2
@@ -28,8 +29,8 @@ def write(report: Report, path: Path) -> tuple[Path, Path]:
     """
     page, data = path.with_suffix(".html"), path.with_suffix(".json")
     try:
-        page.write_text(to_html(report), encoding="utf-8")
-        data.write_text(json.dumps(to_json(report), ensure_ascii=False, indent=1) + "\n", encoding="utf-8")
+        atomic.write(page, to_html(report))
+        atomic.write(data, json.dumps(to_json(report), ensure_ascii=False, indent=1) + "\n")
     except OSError as error:
         raise ReportFileError(f"{error.filename}: the report cannot be written: {error.strerror}") from error
     return page, data

@@ -125,7 +125,7 @@ def replay(recording: Recording, trackers: Mapping[str, OfflineTracker]) -> Iter
 
 
 def free_path(recording: Path) -> Path:
-    """A file beside the recording that does not exist yet: `x_replay.mcap`, `x_replay_2.mcap`, …."""
+    """A file beside the recording that does not exist, nor unfinished: `x_replay.mcap`, `x_replay_2.mcap`, …."""
     suffixes = chain(["_replay"], (f"_replay_{number}" for number in count(2)))
     paths = (recording.with_name(f"{recording.stem}{suffix}.mcap") for suffix in suffixes)
-    return next(path for path in paths if not path.exists())
+    return next(path for path in paths if not (path.exists() or path.with_name(f"{path.name}.active").exists()))

@@ -1,1 +1,1 @@
-"""Files from other sources: limits that hold before anything is read or parsed."""
+"""Files: limits that hold before anything of another source is read or parsed; files that are written as a whole."""

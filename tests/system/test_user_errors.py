@@ -70,6 +70,23 @@ def test_all_device_addresses_that_no_device_can_have(refused, rig_file):
     assert "devices.second.uri = \"kinect1://?stream=ir\": unknown key 'stream'" in message
 
 
+@pytest.mark.parametrize(
+    ("command", "option", "file"),
+    [
+        ("rig x.mcap --target board.toml", "--out", "x.toml"),
+        ("intrinsics x.mcap --target board.toml --out x.toml", "--corners", "x.vnl"),
+        ("noise x.mcap --distance-m 1", "--out", "x"),
+        ("verify x.toml x.mcap --target board.toml", "--report", "x.html"),
+        ("capture RIG --target board.toml", "--out", "x.mcap"),
+    ],
+)
+def test_a_folder_that_is_not_there_is_named_before_the_work(refused, rig_file, tmp_path, command, option, file):
+    (tmp_path / "board.toml").write_text('kind = "chessboard"\ncolumns = 9\nrows = 6\nsquare_mm = 25.0\n')
+    words = command.replace("RIG", str(rig_file)).replace("board.toml", str(tmp_path / "board.toml")).split()
+    out = tmp_path / "no" / file
+    assert refused("calibrate", *words, option, out) == f"{option} {out}: there is no folder {tmp_path}/no\n"
+
+
 class TestReplay:
     def test_of_nothing(self, refused, tmp_path):
         assert refused("replay", tmp_path / "no.mcap") == f"{tmp_path}/no.mcap: No such file or directory\n"

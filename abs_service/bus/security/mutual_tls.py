@@ -14,6 +14,8 @@ from abs_service.bus.security import roles
 
 #: Time in which a router has to refuse a client [s].
 ANSWER_S = 2.0
+#: Time in which who speaks TLS answers its first message; `abs-service status` ends within two seconds [s].
+PROBE_S = 0.5
 #: X509_V_ERR_INVALID_PURPOSE of OpenSSL: here, a certificate of a client at a process that listens.
 INVALID_PURPOSE = 26
 
@@ -47,7 +49,9 @@ class NoSecurity:
 
     def refusal(self, endpoint: str) -> str:
         """Reason for which a router refuses this process; "" if unknown."""
-        return ""
+        if not endpoint.startswith(("tcp/", "tls/")) or not _speaks_tls(endpoint):
+            return ""
+        return "TLS is spoken there; give a rig file whose table [bus.tls] names certificates, and an endpoint tls/…"
 
 
 NO_SECURITY = NoSecurity()
@@ -113,16 +117,18 @@ class MutualTls:
 
     def refusal(self, endpoint: str) -> str:
         """See `NoSecurity`; connects once more, since zenoh does not report it."""
-        host, port = _host(endpoint), int(endpoint.partition("#")[0].rpartition(":")[2])
+        address = _address(endpoint)
         try:
             with (
-                socket.create_connection((host, port), ANSWER_S) as plain,
-                self._context(ssl.PROTOCOL_TLS_CLIENT).wrap_socket(plain, server_hostname=host) as link,
+                socket.create_connection(address, ANSWER_S) as plain,
+                self._context(ssl.PROTOCOL_TLS_CLIENT).wrap_socket(plain, server_hostname=address[0]) as link,
             ):
                 link.recv(1)  # what the router thinks of our certificate comes after the handshake
         except ssl.SSLCertVerificationError as error:
             return f"its certificate is refused here: {error.verify_message}"
         except ssl.SSLError as error:
+            if not _speaks_tls(endpoint):
+                return "no TLS is spoken there; compare with the bus.endpoint and the table [bus.tls] of who listens"
             return f"it refuses this certificate: {(error.reason or str(error)).lower().replace('_', ' ')}"
         except OSError:
             pass
@@ -149,7 +155,25 @@ class MutualTls:
 
 
 def _host(endpoint: str) -> str:
-    return endpoint.removeprefix("tls/").partition("#")[0].rpartition(":")[0].strip("[]")
+    return _address(endpoint)[0]
+
+
+def _address(endpoint: str) -> tuple[str, int]:
+    host, _, port = endpoint.partition("/")[2].partition("#")[0].rpartition(":")
+    return host.strip("[]"), int(port)
+
+
+def _speaks_tls(endpoint: str) -> bool:
+    """True if what listens at an endpoint answers the first message of TLS, with its certificate or an alert."""
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    context.check_hostname, context.verify_mode = False, ssl.CERT_NONE
+    try:
+        with socket.create_connection(_address(endpoint), PROBE_S) as plain, context.wrap_socket(plain):
+            return True
+    except ssl.SSLError as error:
+        return "ALERT" in (error.reason or "")
+    except OSError:
+        return False
 
 
 def _handshake(client: ssl.SSLContext, server: ssl.SSLContext, host: str | None) -> Certificate:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from calib.board.artwork import artwork
 from calib.board.target import Target, outline
+from calib.files import atomic
 
 #: Margin that printers leave white, and the strip below the board for ruler and text [m].
 RIM, STRIP = 0.008, 0.014
@@ -79,7 +80,7 @@ def write(sheet: Sheet, path: Path) -> None:
     """
     content = to_svg(sheet).encode() if path.suffix == ".svg" else to_pdf(sheet)
     try:
-        path.write_bytes(content)
+        atomic.write(path, content)
     except OSError as error:
         raise SheetError(f"{path}: cannot be written: {error.strerror}") from error
 

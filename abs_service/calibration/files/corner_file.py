@@ -1,5 +1,6 @@
 """Saved detections of a board, from which a calibration is solved again without images."""
 
+import io
 import zipfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from abs_service.calibration.shots.corner_extraction import BoardObservations
 from calib.board.target import Target
 from calib.board.views import CornerView, PlaneView
+from calib.files import atomic
 
 #: End of the names of these files, which are NumPy's archives.
 SUFFIX = ".corners.npz"
@@ -52,8 +54,10 @@ def write(seen: BoardObservations, path: Path) -> None:
     }
     arrays |= _columns("corner", seen.corners, _CORNERS, [*seen.sizes])
     arrays |= _columns("plane", seen.planes, _PLANES, [*seen.sizes])
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, allow_pickle=False, **arrays)
     try:
-        np.savez_compressed(path, allow_pickle=False, **arrays)
+        atomic.write(path, buffer.getvalue())
     except OSError as error:
         raise CornerFileError(f"{path}: cannot be written: {error.strerror}") from error
 

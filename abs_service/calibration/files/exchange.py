@@ -63,7 +63,7 @@ def of_content(path: Path, text: str) -> str:
     found = next((name for mark, name in _TELLING if mark in text), None)
     if found is None:
         raise ExchangeError(
-            f"{path}: its format is not recognised; name it with --from, one of {', '.join([OWN, *READERS])}"
+            f"{path}: its format is not recognised; `calibrate convert --from` takes {', '.join([OWN, *READERS])}"
         )
     return found
 

@@ -12,6 +12,7 @@ from calib.board.corners import quality
 from calib.board.corners.detection import MIN_POINTS
 from calib.board.target import Target
 from calib.board.views import CornerView
+from calib.files import atomic
 from calib.formats import vnl
 from drivers.image_folder.listing import last_number
 
@@ -78,6 +79,6 @@ def write(seen: BoardObservations, target: Target, path: Path) -> None:
         points[apart.argmin(axis=1)] = view.pixels
         pictures[f"{view.sensor}-{view.shot:04d}"] = points
     try:
-        path.write_text(vnl.write(pictures), encoding="utf-8")
+        atomic.write(path, vnl.write(pictures))
     except OSError as error:
         raise CornerFileError(f"{path}: cannot be written: {error.strerror}") from error

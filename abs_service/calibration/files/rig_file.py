@@ -17,7 +17,7 @@ from abs_service.calibration.files import toml_text
 from abs_service.report.provenance import Provenance
 from calib import pose
 from calib.camera import Camera
-from calib.files import limited
+from calib.files import atomic, limited
 
 
 class RigFileError(Exception):
@@ -110,8 +110,8 @@ def write(calibration: RigCalibration, path: Path) -> list[Path]:
     beside = {"file": side.name, "sha256": digest} if arrays else {}
     try:
         if arrays:
-            side.write_bytes(arrays)
-        path.write_text(_text(calibration, path.name, beside), encoding="utf-8")
+            atomic.write(side, arrays)
+        atomic.write(path, _text(calibration, path.name, beside))
     except OSError as error:
         raise RigFileError(f"{error.filename}: the calibration cannot be written: {error.strerror}") from error
     return [path, side] if arrays else [path]

@@ -11,7 +11,7 @@ from abs_service.config.problems import ABSENT, Problem, allowed_instead
 from calib.board.april_grid import AprilGrid
 from calib.board.target import AsymmetricCircles, Charuco, Chessboard, Circles, Target
 from calib.board.target_checks import TargetError
-from calib.files import limited, nested
+from calib.files import atomic, limited, nested
 
 #: Values of `kind`.
 KINDS: Mapping[str, type[Target]] = {
@@ -95,7 +95,7 @@ def write(target: Target, path: Path) -> None:
         TargetFileError: the file cannot be written.
     """
     try:
-        path.write_text(tomli_w.dumps(to_table(target)), encoding="utf-8")
+        atomic.write(path, tomli_w.dumps(to_table(target)))
     except OSError as error:
         raise TargetFileError(f"{path}: cannot be written: {error.strerror}") from error
 

@@ -35,6 +35,7 @@ from abs_service.calibration.shots.live_shots import LiveShots, NamedDevice
 from abs_service.calibration.shots.shot_recording import ShotFileError, ShotRecording
 from abs_service.calibration.shots.shots import SOUGHT, Shot
 from abs_service.commands.parts import rig_devices, rig_process
+from abs_service.commands.parts.options import check_new
 from abs_service.report.content import Level
 from calib.board.target import Target
 from calib.camera import Camera
@@ -63,6 +64,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Collects views until they are sufficient."""
     rig = rig_process.load_config(arguments)
     target = target_file.read(arguments.target)
+    check_new(arguments.out, "--out")
     stop = rig_process.stop_on_signals()
     end_ns = time.monotonic_ns() + arguments.limit_s * 1e9
     console = Console(stderr=True)

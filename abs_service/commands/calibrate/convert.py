@@ -29,6 +29,7 @@ from abs_service.config.problems import allowed_instead
 from abs_service.report import provenance
 from abs_service.supervision.exit_codes import Exit
 from calib.camera import Camera
+from calib.files import atomic
 from calib.formats import opencv, plausibility
 from calib.formats.content import Content, Hints
 from calib.formats.resizing import resized
@@ -110,7 +111,7 @@ def _write(out: Path, target: str, cameras: Mapping[str, Camera], arguments: arg
         return ()
     written = exchange.write(out, target, cameras)
     try:
-        out.write_text(written.text, encoding="utf-8")
+        atomic.write(out, written.text)
     except OSError as error:
         raise OptionError(f"{out}: cannot be written: {error.strerror}") from error
     return written.lost

@@ -39,7 +39,7 @@ from abs_service.calibration.noise import board_poses, measurement, repeated, re
 from abs_service.calibration.shots import sequences
 from abs_service.commands.calibrate.inputs import calibrations
 from abs_service.commands.images import camera_file
-from abs_service.commands.parts.options import OptionError, number, whole
+from abs_service.commands.parts.options import OptionError, check_folder, number, whole
 from abs_service.commands.parts.progress import bars
 from abs_service.config import plugins
 from abs_service.report import page, provenance
@@ -47,6 +47,7 @@ from abs_service.report.content import Level, Report, to_json
 from abs_service.supervision.exit_codes import Exit
 from abs_service.tracker.detection.segments.within import load_mask
 from calib.camera import Camera
+from calib.files import atomic
 from calib.noise.per_pixel import PerPixel
 from calib.sequences.static_board import StaticBoard
 from drivers.contract.frame import Geometry
@@ -90,6 +91,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Reads the sources, fits, writes and reports."""
+    if arguments.out is not None:
+        check_folder(arguments.out, "--out")
     console = Console(stderr=True)
     with bars() as progress:
         task = progress.add_task("depth images", total=arguments.frames * len(arguments.sources))
@@ -199,7 +202,7 @@ def _write_model(found: measurement.NoiseCalibration, sensor: str, out: Path, le
         text = toml_text.table(("sensors", sensor, "noise"), table, comment)
         if found.missing.targets:
             text += "\n" + toml_text.table(("sensors", sensor, "no_return"), plugins.plain(found.missing.law))
-        toml.write_text(text, encoding="utf-8")
+        atomic.write(toml, text)
     except OSError as error:
         raise OptionError(f"--out {out}: cannot be written: {error.strerror}") from error
     return [toml, *written]

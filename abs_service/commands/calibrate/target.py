@@ -21,7 +21,7 @@ from dataclasses import fields, replace
 from pathlib import Path
 
 from abs_service.calibration.files import board_sheet, target_file
-from abs_service.commands.parts.options import OptionError, ending_in, positive, whole
+from abs_service.commands.parts.options import OptionError, check_folder, ending_in, positive, whole
 from abs_service.supervision.exit_codes import Exit
 from calib.board.april_grid import AprilGrid
 from calib.board.target import AsymmetricCircles, Charuco, Chessboard, Circles, Target, outline
@@ -82,6 +82,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Writes the page and the description."""
+    check_folder(arguments.out, "--out")
     target = _target(arguments)
     width, height = sorted(arguments.paper, reverse=_is_wide(target))
     page = board_sheet.lay_out(target, width, height, _words(target))

@@ -30,7 +30,7 @@ from abs_service.calibration.shots.shots import Shot
 from abs_service.commands.calibrate.inputs import calibrations, live, skipping
 from abs_service.commands.calibrate.inputs.material import UnusableImagesError
 from abs_service.commands.parts import rig_process
-from abs_service.commands.parts.options import OptionError, assignments, views
+from abs_service.commands.parts.options import OptionError, assignments, check_folder, views
 from abs_service.config.problems import allowed_instead
 from abs_service.report import page, provenance
 from abs_service.report.content import Level, Report, Verdict, to_json
@@ -73,6 +73,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Verifies, reports and judges."""
+    if arguments.report is not None:
+        check_folder(arguments.report, "--report")
     known = calibrations.load(arguments.calibration)
     target = target_file.read(arguments.target)
     seen, files = _look(arguments, target, known)

@@ -50,7 +50,7 @@ from pathlib import Path
 
 from abs_service.commands.images import camera_file, frame_numbers, import_file, open3d_folder
 from abs_service.commands.images.camera_file import CameraFile
-from abs_service.commands.parts.options import OptionError, number
+from abs_service.commands.parts.options import OptionError, check_new, number
 from abs_service.supervision.exit_codes import Exit
 from calib.files import limited, nested
 from drivers.contract.frame import Geometry
@@ -112,14 +112,13 @@ def run(arguments: argparse.Namespace) -> int:
     _check_options(arguments)
     rig_toml = _rig(arguments.rig)
     foreign_recording = _foreign_recording(arguments)
-    if arguments.out.exists():
-        raise OptionError(f"{arguments.out}: exists already; remove it or choose another name")
+    check_new(arguments.out, "--out")
     partial = arguments.out.with_name(f"{arguments.out.name}.partial")
     try:
         counts = import_file.write(partial, arguments.path.resolve().stem, foreign_recording, rig_toml)
         partial.rename(arguments.out)
     except OSError as error:
-        raise OptionError(f"{arguments.out}: cannot be written: {error.strerror}") from error
+        raise OptionError(f"--out {arguments.out}: cannot be written: {error.strerror}") from error
     finally:
         partial.unlink(missing_ok=True)
     names = (

@@ -20,6 +20,7 @@ from abs_service.commands.new.rig_text import BEHIND, DEVICES, OBJECTS, Answers,
 from abs_service.commands.parts.options import OptionError, positive
 from abs_service.config.problems import allowed_instead
 from abs_service.supervision.exit_codes import Exit
+from calib.files import atomic
 from drivers import opening
 from drivers.contract.discovery import Found
 
@@ -70,7 +71,7 @@ def run(arguments: argparse.Namespace) -> int:
     else:
         answers = _answered_by_options(arguments, name)
     try:
-        file.write_text(rig_text.write(answers, str(file)), encoding="utf-8")
+        atomic.write(file, rig_text.write(answers, str(file)))
     except OSError as error:
         raise OptionError(f"{file}: cannot be written: {error.strerror}") from None
     if answers.device.note:

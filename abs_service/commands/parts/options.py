@@ -62,6 +62,38 @@ def ending_in(*suffixes: str) -> Callable[[str], Path]:
     return read
 
 
+def check_folder(path: Path, option: str = "") -> None:
+    """Checks that there is a folder for a file, which an option names, before the minutes after which it is written.
+
+    Raises:
+        OptionError: there is none.
+    """
+    if not path.parent.is_dir():
+        raise OptionError(f"{_named(option, path)}: there is no folder {path.parent}")
+
+
+def check_new(path: Path, option: str = "") -> Path:
+    """Checks that a file can be made, which an option names; returns what it is called until it is complete.
+
+    Raises:
+        OptionError: it exists, it exists unfinished, or there is no folder for it.
+    """
+    if path.exists():
+        raise OptionError(f"{_named(option, path)}: exists already; choose another name or remove it")
+    check_folder(path, option)
+    active = path.with_name(f"{path.name}.active")
+    if active.is_file():
+        raise OptionError(
+            f"{_named(option, path)}: {active} is there, which is being written, or was left unfinished and may be "
+            "recovered (`abs-service recover`); choose another name or remove it"
+        )
+    return active
+
+
+def _named(option: str, path: Path) -> str:
+    return f"{option} {path}".lstrip()
+
+
 #: Type of an argument: a file that a figure is drawn into.
 picture = ending_in(".png", ".svg", ".pdf")
 

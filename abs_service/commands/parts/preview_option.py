@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from abs_service import config, wiring
-from abs_service.commands.parts.options import OptionError, picture
+from abs_service.commands.parts.options import OptionError, check_folder, picture
 from abs_service.display.pictures import preview_picture
 from abs_service.tracking.preview import PreviewError, preview
 from calib.rig import Rig
@@ -33,6 +33,7 @@ def draw(settings: config.ServiceConfig, name: str, path: Path, source: Source) 
         OptionError: there is no depth image, or the file cannot be written.
     """
     own = path if len(settings.trackers) == 1 else path.with_name(f"{path.stem}-{name}{path.suffix}")
+    check_folder(own, "--picture")
     try:
         seen = preview(source[1], source[0], wiring.plan(settings, name))
         preview_picture.draw(seen, name, wiring.model_name(settings, name), own)

@@ -16,7 +16,7 @@ from abs_service import config
 from abs_service.bus.security import roles
 from abs_service.bus.security.expiry import Expiry
 from abs_service.bus.security.mutual_tls import TlsError
-from abs_service.bus.session import SessionMode
+from abs_service.bus.session import ENDPOINT_KEY, SessionMode
 from abs_service.bus.zenoh_bus import ZenohBus
 from abs_service.commands.parts.log import library_output, logs
 from abs_service.commands.parts.options import number
@@ -75,23 +75,31 @@ def open_bus(rig: config.ServiceConfig, arguments: argparse.Namespace, *names: s
         BusError: it cannot be opened.
         SecurityError: a file of `[bus.tls]` cannot be used.
     """
-    mode = SessionMode.ROUTER if arguments.listen else SessionMode.CLIENT
-    endpoint = arguments.listen or arguments.connect or rig.bus.endpoint
-    with logs.in_background(), open_bus_at(endpoint, mode, rig, arguments, *names) as bus:
+    mode, endpoint, key = SessionMode.CLIENT, rig.bus.endpoint, ENDPOINT_KEY
+    if arguments.connect is not None:
+        endpoint, key = arguments.connect, "--connect"
+    elif arguments.listen is not None:
+        mode, endpoint, key = SessionMode.ROUTER, arguments.listen, "--listen"
+    with logs.in_background(), open_bus_at(endpoint, mode, rig, arguments, *names, key=key) as bus:
         yield bus
 
 
 @contextmanager
 def open_bus_at(
-    endpoint: str, mode: SessionMode, rig: config.ServiceConfig, arguments: argparse.Namespace, *names: str
+    endpoint: str,
+    mode: SessionMode,
+    rig: config.ServiceConfig,
+    arguments: argparse.Namespace,
+    *names: str,
+    key: str = ENDPOINT_KEY,
 ) -> Iterator[CheckedBus]:
-    """`open_bus` at a given endpoint, in a given mode."""
+    """`open_bus` at a given endpoint, in a given mode; `key` as in `open_session`."""
     process_tuning.shorten_switch_interval()
     # Zenoh says on standard output which clients it refuses.
     with library_output.logged() if mode is SessionMode.ROUTER and rig.bus.tls else nullcontext():
         try:
             security = rig.bus.security(*names, roles.RIG)
-            bus = ZenohBus.open(rig.name, endpoint, mode, rig.bus.shared_memory, security, rig.bus.routers)
+            bus = ZenohBus.open(rig.name, endpoint, mode, rig.bus.shared_memory, security, rig.bus.routers, key)
             expiry = Expiry(security, endpoint, mode is SessionMode.ROUTER, time.monotonic_ns)
         except TlsError as error:
             raise SecurityError(f"{config.named(arguments.config)}: {error}") from None

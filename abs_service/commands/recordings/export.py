@@ -23,7 +23,7 @@ from abs_service.api.checks import ArgumentError
 from abs_service.api.estimate import Estimate
 from abs_service.api.recording import Recording
 from abs_service.bus import keys
-from abs_service.commands.parts.options import ending_in, number
+from abs_service.commands.parts.options import check_new, ending_in, number
 from abs_service.commands.parts.progress import bars
 from abs_service.export import animation, arrays, series, table, viewers
 from abs_service.export.errors import ExportError
@@ -77,14 +77,12 @@ def run(arguments: argparse.Namespace) -> int:
     package, extra = _EXTRAS.get(path.suffix, ("", ""))
     if package and find_spec(package) is None:
         raise ExportError(f"--out {path} needs {package}: {install_extra(extra)} in the clone")
-    if path.exists():
-        raise ExportError(f"{path} is there already; name another file with --out")
     try:
         if path.suffix in _SERIES:
             done = _write_estimates(source, arguments.tracker, path.suffix, path)
             print(f"{path.with_name(path.stem)}_*{path.suffix}: {done}")
             return Exit.OK
-        active = path.with_name(f"{path.name}.active")
+        active = check_new(path, "--out" if arguments.out else "")
         try:
             if path.suffix == ".mcap":
                 done = _write_view(source, arguments.view_hz, active)

@@ -12,6 +12,7 @@ import argparse
 import sys
 from pathlib import Path
 
+from abs_service.recording.disk import folder
 from abs_service.recording.recovery import RecoveryError, recover
 from abs_service.supervision.exit_codes import Exit
 
@@ -30,7 +31,7 @@ def run(arguments: argparse.Namespace) -> int:
     for path in arguments.files:
         try:
             if arguments.out:
-                arguments.out.mkdir(parents=True, exist_ok=True)
+                folder.make(arguments.out)
             report = recover(path, arguments.out)
             print(report)
             exit_code = exit_code if report.messages else max(exit_code, Exit.FAILED)

@@ -28,7 +28,7 @@ from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.commands import run as run_command
 from abs_service.commands.parts import preview_option, progress
 from abs_service.commands.parts.log import logs
-from abs_service.commands.parts.options import OptionError, number
+from abs_service.commands.parts.options import OptionError, check_new, number
 from abs_service.commands.parts.recorded_rig import draw_previews, recorded_rig
 from abs_service.commands.parts.rig_in_memory import in_memory
 from abs_service.commands.recordings.image_copies import image_copies
@@ -70,9 +70,8 @@ def run(arguments: argparse.Namespace) -> int:
             raise OptionError("--images: with --speed, --out FOLDER records the images; leave out --images")
         return _live(settings, arguments)
     out = arguments.out or free_path(arguments.recording)
-    if out.exists():
-        raise OptionError(f"--out {out}: exists already; choose another name or remove it")
-    with _writing(out, config.to_toml(settings)) as file, progress.bars(disable=arguments.json) as bars:
+    active = check_new(out, "--out" if arguments.out else "")
+    with _writing(out, active, config.to_toml(settings)) as file, progress.bars(disable=arguments.json) as bars:
         headers = _headers(settings, recording)
         trackers = {name: _tracker(settings, name, recording, headers, file) for name in settings.trackers}
         cameras = recording.cameras | wiring.cameras(settings, recording.cameras)
@@ -169,9 +168,8 @@ def _run_through(
 
 
 @contextmanager
-def _writing(path: Path, toml: str) -> Iterator[McapFile]:
-    """A new MCAP file, called *.active until it is complete; an error leaves none, an interruption what there is."""
-    active = path.with_name(f"{path.name}.active")
+def _writing(path: Path, active: Path, toml: str) -> Iterator[McapFile]:
+    """A new MCAP file, `active` until it is complete; an error leaves none, an interruption what there is."""
     try:
         stream = active.open("wb")
     except OSError as error:

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from abs_service import config, wiring
 from abs_service.commands.parts import progress, recorded_rig
-from abs_service.commands.parts.options import OptionError, picture, positive
+from abs_service.commands.parts.options import OptionError, check_folder, picture, positive
 from abs_service.commands.recordings import replay
 from abs_service.display.pictures.stiffness_plot import draw
 from abs_service.supervision.exit_codes import Exit
@@ -42,8 +42,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Estimates, prints and draws."""
     path = arguments.recording
     plot = arguments.plot or path.with_name(f"{path.stem}-stiffness.png")
-    if not plot.parent.is_dir():  # before minutes of tracking, not after
-        raise OptionError(f"--plot {plot}: {plot.parent} is no folder")
+    check_folder(plot, "--plot" if arguments.plot else "")
     recording = Recording(path)
     for note in replay.notes(recording):
         print(f"abs-service: note: {note}", file=sys.stderr)

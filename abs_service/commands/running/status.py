@@ -20,7 +20,7 @@ from absmsg.v1.health_pb2 import Health
 from abs_service.bus import keys, rig_health
 from abs_service.bus.security import roles
 from abs_service.bus.security.mutual_tls import NO_SECURITY, MutualTls, NoSecurity
-from abs_service.bus.session import DEFAULT_ENDPOINT, BusError, check_endpoint
+from abs_service.bus.session import DEFAULT_ENDPOINT, ENDPOINT_KEY, BusError, check_endpoint
 from abs_service.commands.parts import rig_process
 from abs_service.display.terminal.health_words import words
 from abs_service.supervision.children.child import PROCESS, ChildState
@@ -41,9 +41,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Prints the health of every part and returns its exit code."""
     endpoint, name, security = _whom(arguments)
-    check_endpoint(endpoint, security)
+    key = "--connect" if arguments.connect is not None else ENDPOINT_KEY
+    check_endpoint(endpoint, security, key)
     try:
-        answers = rig_health.ask(endpoint, name, security, _running)
+        answers = rig_health.ask(endpoint, name, security, _running, key)
     except BusError as error:
         return _nothing(str(error))
     if not answers:
@@ -64,7 +65,8 @@ def _whom(arguments: argparse.Namespace) -> tuple[str, str, NoSecurity | MutualT
     if arguments.config:
         rig = rig_process.load_config(arguments)
         endpoint, name, security = rig.bus.endpoint, rig.name, rig.bus.security(roles.RIG, *roles.READERS)
-    return arguments.connect or endpoint, name if arguments.rig is None else keys.check_name(arguments.rig), security
+    name = name if arguments.rig is None else keys.check_name(arguments.rig)
+    return endpoint if arguments.connect is None else arguments.connect, name, security
 
 
 def _nothing(reason: str) -> Exit:

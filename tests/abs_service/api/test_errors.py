@@ -38,7 +38,10 @@ DEPTH, IMAGE = Sheet().depth(), Sheet().image(CAMERA)
         ({"depth_m": DEPTH, "time_s": "x"}, r"time_s = 'x': must be a time in seconds"),
         ({"depth_m": DEPTH, "time_s": None}, r"time_s = None: must be a time in seconds"),
         ({"depth_m": DEPTH, "time_s": np.array([1, 2])}, r"time_s = array\(\[1, 2\]\): must be a time in seconds"),
-        ({"depth_m": DEPTH, "time_s": 1.7e18}, r"time_s = 1\.7e\+18: must be a time in seconds, less than 9e\+09"),
+        (
+            {"depth_m": DEPTH, "time_s": 1.7e12},
+            r"time_s = 1700000000000\.0: must be a time in seconds, less than 9e\+09: milliseconds \* 1e-3, nanosec",
+        ),
         ({"depth_m": np.full_like(DEPTH, 1e300)}, r"depth_m has a median of 1e\+300, must be metres"),
         ({"depth_m": [[1.0], [1.0, 2.0]]}, r"depth_m is no array: .*inhomogeneous"),
         ({"depth_m": np.ma.masked_greater(DEPTH, 1)}, r"depth_m is a masked array: must be a plain one"),

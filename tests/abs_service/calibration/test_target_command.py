@@ -143,6 +143,7 @@ def test_programs_learn_what_was_written(tmp_path: Path, capsys: pytest.CaptureF
         (["charuco", "--marker-mm", "30"], ["--marker-mm", "less than the square"]),
         (["charuco", "--columns", "2"], ["--columns", "from 3 to 100"]),
         (["charuco", "--dictionary", "9x9"], ["--dictionary", "5x5_100"]),
+        (["charuco", "--out", "no/x.pdf"], ["--out no/x.pdf: there is no folder no"]),
     ],
 )
 def test_what_cannot_be_printed_is_said(

@@ -77,6 +77,12 @@ def test_what_cannot_be_made_is_said_and_leaves_nothing(arguments, message, tmp_
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_file_where_a_folder_should_be_is_named(tmp_path, capsys):
+    (tmp_path / "lab").write_text("mine")
+    assert cli.main(["keys", str(tmp_path / "lab" / "keys"), "--host", "a"]) == 2
+    assert f"{tmp_path}/lab is no folder\n" in capsys.readouterr().err
+
+
 def test_openssl_that_is_missing_is_named(tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("PATH", "")
     assert cli.main(["keys", str(tmp_path / "lab"), "--only", "viewer"]) == 2

@@ -95,6 +95,13 @@ def test_a_series_names_its_files_and_replaces_nothing(recording, tmp_path, caps
     assert "sheet_000001.ply is there already" in capsys.readouterr().err
 
 
+def test_a_file_where_the_folder_of_a_series_should_be_is_named(recording, tmp_path, capsys):
+    (tmp_path / "meshes").write_text("mine")
+    out = tmp_path / "meshes" / "sheet.ply"
+    assert cli.main(["export", str(recording), "--out", str(out)]) == Exit.USER
+    assert f"error: --out {out}: {out.parent} is no folder\n" in capsys.readouterr().err
+
+
 def test_what_breaks_off_is_exported_up_to_there(tmp_path, capsys):
     recording = write_estimated(tmp_path / "x.mcap", finish=False)
     export(recording, tmp_path / "x.csv")

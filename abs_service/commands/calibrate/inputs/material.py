@@ -14,7 +14,7 @@ from abs_service.calibration.shots.corner_extraction import BoardObservations
 from abs_service.calibration.shots.shot_sources import FolderShots, RecordingShots
 from abs_service.calibration.shots.shots import Shot
 from abs_service.commands.calibrate.inputs import calibrations, live, skipping
-from abs_service.commands.parts.options import OptionError, assignments
+from abs_service.commands.parts.options import OptionError, assignments, check_folder, check_new
 from calib.board import coverage
 from calib.board.distinct import counts_of, distinct_poses
 from calib.board.target import Target
@@ -51,8 +51,9 @@ def material(arguments: argparse.Namespace) -> Material:
         TargetFileError, ShotsError, RecordingError, ConfigError: files that cannot be used.
         ViewsAlikeError, MirroredSensorError, SameImagesError: the views do not allow a calibration.
     """
-    if arguments.out.exists():
-        raise OptionError(f"--out {arguments.out}: exists already; choose another name or remove it")
+    check_new(arguments.out, "--out")
+    if arguments.corners is not None:
+        check_folder(arguments.corners, "--corners")
     if (arguments.source is None or mrcal_corners.is_vnl(arguments.source)) == (not arguments.images):
         raise OptionError("give either a recording or rig as SOURCE, or --images NAME=GLOB for each sensor")
     target = target_file.read(arguments.target)

@@ -10,7 +10,7 @@ from abs_service import cli
 from abs_service.bus import links, session
 from abs_service.bus.security import expiry
 from abs_service.bus.security.expiry import Expiry
-from abs_service.bus.security.mutual_tls import Certificate, MutualTls, TlsError
+from abs_service.bus.security.mutual_tls import NO_SECURITY, Certificate, MutualTls, TlsError
 from abs_service.bus.session import BusError, SessionMode, check_endpoint, open_session
 from abs_service.bus.zenoh_bus import ZenohBus
 from tests.conftest import encrypted
@@ -134,8 +134,15 @@ def test_a_router_that_refuses_a_client_says_why(keys, lab, secured, endpoint):
 def test_a_client_without_tls_is_refused(secured, endpoint, monkeypatch):
     monkeypatch.setattr(session, "CONNECT_TIMEOUT_MS", 500)
     secured("rig", SessionMode.ROUTER)
-    with pytest.raises(BusError, match="nothing answers there"):
-        open_session(endpoint.replace("127.0.0.1", "localhost"), SessionMode.CLIENT)
+    for address in (endpoint.replace("127.0.0.1", "localhost"), encrypted(endpoint)):
+        with pytest.raises(BusError, match=r"TLS is spoken there; give a rig file whose table \[bus\.tls\] .* tls/…"):
+            open_session(address, SessionMode.CLIENT)
+
+
+def test_who_speaks_no_tls_is_not_said_to(open_bus, endpoint, keys):
+    open_bus()
+    assert NO_SECURITY.refusal(endpoint) == ""
+    assert tls(keys).refusal(encrypted(endpoint)).startswith("no TLS is spoken there")
 
 
 def test_the_end_of_a_certificate_is_told_while_a_process_runs_until_there_is_a_new_one(lab, monkeypatch):

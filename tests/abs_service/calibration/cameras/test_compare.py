@@ -94,6 +94,12 @@ def test_cameras_are_matched_by_name_or_as_told(compare, tmp_path: Path):
     assert (code, "no camera has the same name in both: a, b and x, y" in err) == (Exit.USER, True)
 
 
+def test_a_format_that_is_unknown_is_named_by_an_option_that_there_is(compare, tmp_path: Path):
+    (tmp_path / "x.cal").write_text("?")
+    code, _, err = compare(written(tmp_path / "one.toml", b=CAMERA), tmp_path / "x.cal")
+    assert (code, "`calibrate convert --from` takes toml" in err) == (Exit.USER, True), err
+
+
 @pytest.mark.parametrize(
     ("options", "said"),
     [

@@ -122,7 +122,7 @@ def test_a_size_that_is_not_the_camera_s_resizes_it(convert, lab: Path) -> None:
         (("lab.calibration.toml", "lab.calibration.toml"), "exists already"),
         (("none.yaml", "x.toml"), "cannot be read"),
         (("lab.calibration.toml", "x.yaml"), "say one with --to"),
-        (("text.yaml", "x.toml"), "name it with --from"),
+        (("text.yaml", "x.toml"), "`calibrate convert --from` takes toml"),
         (("lab.calibration.toml", "x.toml", "--sensor", "colour"), 'did you mean "color"?'),
         (("lab.calibration.toml", "x.toml", "--rename", "tof"), "must be OLD=NEW"),
         (("lab.calibration.toml", "x.toml", "--rename", "toff=a"), 'did you mean "tof"?'),

@@ -55,7 +55,7 @@ def test_a_folder_of_open3d_without_intrinsics_is_refused(tmp_path: Path, capsys
         (CAMERA, ["--layout", "tum", "--mask", "m*"], "--mask: layout tum takes --camera, --frames"),
         (CAMERA, ["--layout", "tum", "--depth", "d*"], "--depth: layout tum takes --camera, --frames"),
         (CAMERA, ["--layout", "tum", "--rate", "9"], "--rate: layout tum takes --camera, --frames"),
-        (CAMERA, ["--out", "/nowhere/at/all.mcap"], "/nowhere/at/all.mcap: cannot be written: No such file"),
+        (CAMERA, ["--out", "/nowhere/at/all.mcap"], "--out /nowhere/at/all.mcap: there is no folder /nowhere/at"),
     ],
 )
 def test_a_user_error_is_reported_with_exit_code_2(

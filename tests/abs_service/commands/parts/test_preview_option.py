@@ -174,7 +174,7 @@ def test_a_path_that_cannot_be_written_is_refused(recording, tmp_path, capsys, c
     rig.write_text(RIG)
     picture = tmp_path / "no" / "folder" / "x.png"
     assert cli.main([command, str(recording if command == "replay" else rig), "--picture", str(picture)]) == Exit.USER
-    assert f"error: --picture {picture}: cannot be written: No such file or directory" in capsys.readouterr().err
+    assert f"error: --picture {picture}: there is no folder {picture.parent}\n" in capsys.readouterr().err
     assert not list(recording.parent.glob("*_replay*"))
 
 

@@ -5,6 +5,7 @@ import errno
 import os
 import signal
 import threading
+from pathlib import Path
 from queue import SimpleQueue
 
 import pytest
@@ -67,11 +68,42 @@ def test_one_process_may_listen_and_others_connect_to_a_given_endpoint(endpoint)
         assert bus.query("**", 0.1) == []
 
 
-def test_an_endpoint_of_the_command_line_is_checked_like_that_of_the_file():
+@pytest.mark.parametrize("option", ["--connect", "--listen"])
+@pytest.mark.parametrize("wrong", ["nowhere", ""])
+def test_an_endpoint_of_the_command_line_is_checked_like_that_of_the_file(option, wrong):
     rig = rig_process.load_config(parse())
     with (
-        pytest.raises(BusError, match='"nowhere": not an endpoint'),
-        rig_process.open_bus(rig, parse("--connect", "nowhere"), "viewer"),
+        pytest.raises(BusError, match=f'^{option} = "{wrong}": not an endpoint'),
+        rig_process.open_bus(rig, parse(option, wrong), "viewer"),
+    ):
+        pass
+
+
+def test_where_nobody_answers_the_option_is_named(endpoint):
+    rig = rig_process.load_config(parse())
+    with (
+        pytest.raises(BusError, match=f'^--connect = "{endpoint}": nothing answers there'),
+        rig_process.open_bus(rig, parse("--connect", endpoint), "viewer"),
+    ):
+        pass
+
+
+def test_a_port_in_use_is_changed_where_it_was_given(endpoint):
+    rig = rig_process.load_config(parse())
+    with (
+        rig_process.open_bus(rig, parse("--listen", endpoint), "capture"),
+        pytest.raises(BusError, match=f'^--listen = "{endpoint}": the address is in use; .* give --listen another'),
+        rig_process.open_bus(rig, parse("--listen", endpoint), "capture"),
+    ):
+        pass
+
+
+def test_an_endpoint_of_the_command_line_is_encrypted_if_that_of_the_file_is():
+    rig = config.load_default()
+    bus = BusTable(endpoint="tls/lab4:7447", tls=TlsTable(authority=Path("a"), certificate=Path("c"), key=Path("k")))
+    with (
+        pytest.raises(BusError, match=r'^--connect = "tcp/lab4:7447": must begin with tls/'),
+        rig_process.open_bus(rig.model_copy(update={"bus": bus}), parse("--connect", "tcp/lab4:7447"), "viewer"),
     ):
         pass
 

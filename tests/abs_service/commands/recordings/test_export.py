@@ -143,8 +143,29 @@ def test_nothing_is_overwritten(recording, tmp_path, capsys):
     out = tmp_path / "out.mcap"
     out.write_bytes(b"mine")
     assert cli.main(["export", str(recording), "--out", str(out)]) == Exit.USER
-    assert "is there already" in capsys.readouterr().err
+    assert f"--out {out}: exists already" in capsys.readouterr().err
     assert out.read_bytes() == b"mine"
+
+
+def test_what_another_recording_has_left_unfinished_stays(recording, tmp_path, capsys):
+    active = tmp_path / "out.mcap.active"
+    active.write_bytes(b"hers")
+    assert cli.main(["export", str(recording), "--out", str(tmp_path / "out.mcap")]) == Exit.USER
+    assert f"--out {tmp_path}/out.mcap: {active} is there, which is being written" in capsys.readouterr().err
+    assert active.read_bytes() == b"hers"
+
+
+@pytest.mark.parametrize("suffix", [".mcap", ".csv", ".npz", ".glb"])
+def test_a_folder_that_is_not_there_is_named_with_the_option(recording, tmp_path, capsys, suffix):
+    out = tmp_path / "new" / f"x{suffix}"
+    assert cli.main(["export", str(recording), "--out", str(out)]) == Exit.USER
+    assert f"error: --out {out}: there is no folder {tmp_path}/new\n" in capsys.readouterr().err
+    assert not out.parent.exists()
+
+
+def test_beside_a_recording_that_is_nowhere_no_option_is_to_blame(tmp_path, capsys):
+    assert cli.main(["export", str(tmp_path / "new" / "x.mcap")]) == Exit.USER
+    assert "--out" not in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -165,12 +186,6 @@ def test_what_is_damaged_leaves_no_copy(recording, tmp_path, capsys, damage, com
 def test_a_missing_file_is_named(tmp_path, capsys):
     assert cli.main(["export", str(tmp_path / "none.mcap")]) == Exit.USER
     assert "none.mcap: No such file" in capsys.readouterr().err
-
-
-def test_a_folder_that_is_missing_is_told_with_the_name_that_was_given(recording, tmp_path, capsys):
-    out = tmp_path / "none" / "out.mcap"
-    assert cli.main(["export", str(recording), "--out", str(out)]) == Exit.USER
-    assert f"error: {out}: No such file" in capsys.readouterr().err
 
 
 def test_a_suffix_is_one_of_those_that_are_allowed(capsys):

@@ -66,3 +66,11 @@ def test_the_command_names_what_a_full_disk_does_not_take(tmp_path, capsys):
     assert command.run(parser.parse_args([str(source), "--out", str(saved)])) == 2
     assert f"error: {saved}: cannot be written: No space left on device" in capsys.readouterr().err
     assert not list(saved.iterdir())
+
+
+def test_a_file_where_the_folder_should_be_is_named(tmp_path, capsys):
+    (tmp_path / "saved").write_text("mine")
+    parser = argparse.ArgumentParser()
+    command.add_arguments(parser)
+    assert command.run(parser.parse_args([str(write(tmp_path / "a.mcap")), "--out", str(tmp_path / "saved")])) == 2
+    assert f"{tmp_path}/saved is no folder\n" in capsys.readouterr().err

@@ -184,17 +184,18 @@ def test_a_reference_that_is_not_in_the_recording_is_named(recording, tmp_path, 
     assert message in capsys.readouterr().err
 
 
-def test_what_exists_is_not_overwritten(recording, tmp_path, capsys):
-    out = tmp_path / "out.mcap"
-    out.write_bytes(b"precious")
-    assert cli.main(["replay", str(recording), "--out", str(out)]) == Exit.USER
-    assert "exists already" in capsys.readouterr().err
-    assert out.read_bytes() == b"precious"
+@pytest.mark.parametrize(("name", "said"), [("out.mcap", "exists already"), ("out.mcap.active", "is there")])
+def test_what_exists_is_not_overwritten(recording, tmp_path, capsys, name, said):
+    (tmp_path / name).write_bytes(b"precious")
+    assert cli.main(["replay", str(recording), "--out", str(tmp_path / "out.mcap")]) == Exit.USER
+    assert f"{tmp_path}/{name}" in (error := capsys.readouterr().err)
+    assert said in error
+    assert (tmp_path / name).read_bytes() == b"precious"
 
 
 def test_a_folder_that_is_not_there_is_named(recording, tmp_path, capsys):
     assert cli.main(["replay", str(recording), "--out", str(tmp_path / "none" / "out.mcap")]) == Exit.USER
-    assert "cannot be written: No such file or directory" in capsys.readouterr().err
+    assert f"--out {tmp_path}/none/out.mcap: there is no folder {tmp_path}/none" in capsys.readouterr().err
 
 
 def test_a_disk_that_is_full_is_told_with_the_file_and_leaves_none(recording, tmp_path, capsys):

@@ -61,7 +61,7 @@ def test_the_text_has_stiffness_and_uncertainty(recording, capsys, monkeypatch):
     ("options", "problem"),
     [
         (["--weight", "0.3", "--tracker", "sheet"], "--tracker sheet: must be a tracker with a gravity model, one of"),
-        (["--weight", "0.3", "--plot", "no/folder/x.png"], "--plot no/folder/x.png: no/folder is no folder"),
+        (["--weight", "0.3", "--plot", "no/folder/x.png"], "--plot no/folder/x.png: there is no folder no/folder"),
         (
             ["--weight", "0.3", "--config", str(ROOT / "examples" / "rigs" / "flexpad.toml")],
             "no tracker has a gravity model",

@@ -1,6 +1,7 @@
 """Changes of a configuration by the command line of `run`, and the processes that follow."""
 
 import argparse
+from pathlib import Path
 
 import pytest
 
@@ -8,6 +9,7 @@ from abs_service import config
 from abs_service.bus.keys import KeyNameError
 from abs_service.bus.session import BusError
 from abs_service.commands import run
+from abs_service.config.tables.bus import BusTable, TlsTable
 
 
 def arguments(*given):
@@ -38,6 +40,12 @@ class TestWhatTheCommandLineChanges:
     def test_another_host_that_cannot_be_reached_so_is_refused(self):
         with pytest.raises(BusError, match='--connect = "far": not an endpoint; write PROTOCOL/HOST:PORT'):
             self.changed("--connect", "far")
+
+    def test_a_link_to_another_host_is_encrypted_if_the_rig_is(self):
+        rig = config.load_default()
+        bus = BusTable(endpoint="tls/rig:7447", tls=TlsTable(authority=Path("a"), certificate=Path("c"), key=Path("k")))
+        with pytest.raises(BusError, match=r'^--connect = "tcp/far:7447": must begin with tls/'):
+            run.effective(rig.model_copy(update={"bus": bus}), arguments("--connect", "tcp/far:7447"))
 
     def test_a_seed_for_devices_of_another_host_is_refused(self, capsys):
         with pytest.raises(SystemExit):
