@@ -105,9 +105,9 @@ def open_session(
         )
         return zenoh.open(zenoh.Config.from_json5(json.dumps(settings)))
     except zenoh.ZError as error:
-        refusal = security.refusal(endpoint) if mode is SessionMode.CLIENT else ""
-        kind = UnansweredError if mode is SessionMode.CLIENT and not refusal else BusError
         unresolved = connection.unresolved(endpoint) if mode is SessionMode.CLIENT else ""
+        refusal = security.refusal(endpoint) if mode is SessionMode.CLIENT and not unresolved else ""
+        kind = UnansweredError if mode is SessionMode.CLIENT and not refusal else BusError
         reason = refusal or unresolved or _explain(str(error), mode, connect_timeout_ms, key)
         raise kind(f'{key} = "{endpoint}": {reason}') from error
 

@@ -50,7 +50,9 @@ class ZenohBus:
         keys.check_name(rig)  # before there is a session to be closed
         bus = cls(open_session(endpoint, mode, shared_memory, security=security, routers=routers, key=key), rig)
         if mode is SessionMode.CLIENT:
-            on_link = links.RouterLog(endpoint, security.refusal).on_event
+            # Who has been connected without TLS is not refused when its router is gone.
+            refusal = security.refusal if security.link else _no_refusal
+            on_link = links.RouterLog(endpoint, refusal).on_event
         else:
             on_link = link_log.on_event if security.link else _ignore
         bus._links = bus._keep(from_non_daemon_thread(lambda: links.watch(bus._session, on_link)))
@@ -187,6 +189,10 @@ class ZenohBus:
             b"" if attachment is None else attachment.to_bytes(),
             overwritten=payload is None,
         )
+
+
+def _no_refusal(endpoint: str) -> str:
+    return ""
 
 
 def _ignore(event: zenoh.LinkEvent) -> None:
