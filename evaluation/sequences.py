@@ -155,13 +155,13 @@ class TruthEvaluator:
     """Compares the estimates of a tracking session with the truth.
 
     Args:
-        tracking: the session. The caller tracks, so that the comparison is not part of the measured time.
+        session: the session. The caller tracks, so that the comparison is not part of the measured time.
     """
 
-    def __init__(self, tracking: TrackingSession):
-        self._tracking = tracking
+    def __init__(self, session: TrackingSession):
+        self._session = session
         self._truths = TruthComparison()
-        self._known = tracking.mesh_version
+        self._known = session.mesh_version
 
     def errors(self, estimate: Estimate, points: NDArray[np.floating]) -> Errors | None:
         """Errors of the session's latest estimate; None if the truth is unknown.
@@ -171,9 +171,9 @@ class TruthEvaluator:
             points: true positions of the surface's material points (rows, columns, 3) [m] at that time.
         """
         self._truths.add_truth(estimate.t_host_ns, points)
-        if self._tracking.mesh is not None and self._tracking.mesh_version != self._known:
-            self._known = self._tracking.mesh_version
-            self._truths.add_topology(self._tracking.mesh.vertices, self._tracking.made_ns)
+        if self._session.mesh is not None and self._session.mesh_version != self._known:
+            self._known = self._session.mesh_version
+            self._truths.add_topology(self._session.mesh.vertices, self._session.made_ns)
         return self._truths.compare(estimate.t_host_ns, estimate.vertices)
 
     def material_points(self, estimate: Estimate) -> NDArray[np.float64] | None:
@@ -197,17 +197,17 @@ def track(rig: Rig, plan: Plan, exposures: Sequence[LabeledExposure]) -> Tracked
     Raises:
         UntrackedError: no object is detected in the first exposure.
     """
-    tracking = TrackingSession(rig, plan)
-    evaluator = TruthEvaluator(tracking)
+    session = TrackingSession(rig, plan)
+    evaluator = TruthEvaluator(session)
     models, estimates, errors, material, cpu_ms = [], [], [], [], []
     frame_sets = (exposure.frames for exposure in exposures)
-    tracked = track_sets(tracking, frame_sets, time.process_time_ns)
+    tracked = track_sets(session, frame_sets, time.process_time_ns)
     for exposure, (_, estimate, took_ns) in zip(exposures, tracked, strict=True):
         cpu_ms.append(took_ns * 1e-6)
         error, points = evaluator.errors(estimate, exposure.points), evaluator.material_points(estimate)
-        if error is None or points is None or tracking.model is None:
+        if error is None or points is None or session.model is None:
             raise UntrackedError(f"exposure {exposure.frames.seq}: {', '.join(estimate.reasons)}")
-        models.append(tracking.model)
+        models.append(session.model)
         estimates.append(estimate)
         errors.append(error)
         material.append(points)

@@ -105,7 +105,7 @@ class Recording:
                     f"streams = {stream!r}: must be in {self.path}, which has {', '.join(self.streams)}"
                 )
         wanted = {(sensor, name) for sensor, _, name in (stream.partition("/") for stream in streams)}
-        return (_image(item) for item in self._images.frames(wanted) if isinstance(item, Frame))
+        return map(_image, self._images.images(wanted))
 
     def estimates(self, tracker: str = "") -> Iterator[Estimate]:
         """Estimates that were recorded, or that `abs-service replay` wrote, in the order of their times.

@@ -21,7 +21,7 @@ from abs_service.tracking.observer import missing_streams
 from abs_service.tracking.tracked_sets import TrackedSet, track_sets
 from abs_service.tracking.warmup.board import warm_up
 from calib.camera import Camera
-from drivers.contract.frame import Frame, FrameSet
+from drivers.contract.frame import FrameSet
 from drivers.replay import Recording
 
 
@@ -152,7 +152,7 @@ class Tracker:
             lacking = f"recording = {recording.path}: must have {', '.join(missing)}"
             raise ArgumentError(f"{lacking}; it has {', '.join(recording.streams)}")
         self._parts.region.mask = None
-        frames = (item for item in Recording(recording.path).frames() if isinstance(item, Frame))
+        frames = Recording(recording.path).images()
         return self._track(self._parts.synchroniser().group(frames))
 
     def reinitialize(self) -> None:

@@ -14,6 +14,7 @@ from abs_service.api.recording import Recording
 from abs_service.display.page.pictures import Picture, grey, picture, with_mesh
 from abs_service.export.errors import ExportError
 from calib.camera import Camera
+from drivers import replay
 from drivers.contract.frame import Frame
 
 #: An image shows the moment of an estimate up to so much later: half a period at 30 Hz [s].
@@ -41,7 +42,7 @@ def write(estimates: Iterable[Estimate], recording: Recording, path: Path) -> in
     """
     cameras = recording.cameras
     streams = sum(count > 0 and name.partition("/")[0] in cameras for name, count in recording.streams.items())
-    frames = (frame.at_middle() for frame in recording.frames() if frame.sensor in cameras)
+    frames = (frame.at_middle() for frame in replay.Recording(recording.path).images() if frame.sensor in cameras)
     pictures = ((one, _drawn(one, shown, cameras)) for one, shown in _moments(estimates, frames, streams))
     first = next(pictures, None)
     if first is None:

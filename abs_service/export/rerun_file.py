@@ -20,6 +20,7 @@ from abs_service.wire.viewer_messages import COLORS, ViewRate
 from calib.camera import Camera
 from calib.lenses.lens import LensError
 from calib.pose import to_quaternion
+from drivers import replay
 from drivers.contract.frame import Frame, Kind
 from drivers.replay import RecordingError
 
@@ -58,7 +59,7 @@ def write(
     file = RerunFile(path, view_hz)
     written = 0
     try:
-        cameras, frames = recording.cameras, recording.frames()
+        cameras, frames = recording.cameras, replay.Recording(recording.path).images()
     except RecordingError:  # there are no images, as in what `abs-service replay` writes
         cameras, frames = {}, ()
     for sensor, camera in cameras.items():

@@ -30,7 +30,7 @@ class OfflineTracker:
 
     Args:
         name: of the tracker.
-        tracking: the tracker.
+        session: the tracker.
         synchroniser: makes its frame sets.
         model: type of its deformation model.
         calib_id: hash of its rig's calibration.
@@ -42,7 +42,7 @@ class OfflineTracker:
     def __init__(
         self,
         name: str,
-        tracking: TrackingSession,
+        session: TrackingSession,
         synchroniser: Synchroniser,
         model: str,
         calib_id: str,
@@ -53,7 +53,7 @@ class OfflineTracker:
         self.log = TrackerLog()
         self.synchroniser = synchroniser
         self._name = name
-        self._tracking = tracking
+        self._session = session
         self._identity = Identity(name, model, "", calib_id, 0)
         self._headers = headers
         self._file = file
@@ -72,7 +72,7 @@ class OfflineTracker:
         return self._track(self.synchroniser.flush())
 
     def _track(self, frame_sets: Iterable[FrameSet]) -> Iterator[EstimateReport]:
-        for _, estimate, took_ns in track_sets(self._tracking, frame_sets, self._clock):
+        for _, estimate, took_ns in track_sets(self._session, frame_sets, self._clock):
             yield from self._report(estimate, took_ns * 1e-6)
 
     def _report(self, estimate: Estimate, solve_ms: float) -> Iterator[EstimateReport]:
@@ -88,16 +88,16 @@ class OfflineTracker:
         yield from self.log.take_mesh(mesh)
 
     def _write_new_topology(self) -> None:
-        mesh, version = self._tracking.mesh, self._tracking.mesh_version
+        mesh, version = self._session.mesh, self._session.mesh_version
         if mesh is None or version == self._identity.mesh_version:
             return
-        self._identity = estimate_messages.with_mesh(self._identity, mesh, version, self._tracking.derived)
-        header = self._headers.at(self._tracking.made_ns, version, keys.RIG_FRAME)
+        self._identity = estimate_messages.with_mesh(self._identity, mesh, version, self._session.derived)
+        header = self._headers.at(self._session.made_ns, version, keys.RIG_FRAME)
         topology = estimate_messages.topology(header, mesh, self._identity)
         topic = f"/{keys.topology(self._name)}"
-        wall_ns = self._headers.clock.wall(self._tracking.made_ns)
+        wall_ns = self._headers.clock.wall(self._session.made_ns)
         self._file.write(topic, estimate_messages.TOPOLOGY, topology.SerializeToString(), wall_ns, version)
-        self.log.truth.add_topology(mesh.vertices, self._tracking.made_ns)
+        self.log.truth.add_topology(mesh.vertices, self._session.made_ns)
 
     def _write(self, topic: str, message: str, content: Any, estimate: Estimate) -> None:
         wall_ns = self._headers.clock.wall(estimate.t_host_ns)

@@ -19,12 +19,12 @@ class TrackedSet(NamedTuple):
 
 
 def track_sets(
-    tracking: TrackingSession, frame_sets: Iterable[FrameSet], clock: Callable[[], int], budget_ns: float = math.inf
+    session: TrackingSession, frame_sets: Iterable[FrameSet], clock: Callable[[], int], budget_ns: float = math.inf
 ) -> Iterator[TrackedSet]:
     """Tracks frame sets one after the other, when the next one is asked for; none is left out.
 
     Args:
-        tracking: the session; in between, its model and mesh are those of the latest estimate.
+        session: the session; in between, its model and mesh are those of the latest estimate.
         frame_sets: in order of time.
         clock: measures the searches [ns].
         budget_ns: time of a search [ns]; without a limit, nothing depends on the clock.
@@ -34,7 +34,7 @@ def track_sets(
     """
     for frames in frame_sets:
         begin_ns = clock()
-        estimate = tracking.track(frames, partial(_in_time, clock, begin_ns + budget_ns))
+        estimate = session.track(frames, partial(_in_time, clock, begin_ns + budget_ns))
         yield TrackedSet(frames, estimate, clock() - begin_ns)
 
 

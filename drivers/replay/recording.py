@@ -67,6 +67,10 @@ class Recording:
         self.cameras = {sensor: self._camera(model) for sensor, model in self.models.items()}
         self.recalibrated = [sensor for sensor, model in self.models.items() if self._is_followed(model)]
 
+    def images(self, streams: Collection[tuple[str, str]] = ()) -> Iterator[Frame]:
+        """`frames` without the truths."""
+        return (item for item in self.frames(streams) if isinstance(item, Frame))
+
     def frames(self, streams: Collection[tuple[str, str]] = ()) -> Iterator[Frame | Truth]:
         """Frames and truths in order of time; each is decoded when it is reached.
 

@@ -80,12 +80,12 @@ def test_per_frame_search_metric(benchmark):
 @pytest.mark.parametrize("vertices", [300, 1000])
 def test_whole_frame(benchmark, vertices):
     """Time from a frame set to an estimate with the default plan, `hybrid`, while the sheet moves and bends."""
-    tracking = TrackingSession(RIG, default_plan(vertices=vertices))
+    session = TrackingSession(RIG, default_plan(vertices=vertices))
     for k in APPROACH:
-        tracking.track(frame_set(SIMULATION.expose(k)[0], k), lambda: True)
+        session.track(frame_set(SIMULATION.expose(k)[0], k), lambda: True)
     exposures = [frame_set(SIMULATION.expose(k)[0], k) for k in range(FIRST, FIRST + 20)]
     following = iter(exposures)
     estimate = benchmark.pedantic(
-        lambda: tracking.track(next(following), lambda: True), rounds=1 if benchmark.disabled else len(exposures)
+        lambda: session.track(next(following), lambda: True), rounds=1 if benchmark.disabled else len(exposures)
     )
     assert estimate.status == Status.TRACKING

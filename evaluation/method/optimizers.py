@@ -105,13 +105,13 @@ def run(settings: Settings, context: Context) -> Findings:
 
 def track(simulation: Simulation, indices: Sequence[int], settings: OptimizerSettings, budget_ms: float) -> Run:
     """Tracks exposures, each within a budget of wall-clock time."""
-    tracking = TrackingSession(demo_rig(simulation), demo_plan(optimizer=settings))
-    evaluator = TruthEvaluator(tracking)
+    session = TrackingSession(demo_rig(simulation), demo_plan(optimizer=settings))
+    evaluator = TruthEvaluator(session)
     estimates, errors, times = [], [], []
     for k in indices:
         (exposure,) = expose(simulation, [k])
         start, start_cpu = time.monotonic(), time.process_time()
-        estimates.append(tracking.track(exposure.frames, partial(_in_time, start + budget_ms * 1e-3)))
+        estimates.append(session.track(exposure.frames, partial(_in_time, start + budget_ms * 1e-3)))
         times.append((time.process_time() - start_cpu) * 1e3)
         errors.append(evaluator.errors(estimates[-1], exposure.points))
     return Run(estimates, [one for one in errors if one is not None], times[1:])

@@ -96,7 +96,7 @@ def of_recording(path: Path, sensor: str, maximum: int, advance: Callable[[], No
         RecordingError: damaged file, or not a recording.
     """
     recording = Recording(path)
-    frames = (item for item in recording.frames() if isinstance(item, Frame))
+    frames = recording.images()
     return of_frames(path.name, frames, recording.cameras, sensor, maximum, advance)
 
 

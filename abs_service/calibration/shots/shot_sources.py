@@ -8,7 +8,7 @@ from pathlib import Path
 from abs_service.calibration.shots.shots import USED, Assembler, SensorShot, Shot, ShotsError, thinned
 from abs_service.pairing.synchroniser import Synchroniser
 from calib.camera import Camera
-from drivers.contract.frame import Frame, FrameSet
+from drivers.contract.frame import FrameSet
 from drivers.image_folder import image_file
 from drivers.image_folder.listing import ImageFile, ImageFolderError, by_number, changing_numbers, last_number
 from drivers.replay.recording import Recording
@@ -50,7 +50,7 @@ class RecordingShots:
         # The slowest stream determines the number of shots.
         reference = min(used, key=lambda key: self.recording.counts[key])
         synchroniser = Synchroniser(reference, used, self.tolerance_ns)
-        frames = (item for item in self.recording.frames(used) if isinstance(item, Frame))
+        frames = self.recording.images(used)
         yield from synchroniser.group(frames)
 
 

@@ -12,7 +12,7 @@ from abs_service.wire.commands import Choice, Pixel, RefusedError
 from calib.rig import Rig
 
 
-def reinitialize(tracking: TrackingSession, rig: Rig, plan: Plan, tracker: str, choice: Choice) -> str:
+def reinitialize(session: TrackingSession, rig: Rig, plan: Plan, tracker: str, choice: Choice) -> str:
     """Makes a tracker look for its object anew; returns the table of the rig file that keeps a choice, else "".
 
     Raises:
@@ -20,7 +20,7 @@ def reinitialize(tracking: TrackingSession, rig: Rig, plan: Plan, tracker: str, 
     """
     region = chosen(plan.region, choice)
     if region is None:
-        tracking.reinitialize()
+        session.reinitialize()
         return ""
     camera = rig.sensors[plan.reference].camera
     for pixel in (choice.seed,) if choice.seed else choice.polygon:
@@ -28,7 +28,7 @@ def reinitialize(tracking: TrackingSession, rig: Rig, plan: Plan, tracker: str, 
             size = f"{camera.width} × {camera.height} pixels"
             raise RefusedError(f"the pixel {list(pixel)} is outside the depth image of {size}")
     try:
-        tracking.reinitialize(region.build())
+        session.reinitialize(region.build())
     except DetectionError as error:
         raise RefusedError(str(error)) from error
     return toml(tracker, region)

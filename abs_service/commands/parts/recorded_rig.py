@@ -9,7 +9,6 @@ from abs_service.config.problems import allowed_instead
 from abs_service.pairing.synchroniser import Synchroniser
 from abs_service.tracking.observer import missing_streams
 from calib.rig import Rig
-from drivers.contract.frame import Frame
 from drivers.replay import Recording
 
 
@@ -47,6 +46,6 @@ def draw_previews(settings: config.ServiceConfig, recording: Recording, path: Pa
     lines: list[str] = []
     for name in settings.trackers:
         rig, synchroniser = recorded_rig(settings, name, recording)
-        frame_sets = synchroniser.group(item for item in recording.frames() if isinstance(item, Frame))
+        frame_sets = synchroniser.group(recording.images())
         lines.append(preview_option.draw(settings, name, path, (rig, frame_sets)))
     return lines

@@ -93,14 +93,14 @@ def track_until_recalibrated(
     if stop.is_set():
         return
     process_tuning.freeze_loaded_objects()
-    tracking = TrackingSession(rig, plan)
-    act = partial(chosen_region.reinitialize, tracking, rig, plan, name)
+    session = TrackingSession(rig, plan)
+    act = partial(chosen_region.reinitialize, session, rig, plan, name)
     commands.answer_reinitialize(bus, name, headers, health, act)
     with _measured_clocks(bus, headers) as clocks:
         sets = _frame_sets(bus, settings, name, rig, clocks)
         tracker_health = TrackerHealth(health, sets, time.monotonic_ns)
         publisher, budget_ms = _publisher(bus, settings, name, rig, headers), settings.trackers[name].budget_ms
-        live = LiveTracker(tracking, sets, publisher, tracker_health, time.monotonic_ns, clocks, budget_ms)
+        live = LiveTracker(session, sets, publisher, tracker_health, time.monotonic_ns, clocks, budget_ms)
         while not (stop.is_set() or monitor.changed.is_set()):
             live.process_next()
             if health.due():

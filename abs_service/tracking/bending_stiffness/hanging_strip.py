@@ -102,14 +102,14 @@ def track_strip(
     Raises:
         StiffnessError: no strip was tracked in any frame.
     """
-    tracking, observer = TrackingSession(rig, plan), Observer(rig)
+    session, observer = TrackingSession(rig, plan), Observer(rig)
     tracked: dict[int, list[tuple[Gravity, Estimate, FrameSet]]] = {}
     sets = 0
     frame_sets = synchroniser.group(_counted(recording, on_image))
-    for frames, estimate, _ in track_sets(tracking, frame_sets, time.monotonic_ns):
-        sets, model = sets + 1, tracking.model
+    for frames, estimate, _ in track_sets(session, frame_sets, time.monotonic_ns):
+        sets, model = sets + 1, session.model
         if isinstance(model, Gravity) and estimate.status == Status.TRACKING:
-            tracked.setdefault(tracking.mesh_version, []).append((model, estimate, frames))
+            tracked.setdefault(session.mesh_version, []).append((model, estimate, frames))
     if not tracked:
         raise StiffnessError(f"{recording.path}: no strip was tracked in {sets} frame sets")
     longest = max(tracked.values(), key=len)

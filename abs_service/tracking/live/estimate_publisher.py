@@ -52,7 +52,7 @@ class EstimatePublisher:
         self._seq = 0
 
     def publish(
-        self, estimate: Estimate, tracking: TrackingSession, effort: Effort, host_clock: str, offset: Offset
+        self, estimate: Estimate, session: TrackingSession, effort: Effort, host_clock: str, offset: Offset
     ) -> None:
         """Publishes an estimate, after the topology of its mesh if that is new.
 
@@ -61,14 +61,14 @@ class EstimatePublisher:
             host_clock: which clock the frames' times are of.
             offset: of that clock; stamps need it.
         """
-        if tracking.mesh is not None and tracking.mesh_version != self._identity.mesh_version:
-            made = tracking.mesh, tracking.mesh_version, tracking.derived
+        if session.mesh is not None and session.mesh_version != self._identity.mesh_version:
+            made = session.mesh, session.mesh_version, session.derived
             self._identity = estimate_messages.with_mesh(self._identity, *made)
             # Numbered by itself, or a recorder would take the estimates in between for topologies that it missed.
-            header = self._header(tracking.made_ns, host_clock, offset, tracking.mesh_version)
-            self._topology_message = estimate_messages.topology(header, tracking.mesh, self._identity, tracking.model)
+            header = self._header(session.made_ns, host_clock, offset, session.mesh_version)
+            self._topology_message = estimate_messages.topology(header, session.mesh, self._identity, session.model)
             self._topology.put(self._topology_message.SerializeToString())
-            self._offset = _offset_of(tracking.model)
+            self._offset = _offset_of(session.model)
         header = self._header(estimate.t_host_ns, host_clock, offset, self._seq)
         state = estimate_messages.state(header, estimate, self._identity, effort)
         mesh = estimate_messages.mesh(header, estimate, self._identity)

@@ -15,7 +15,7 @@ class LiveTracker:
     """One tracker on a bus.
 
     Args:
-        tracking: the tracker.
+        session: the tracker.
         sets: its frame sets.
         publisher: publishes its estimates.
         health: reports its health.
@@ -26,7 +26,7 @@ class LiveTracker:
 
     def __init__(
         self,
-        tracking: TrackingSession,
+        session: TrackingSession,
         sets: FrameSetQueue,
         publisher: EstimatePublisher,
         health: TrackerHealth,
@@ -34,7 +34,7 @@ class LiveTracker:
         clocks: ClockOffsets,
         budget_ms: float,
     ):
-        self._tracking = tracking
+        self._session = session
         self._sets = sets
         self._publisher = publisher
         self._health = health
@@ -50,7 +50,7 @@ class LiveTracker:
             return
         begin_ns = self._clock()
         try:
-            estimate = self._tracking.track(frames, lambda: self._clock() - begin_ns < self._budget_ns)
+            estimate = self._session.track(frames, lambda: self._clock() - begin_ns < self._budget_ns)
         except ObservationError as error:
             self._health.reject(str(error))
             return
@@ -62,7 +62,7 @@ class LiveTracker:
         offset = Offset(self._clock() - estimate.t_host_ns, 0) if known is None else known
         age_ms, age_error_ms = self._age_ms(estimate.t_host_ns, known)
         effort = Effort(solve_ms, self._budget_ns * 1e-6, age_ms, age_error_ms, skipped, self._sets.dropped)
-        self._publisher.publish(estimate, self._tracking, effort, frames.host_clock, offset)
+        self._publisher.publish(estimate, self._session, effort, frames.host_clock, offset)
         self._health.add(estimate, solve_ms)
 
     def _age_ms(self, t_host_ns: int, known: Offset | None) -> tuple[float, float]:

@@ -60,10 +60,10 @@ def _track_board(sensors: Mapping[str, Sensor], plan: Plan) -> None:
     rig = Rig("warm-up", {name: _sensor(sensor) for name, sensor in sensors.items()})
     frames = [_board(head, Kind(stream), plan.model.board) for head, stream in streams(rig.sensors.values())]
     small = replace(plan, region=nearest.Settings(), template=first_image.Settings(), vertices=_VERTICES)
-    tracking = TrackingSession(rig, small)
+    session = TrackingSession(rig, small)
     changed = [[change(frame) for frame in frames] for change in (_with_dropout, _moved, _without_object)]
     for seq, seen in enumerate((frames, *changed)):
-        tracking.track(FrameSet(seq, round(seq * 33e6), {frame.key: frame for frame in seen}), lambda: False)
+        session.track(FrameSet(seq, round(seq * 33e6), {frame.key: frame for frame in seen}), lambda: False)
 
 
 def _sensor(sensor: Sensor) -> Sensor:

@@ -132,17 +132,17 @@ class OwnTracker:
             reinitialization=REINITIALIZATION,
             seed=seed,
         )
-        self._tracking = TrackingSession(Rig("peers", {"tof": Sensor("tof", CAMERA, Constant(sigma))}), plan)
+        self._session = TrackingSession(Rig("peers", {"tof": Sensor("tof", CAMERA, Constant(sigma))}), plan)
         self.estimate: Estimate
         self.track(first)
-        mesh = template(first.state) if self._tracking.mesh is None else self._tracking.mesh
+        mesh = template(first.state) if self._session.mesh is None else self._session.mesh
         self.places = mesh.chart if setup.model == "nurbs" else _inner_places(mesh.chart)
 
     def track(self, frame: SheetFrame) -> NDArray[np.floating]:
         """Vertices (n, 3) [m] in a frame."""
         image = DepthImage(frame.distance, np.full_like(frame.distance, np.nan))
         seen = Observation(0, frame.t_ns, {"tof": image}, {"tof": Source(0, frame.t_ns)}, ())
-        self.estimate = self._tracking.track_observation(seen, lambda: True)
+        self.estimate = self._session.track_observation(seen, lambda: True)
         return self.estimate.vertices
 
 

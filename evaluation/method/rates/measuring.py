@@ -49,13 +49,13 @@ def measure(case: Case, frames: int) -> Times:
     rig = replace(rig, sensors={name: rig.sensors[name] for name in case.sensors})
     watched = Watched(case.optimizer)
     plan = demo_plan(case.model, optimizer=watched, vertices=case.vertices, evaluations=10**9)
-    tracking, took_s, worked_s = TrackingSession(rig, plan), [], []
+    session, took_s, worked_s = TrackingSession(rig, plan), [], []
     for exposure in expose(simulation, (*APPROACH, *range(FIRST, FIRST + frames))):
         began, begin = time.thread_time(), time.perf_counter()
-        tracking.track(exposure.frames, lambda: True)
+        session.track(exposure.frames, lambda: True)
         took_s.append(time.perf_counter() - begin)
         worked_s.append(time.thread_time() - began)
-    if tracking.mesh is None:
+    if session.mesh is None:
         raise UntrackedError(f"{case.part}: nothing was found")
     clock_ms, cpu_ms = (1e3 * np.array(one[-frames:]) for one in (took_s, worked_s))
     return Times(

@@ -83,19 +83,19 @@ def run_through(take: Path, is_watched: bool) -> Pass:
 class _Process:
     """Work of a tracker's process on a frame set."""
 
-    def __init__(self, tracking: TrackingSession, headers: HeaderFactory, watch: Stopwatch):
+    def __init__(self, session: TrackingSession, headers: HeaderFactory, watch: Stopwatch):
         self.took_ns: list[int] = []
         self.tracked = 0
         self.thetas = hashlib.sha256()
         self.frames: dict[int, TrackedFrame] = {}
-        self._tracking = tracking
+        self._session = session
         self._headers = headers
         self._watch = watch
         self._version, self._made = -1, 0
         self._identity = Identity(TRACKER, "nurbs", "", "", 1)
 
     def take(self, frames: FrameSet, begin_ns: int) -> None:
-        estimate = self._tracking.track(frames, lambda: True)
+        estimate = self._session.track(frames, lambda: True)
         header = self._headers.at(estimate.t_host_ns, estimate.seq, keys.RIG_FRAME)
         with self._watch.stage(ENCODE):
             estimate_messages.state(header, estimate, self._identity, Effort(0, 0, 0, 0, 0, {})).SerializeToString()
@@ -106,11 +106,11 @@ class _Process:
         self.thetas.update(np.ascontiguousarray(estimate.theta).tobytes())
 
     def _keep(self, k: int, estimate: Estimate) -> None:
-        if self._tracking.mesh is None:
+        if self._session.mesh is None:
             return
-        if self._tracking.mesh_version != self._version:
-            self._version, self._made = self._tracking.mesh_version, k
-        is_tracking, rest = estimate.status == Status.TRACKING, self._tracking.mesh.vertices
+        if self._session.mesh_version != self._version:
+            self._version, self._made = self._session.mesh_version, k
+        is_tracking, rest = estimate.status == Status.TRACKING, self._session.mesh.vertices
         self.frames[k] = TrackedFrame(is_tracking, estimate.vertices, rest, self._made)
 
 

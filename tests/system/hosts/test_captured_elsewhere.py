@@ -33,7 +33,7 @@ def test_what_one_host_captures_another_tracks_and_records(endpoint, launch, tmp
         "its own processes went on all the time"
     )
     (file,) = (tmp_path / "takes").glob("*.mcap")
-    assert len(list(abs_service.open_recording(file).frames())) > 50, "before and after"
+    assert len(list(abs_service.open_recording(file).images())) > 50, "before and after"
 
 
 def _level(listener):

@@ -29,7 +29,7 @@ def run(folder: Path, *options: str) -> int:
 
 def frames_of(path: Path) -> list[Frame]:
     """All images of a recording."""
-    return [item for item in Recording(path).frames() if isinstance(item, Frame)]
+    return list(Recording(path).images())
 
 
 def open3d(folder: Path, name: str, **changes: object) -> list[str]:

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from abs_service.tracker.terms.base import Bounds, Prediction
 from abs_service.tracker.terms.depth.depth import DepthTerm
-from abs_service.tracker.terms.depth.depth_cost import Residuals
+from abs_service.tracker.terms.depth.depth_cost import DepthResiduals
 from abs_service.tracker.terms.depth.fluctuation import MIN_FRAMES, MIN_VERTICES, Fluctuation
 from abs_service.tracker.terms.depth.observed_depth import MAX_MISFIT_M, write_misfit
 from abs_service.tracker.terms.depth.pixel_classes import (
@@ -94,7 +94,7 @@ def test_the_misfit_of_a_vertex_is_what_its_pixel_shows(seed: int):
     generator, n = np.random.default_rng(seed), 40
     pixel = generator.integers(-1, 30, n).astype(np.int32)
     cost = np.where(generator.random(n) < 0.3, np.inf, 1.0)
-    residuals = Residuals(generator.standard_normal(n) * 30, generator.uniform(100, 500, n), cost)
+    residuals = DepthResiduals(generator.standard_normal(n) * 30, generator.uniform(100, 500, n), cost)
     bits = generator.choice([0, 0, 0, LOST, COVERED, BEYOND, DOUBTFUL, LOST + BEYOND], 30).astype(np.uint8)
     free_m = generator.uniform(0, 0.1, 30).astype(np.float32)
     at, found = np.maximum(pixel, 0), np.zeros((2, n))
