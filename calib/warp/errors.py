@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.camera import Camera
+from calib.warp.points import Points
 
 #: Largest plausible median distance [m]; a larger one indicates a wrong unit.
 MAX_DISTANCE_M = 100.0
@@ -22,6 +23,10 @@ class NoReturnsError(WarpError):
 
 class NoOverlapError(WarpError):
     """Image of which no measurement is in the target's view."""
+
+
+class NoSurfaceError(WarpError):
+    """Image whose measurements in the target's view are single points, of no surface."""
 
 
 class UnitError(WarpError):
@@ -57,12 +62,22 @@ def _some(distance: NDArray[np.floating]) -> NDArray[np.floating]:
     return distance[np.isfinite(distance)]
 
 
-def nothing_seen(distance: NDArray[np.floating], inverse_z: NDArray[np.floating], target: Camera) -> NoOverlapError:
-    """Error for distances [m] outside the target's view; `inverse_z` is NaN behind the target."""
-    known = np.isfinite(distance)
-    before = int(np.count_nonzero(np.isfinite(inverse_z)))
+def nothing_seen(points: Points, target: Camera, maximum_step_m: float) -> NoOverlapError | NoSurfaceError:
+    """Error for points of which no surface is in the target's view."""
+    known, before = np.isfinite(points.distance), np.isfinite(points.inverse_z)
+    away = np.abs(points.place[before] - np.array([target.width - 1, target.height - 1]) / 2)
+    inside = np.count_nonzero((away <= np.array([target.width, target.height]) / 2).all(axis=1))
+    about = (
+        f"of {np.count_nonzero(known)} distances from {np.nanmin(points.distance):.3g} to "
+        f"{np.nanmax(points.distance):.3g} m "
+    )
+    if inside:
+        return NoSurfaceError(
+            f"{about}{inside} are in the view, but none of them with two neighbours within {maximum_step_m:g} m, which "
+            "were a surface: the image is noise, or its surfaces are too small"
+        )
     return NoOverlapError(
-        f"of {np.count_nonzero(known)} distances from {np.nanmin(distance):.3g} to {np.nanmax(distance):.3g} m none is "
-        f"in the view of the target of {target.width} × {target.height} pixels: {before} lie before its camera but "
-        f"beside its image, the others behind it or too far aside; check both T_rs"
+        f"{about}none is in the view of the target of {target.width} × {target.height} pixels: "
+        f"{np.count_nonzero(before)} lie before its camera but beside its image, the others behind it or too far "
+        "aside; check both T_rs"
     )

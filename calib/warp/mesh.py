@@ -86,7 +86,7 @@ class MeshWarp:
             pass
         raster.fray(points.source, self.maximum_step_m, self._reach, buffer, warped)
         if not (face >= 0).any():
-            raise errors.nothing_seen(distance, points.inverse_z, self.geometry.target)
+            raise errors.nothing_seen(points, self.geometry.target, self.maximum_step_m)
         return WarpedDepth(warped, points, self.geometry, self.maximum_step_m, face, nearness)
 
 

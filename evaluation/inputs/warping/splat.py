@@ -49,7 +49,7 @@ class SplatWarp:
         sums = splats.sums(np.zeros_like(points.distance))
         known = sums[..., 0] > 0
         if not known.any():
-            raise errors.nothing_seen(distance, points.inverse_z, self.geometry.target)
+            raise errors.nothing_seen(points, self.geometry.target, np.inf)
         splats.distance[known] = self._ray_length[known] * sums[known, 0] / sums[known, 1]
         return splats
 

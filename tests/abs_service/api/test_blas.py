@@ -1,6 +1,6 @@
 """A program's BLAS has one thread while a frame is computed, and its own number before and after."""
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from itertools import islice
 from pathlib import Path
 
@@ -44,8 +44,10 @@ def test_a_frame_is_computed_with_one_thread(monkeypatch: pytest.MonkeyPatch):
     """The reader of the recording looks whenever the tracker asks for an image."""
     seen: list[set[int]] = []
 
-    def frames(recording: Recording, read=Recording.frames) -> Iterator[Frame | Truth]:
-        for frame in read(recording):
+    read = Recording.frames
+
+    def frames(recording: Recording, streams: Collection[tuple[str, str]] = ()) -> Iterator[Frame | Truth]:
+        for frame in read(recording, streams):
             seen.append(threads())
             yield frame
 

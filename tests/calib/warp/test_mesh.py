@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given, reject, settings
 from hypothesis import strategies as st
 
 from calib import pose
@@ -121,7 +121,10 @@ def test_the_kernels_are_their_definition(seed):
     view = Camera(16, 13, 20.0, 20.0, 7.6, 6.2, T_rs=pose.from_rotation_vector([0.1, 0, 0.2], [0.05, 0, -0.02]))
     distance = generator.choice([0.9, 1.4], (6, 7)) + generator.uniform(0, 0.02, (6, 7))
     distance[generator.random((6, 7)) < 0.15] = np.nan
-    warped = MeshWarp(source, view).warp(distance)
+    try:
+        warped = MeshWarp(source, view).warp(distance)
+    except errors.NoSurfaceError:
+        reject()  # no three neighbours are of one surface
     sigma = generator.uniform(1e-3, 5e-3, (6, 7))
     deviation = warped.deviation(sigma)
     expected, spread, margin = reference.warped(source, view, distance, sigma, MAX_STEP_M)
@@ -198,3 +201,10 @@ def test_cameras_that_do_not_look_at_the_same_are_named():
     in_mm = dataclasses.replace(SOURCE, T_rs=pose.from_rotation_vector([0, 0, 0], [-32.0, -2.0, 4.0]))
     with pytest.raises(errors.UnitError, match=r"32\.\d+ m apart, .* is T_rs in millimetres"):
         MeshWarp(SOURCE, in_mm).warp(distance)
+
+
+def test_an_image_without_three_neighbours_of_one_surface_is_named():
+    rows, columns = np.indices((SOURCE.height, SOURCE.width))
+    noise = 1.0 + 0.1 * ((rows + 2 * columns) % 5)  # any two neighbours are 0.1 m apart, or more
+    with pytest.raises(errors.NoSurfaceError, match="3584 are in the view, but none of them with two neighbours"):
+        MeshWarp(SOURCE, SOURCE).warp(noise)

@@ -73,13 +73,13 @@ class Settings(SurfaceSettings):
                 return without_arms(thing, rests, view.measured)
         return things[0]
 
-    def _refuse_background(self, largest: NDArray[np.bool_], others: list[NDArray[np.bool_]], view: DepthView) -> None:
-        """DetectionError if one of the other surfaces is a thing before the largest one, and no speck."""
-        pixels, away = np.count_nonzero(largest), np.median(view.distance[largest])
+    def _refuse_background(self, main: NDArray[np.bool_], others: list[NDArray[np.bool_]], view: DepthView) -> None:
+        """DetectionError if one of the other surfaces is a thing before the main one, the largest, and no speck."""
+        pixels, away = np.count_nonzero(main), np.median(view.distance[main])
         medians = {
             float(np.median(view.distance[other])): other
             for other in others
-            if not (_is_speck(other, largest) or lining(other, view.measured))
+            if not (_is_speck(other, main) or lining(other, view.measured))
         }
         if medians and min(medians) < away:
             row, column = deepest_pixel(medians[min(medians)])
@@ -129,6 +129,6 @@ def _before_background(
     return surfaces
 
 
-def _is_speck(surface: NDArray[np.bool_], largest: NDArray[np.bool_]) -> bool:
+def _is_speck(surface: NDArray[np.bool_], main: NDArray[np.bool_]) -> bool:
     """True if a surface is too small beside the largest one to be a thing."""
-    return bool(np.count_nonzero(surface) < SPECK * np.count_nonzero(largest))
+    return bool(np.count_nonzero(surface) < SPECK * np.count_nonzero(main))

@@ -115,12 +115,12 @@ def find_explained(
 
 
 @kernel
-def count_within(away: NDArray[np.float32], shown: NDArray[np.bool_], least: float, most: float) -> int:
+def count_within(away: NDArray[np.float32], shown: NDArray[np.bool_], minimum: float, maximum: float) -> int:
     """Number of pixels (rows, columns) that show the object, farther from the mesh than a distance, up to another."""
     count = 0
     for row in range(away.shape[0]):
         for column in range(away.shape[1]):
-            count += 1 if shown[row, column] and least < away[row, column] <= most else 0
+            count += 1 if shown[row, column] and minimum < away[row, column] <= maximum else 0
     return count
 
 

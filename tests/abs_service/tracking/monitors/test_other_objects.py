@@ -1,4 +1,4 @@
-"""After a loss the object is found again wherever it is, however it is bent; another thing is refused."""
+"""Detection after a loss: of the object wherever it is, however it is bent, and of no other thing."""
 
 import dataclasses
 
