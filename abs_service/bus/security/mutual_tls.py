@@ -12,8 +12,8 @@ from typing import Any
 
 from abs_service.bus.security import roles
 
-#: Time in which a router has to refuse a client [s].
-ANSWER_S = 2.0
+#: Longest time for an answer to a handshake [s]; a listener without TLS ends one after 2 s.
+ANSWER_S = 4.0
 #: Time in which who speaks TLS answers its first message; `abs-service status` ends within two seconds [s].
 PROBE_S = 0.5
 #: X509_V_ERR_INVALID_PURPOSE of OpenSSL: here, a certificate of a client at a process that listens.
