@@ -12,10 +12,12 @@ from typing import Any
 
 from abs_service.bus.security import roles
 
-#: Longest time for an answer to a handshake [s]; a listener without TLS ends one after 2 s.
-ANSWER_S = 4.0
+#: Time in which a router has to answer a handshake, and to refuse a client [s].
+ANSWER_S = 2.0
 #: Time in which who speaks TLS answers its first message; `abs-service status` ends within two seconds [s].
 PROBE_S = 0.5
+#: A listener without TLS ends a handshake after two seconds; one that hangs does not answer, either.
+NO_TLS = "no TLS is spoken there, or it hangs; compare with the bus.endpoint and the table [bus.tls] of who listens"
 #: X509_V_ERR_INVALID_PURPOSE of OpenSSL: here, a certificate of a client at a process that listens.
 INVALID_PURPOSE = 26
 
@@ -119,19 +121,23 @@ class MutualTls:
         """See `NoSecurity`; connects once more, since zenoh does not report it."""
         address = _address(endpoint)
         try:
-            with (
-                socket.create_connection(address, ANSWER_S) as plain,
-                self._context(ssl.PROTOCOL_TLS_CLIENT).wrap_socket(plain, server_hostname=address[0]) as link,
-            ):
-                link.recv(1)  # what the router thinks of our certificate comes after the handshake
-        except ssl.SSLCertVerificationError as error:
-            return f"its certificate is refused here: {error.verify_message}"
-        except ssl.SSLError as error:
-            if not _speaks_tls(endpoint):
-                return "no TLS is spoken there; compare with the bus.endpoint and the table [bus.tls] of who listens"
-            return f"it refuses this certificate: {(error.reason or str(error)).lower().replace('_', ' ')}"
+            plain = socket.create_connection(address, ANSWER_S)
         except OSError:
-            pass
+            return ""
+        with plain:
+            try:
+                link = self._context(ssl.PROTOCOL_TLS_CLIENT).wrap_socket(plain, server_hostname=address[0])
+            except ssl.SSLCertVerificationError as error:
+                return f"its certificate is refused here: {error.verify_message}"
+            except OSError as error:
+                return _refused(error) if isinstance(error, ssl.SSLError) and _speaks_tls(endpoint) else NO_TLS
+        with link:
+            try:
+                link.recv(1)  # what the router thinks of our certificate comes after the handshake
+            except ssl.SSLError as error:
+                return _refused(error)
+            except OSError:  # it has nothing to say
+                return ""
         return ""
 
     def _context(self, protocol: int) -> ssl.SSLContext:
@@ -152,6 +158,10 @@ class MutualTls:
 
     def _error(self, key: str, problem: str) -> TlsError:
         return TlsError(key, str(getattr(self, key)), problem)
+
+
+def _refused(error: ssl.SSLError) -> str:
+    return f"it refuses this certificate: {(error.reason or str(error)).lower().replace('_', ' ')}"
 
 
 def _host(endpoint: str) -> str:
