@@ -17,6 +17,9 @@ pytestmark = pytest.mark.slow
 
 FLUSH_S = 0.2
 
+#: Size of images of which a file that is deleted is more than a second old: no newer one has its name.
+SLOW = (24, 48)
+
 
 @pytest.fixture
 def rig(tmp_path, endpoint):
@@ -138,7 +141,7 @@ def test_the_queue_is_as_large_as_the_configuration_says(rig, endpoint, launch):
 def test_the_oldest_recordings_are_deleted_as_the_configuration_says(rig, endpoint, launch):
     rig.write_text(rig.read_text() + "rotate_bytes = 100_000\nretain_bytes = 1_000_000\n")
     launch("record", rig)
-    with Stream(endpoint, noise((96, 128))) as stream:
+    with Stream(endpoint, noise(SLOW)) as stream:
         health = stream.wait_for(lambda health: health.counters["deleted"] > 0)
         assert not (rig.parent / "kept" / health.labels["deleted"]).exists()
         stream.wait_for(lambda health: health.labels["forecast"].startswith("the last "))  # once the rate is known
@@ -147,7 +150,7 @@ def test_the_oldest_recordings_are_deleted_as_the_configuration_says(rig, endpoi
 def test_estimates_of_deleted_recordings_are_kept_as_the_configuration_says(rig, endpoint, launch):
     rig.write_text(rig.read_text() + "rotate_bytes = 100_000\nretain_bytes = 1_000_000\nestimates = true\n")
     recorder = launch("record", rig)
-    with Stream(endpoint, noise((96, 128))) as stream:
+    with Stream(endpoint, noise(SLOW)) as stream:
         health = stream.wait_for(lambda health: health.counters["deleted"] > 0)
         recorder.send_signal(signal.SIGTERM)
         assert recorder.wait(5) == 0
