@@ -42,8 +42,8 @@ class Settings:
     only: tuple[str, ...] = ("",)
 
 
-#: One fault of every kind, twice each, which exercises all of the experiment: the first try, and one after another.
-QUICK = Settings(2, ("fork server", "takes no byte", "unplugged", "random bytes", "reboots"))
+#: One fault of every kind, which exercises all of the experiment, three times each.
+QUICK = Settings(3, ("fork server", "takes no byte", "unplugged", "random bytes", "reboots"))
 
 
 def run(settings: Settings, context: Context) -> Findings:

@@ -1,10 +1,8 @@
 """A stream of images on the bus, and its recordings."""
 
-import itertools
 import queue
 import signal
 import threading
-from collections.abc import Iterator
 
 import numpy as np
 from absmsg.v1.deformation_state_pb2 import DeformationState
@@ -22,23 +20,13 @@ from drivers.encoding import codec
 TOPIC = keys.image("tof", "depth")
 
 
-def noise(shape=(48, 64)):
-    """Images of noise. A recording has the bytes of each; of equal images, hardly more than those of the first."""
-    draw = np.random.default_rng(1)
-    while True:
-        yield draw.integers(0, 65535, shape, np.uint16)
-
-
-EQUAL = itertools.repeat(next(noise()))
-
-
 class Stream:
-    """Publishes images at 200 Hz from a thread and listens to the recorder's health."""
+    """Publishes noisy frames at 200 Hz from a thread and listens to the recorder's health."""
 
-    def __init__(self, endpoint, images: Iterator[np.ndarray] = EQUAL):
+    def __init__(self, endpoint, shape=(48, 64)):
         self._clock = WallClock()
         self._headers = HeaderFactory("demo", self._clock)
-        self._images = images
+        self._pixels = np.random.default_rng(1).integers(0, 65535, shape, np.uint16)
         self._stop = threading.Event()
         self._bus = ZenohBus.open("demo", endpoint, SessionMode.ROUTER)
         self.health = queue.SimpleQueue()
@@ -82,8 +70,7 @@ class Stream:
         seq = 0
         while not self._stop.wait(0.005):
             t_ns = self._clock.monotonic()
-            pixels = next(self._images)
-            frame = Frame("tof", "depth", Kind.DEPTH, pixels, "16UC1", t_ns, t_ns, seq, geometry=Geometry.RADIAL)
+            frame = Frame("tof", "depth", Kind.DEPTH, self._pixels, "16UC1", t_ns, t_ns, seq, geometry=Geometry.RADIAL)
             header = self._headers.at(t_ns, seq)
             publisher.put(codec.encode_image(frame, self._clock.wall(t_ns)), codec.encode_info(frame, header))
             seq += 1
