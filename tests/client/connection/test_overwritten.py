@@ -1,6 +1,5 @@
 """Messages that are overwritten in shared memory while their reader stands still are counted, and never read."""
 
-import itertools
 import json
 import os
 import signal
@@ -12,7 +11,7 @@ import pytest
 
 from abs_service.bus import session
 from abs_service.bus.contract import MESH
-from tests.waiting import repeating
+from tests.waiting import eventually, repeating
 
 #: A reader that is busy with its first message until a line comes; then it says what it got.
 READER = """
@@ -39,6 +38,8 @@ with Link(sys.argv[1], "demo") as link:
 SIZE = 30_000
 #: Much longer than zenoh waits for a reader of shared memory [s].
 STOPPED_S = 0.4
+#: Messages until more than four wait in the queue of the reader, and until the memory of these is used again.
+QUEUED, OVERWRITING = 20, 150
 
 
 @pytest.mark.skipif(not session.pool_bytes(), reason="shared memory is not used here")
@@ -46,7 +47,12 @@ def test_a_client_that_stood_still_leaves_out_and_counts_what_was_overwritten(op
     open_bus().subscribe("sheet/state", lambda sample: None)
     bus = open_bus()
     mesh, state = (bus.publisher(f"sheet/{topic}", "x", MESH) for topic in ("mesh", "state"))
-    numbers = itertools.cycle(range(256))
+    sent = []
+
+    def publish(publisher):
+        publisher.put(bytes([len(sent) % 256]) * SIZE)
+        sent.append(publisher)
+
     command = [sys.executable, "-c", READER, endpoint]
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment) as reader:
@@ -54,12 +60,14 @@ def test_a_client_that_stood_still_leaves_out_and_counts_what_was_overwritten(op
         assert reader.stdout
         try:
             assert reader.stdout.readline() == "ready\n"
-            with repeating(lambda: mesh.put(bytes([next(numbers)]) * SIZE), 0.01):
+            with repeating(lambda: publish(mesh), 0.01):
                 assert reader.stdout.readline() == "busy\n"
-                time.sleep(0.2)  # four more wait in its queue by now
+                before = len(sent)
+                assert eventually(lambda: len(sent) >= before + QUEUED)  # as many as it keeps wait by now
             reader.send_signal(signal.SIGSTOP)
-            with repeating(lambda: state.put(bytes([next(numbers)]) * SIZE), 0.002):
+            with repeating(lambda: publish(state), 0.002):
                 time.sleep(STOPPED_S)
+                assert eventually(lambda: sent.count(state) >= OVERWRITING)
             reader.send_signal(signal.SIGCONT)
             for _ in range(2):
                 print(file=reader.stdin, flush=True)
