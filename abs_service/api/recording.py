@@ -127,7 +127,7 @@ class Recording:
 
     @cached_property
     def _images(self) -> replay.Recording:
-        return replay.Recording(self.path)
+        return replay.Recording(self.path, self._contents)
 
 
 def open_recording(path: str | Path) -> Recording:

@@ -32,6 +32,10 @@ class Recording:
 
     A file whose writer was killed is read up to the truncation, and `truncated` is True.
 
+    Args:
+        path: of the file.
+        contents: its index, if that is known; None to read it.
+
     Attributes:
         path: of the file.
         contents: its index.
@@ -52,8 +56,8 @@ class Recording:
         RecordingError: missing file, not MCAP, or not a recording of abs-service.
     """
 
-    def __init__(self, path: Path) -> None:
-        contents = scan(path)
+    def __init__(self, path: Path, contents: Contents | None = None) -> None:
+        contents = scan(path) if contents is None else contents
         self.path = path
         self.truncated = contents.truncated
         self.damaged_chunks = contents.damaged

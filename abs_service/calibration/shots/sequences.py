@@ -96,8 +96,7 @@ def of_recording(path: Path, sensor: str, maximum: int, advance: Callable[[], No
         RecordingError: damaged file, or not a recording.
     """
     recording = Recording(path)
-    frames = recording.images()
-    return of_frames(path.name, frames, recording.cameras, sensor, maximum, advance)
+    return of_frames(path.name, recording.images(), recording.cameras, sensor, maximum, advance)
 
 
 def of_device(

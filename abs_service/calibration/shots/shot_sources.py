@@ -50,8 +50,7 @@ class RecordingShots:
         # The slowest stream determines the number of shots.
         reference = min(used, key=lambda key: self.recording.counts[key])
         synchroniser = Synchroniser(reference, used, self.tolerance_ns)
-        frames = self.recording.images(used)
-        yield from synchroniser.group(frames)
+        yield from synchroniser.group(self.recording.images(used))
 
 
 @dataclass(frozen=True)

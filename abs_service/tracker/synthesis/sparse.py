@@ -151,7 +151,7 @@ class ObservedSparseView:
         attributes: of the vertices (channels, n).
         gradients: of the attributes in the image.
         hidden: vertices (n,) that are no samples.
-        single: syntheses of populations of one, see `once`; `replace` makes a new one.
+        single: syntheses of populations of one, see `once`.
     """
 
     camera: Camera

@@ -64,6 +64,19 @@ def _mark_facing(
         result[v] = along < 0
 
 
+@kernel
+def line_of_sight(
+    vertices: NDArray[np.float32], normals: NDArray[np.float32], v: int, center: NDArray[np.float64]
+) -> tuple[float, float]:
+    """Distance of vertex v (3, n) from a centre (3,) [m], and the part of the line of sight along its normal [m]."""
+    square, along = 0.0, 0.0
+    for i in range(3):
+        sight = np.float64(vertices[i, v]) - center[i]
+        square += sight * sight
+        along += normals[i, v] * sight
+    return np.sqrt(square), along
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Prediction:
     """The surface that is expected in a frame, with which a sensor's image is compared.

@@ -68,8 +68,10 @@ class Settings(SurfaceSettings):
             self._refuse_background(things[0], things[1:], view)
             return things[0]
         for thing in things:
-            rests, is_speck = resting(thing, plane, view), _is_speck(thing, things[0])
-            if not (is_speck or is_lone_arm(thing, rests, height, view)):
+            if _is_speck(thing, things[0]):
+                continue
+            rests = resting(thing, plane, view)
+            if not is_lone_arm(thing, rests, height, view):
                 return without_arms(thing, rests, view.measured)
         return things[0]
 

@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.detection.depth_view import DepthView
 from abs_service.tracker.detection.plausibility import BELOW_BORDER_PX, at_border
+from abs_service.tracker.detection.segments.neighbourhood import grown, square
 
 #: A surface rests on a plane where the plane goes on within so many pixels at about the same distance [m]: surfaces end
 #: some pixels inside, and up to the clearance above the plane.
@@ -20,7 +21,7 @@ HOVERS = 1 / 16
 #: Number of steps over which the width of an arm is averaged [px].
 _WIDTH_STEPS = 9
 
-_CROSS, _SQUARE = np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]], np.uint8), np.ones((3, 3), np.uint8)
+_CROSS, _SQUARE = np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]], np.uint8), square(1)
 
 
 def resting(surface: NDArray[np.bool_], plane: NDArray[np.bool_], view: DepthView) -> NDArray[np.bool_]:
@@ -31,12 +32,12 @@ def resting(surface: NDArray[np.bool_], plane: NDArray[np.bool_], view: DepthVie
         plane: pixels (height, width) of the plane.
         view: the depth image.
     """
-    around = np.ones((2 * BESIDE_PX + 1, 2 * BESIDE_PX + 1), np.uint8)
+    around = square(BESIDE_PX)
     farthest = cv2.dilate(np.where(surface, view.distance, np.float32(0)), around)
     nearest = cv2.erode(np.where(surface, view.distance, np.float32(np.inf)), around)
     with np.errstate(invalid="ignore"):
         goes_on = plane & (view.distance > nearest - SAME_M) & (view.distance < farthest + SAME_M)
-    return surface & _wider(goes_on, BESIDE_PX)
+    return surface & grown(goes_on, BESIDE_PX)
 
 
 def hovering_at_border(
@@ -50,8 +51,8 @@ def hovering_at_border(
         measured: pixels (height, width) with a return.
     """
     crossing = at_border(surface, measured)
-    labels = np.asarray(cv2.connectedComponents(_wider(crossing, 1).view(np.uint8))[1])
-    lying = np.unique(labels[crossing & _wider(rests, round(HOVERS * surface.shape[1]))])
+    labels = np.asarray(cv2.connectedComponents(grown(crossing, 1).view(np.uint8))[1])
+    lying = np.unique(labels[crossing & grown(rests, round(HOVERS * surface.shape[1]))])
     return crossing & ~np.isin(labels, lying)
 
 
@@ -81,7 +82,7 @@ def without_arms(
     Each such arm is cut off where it is narrowest on its way from the border to the first place that rests. The hand
     stays: it does not differ from the object in depth. Arguments as of `hovering_at_border`.
     """
-    count, arms = cv2.connectedComponents(_wider(hovering_at_border(surface, rests, measured), 1).view(np.uint8))
+    count, arms = cv2.connectedComponents(grown(hovering_at_border(surface, rests, measured), 1).view(np.uint8))
     kept = surface
     for label in range(1, count):
         start = surface & (arms == label)
@@ -99,18 +100,14 @@ def _arm(surface: NDArray[np.bool_], start: NDArray[np.bool_], rests: NDArray[np
     steps, reached, widths = np.zeros(surface.shape, np.int32), start.view(np.uint8), []
     inside = surface.view(np.uint8)
     while not (reached.view(np.bool_) & rests).any():  # grows in octagons
-        grown = cv2.bitwise_and(cv2.dilate(reached, _SQUARE if len(widths) % 2 else _CROSS), inside)
-        new = (grown > reached).view(np.bool_)
+        wider = cv2.bitwise_and(cv2.dilate(reached, _SQUARE if len(widths) % 2 else _CROSS), inside)
+        new = (wider > reached).view(np.bool_)
         if not new.any():
             return np.zeros(surface.shape, np.bool_)
         widths.append(np.count_nonzero(new))
-        steps[new], reached = len(widths), grown
+        steps[new], reached = len(widths), wider
     if len(widths) < _WIDTH_STEPS:
         return np.zeros(surface.shape, np.bool_)
     mean = np.convolve(widths, np.ones(_WIDTH_STEPS), "valid")
     narrowest = len(mean) - 1 - int(np.argmin(mean[::-1])) + _WIDTH_STEPS // 2 + 1
     return reached.view(np.bool_) & (steps <= narrowest)
-
-
-def _wider(pixels: NDArray[np.bool_], by_px: int) -> NDArray[np.bool_]:
-    return np.asarray(cv2.dilate(pixels.view(np.uint8), np.ones((2 * by_px + 1, 2 * by_px + 1)))).view(np.bool_)

@@ -8,13 +8,13 @@ object: the camera would have seen it. Occluded points are ignored, so the objec
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 import scipy  # its parts are imported when they are first used
 from numpy.typing import NDArray
 
 from abs_service.tracker.detection.depth_view import at_points
 from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection
+from abs_service.tracker.detection.segments.neighbourhood import grown
 from abs_service.tracker.detection.shapes.principal_axes import extents, principal_axes
 from abs_service.tracker.detection.shapes.samples import Samples
 from calib import pose
@@ -136,7 +136,7 @@ def _distinct(fits: list[tuple[Pose, float]]) -> list[tuple[Pose, float]]:
 def _scene(detection: InitialDetection) -> Scene:
     camera, distance, deviation = detection.camera, detection.distance, detection.deviation
     on = np.isfinite(distance)
-    near = cv2.dilate(on.view(np.uint8), np.ones((2 * RIM_PX + 1, 2 * RIM_PX + 1))) > 0
+    near = grown(on, RIM_PX)
     around = detection.surroundings if detection.surroundings.size else np.full_like(distance, np.nan)
     is_empty = np.count_nonzero(np.isnan(around[~near])) > np.count_nonzero(~near) / 2
     background = np.where(np.isnan(around), np.inf if is_empty else np.nan, around)

@@ -10,10 +10,13 @@ exact, r² / (1 − h) is 1 on average and the sandwich equals Σ.
 """
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from abs_service.tracker.memo import Memo
+from abs_service.tracker.models.base import SparseJacobian
 from abs_service.tracker.posterior.linearized_cost import Sensed
 from abs_service.tracker.terms.linearization import PointLinearization, add_squares, propagated
 
@@ -26,10 +29,11 @@ PerResidual = Sequence[NDArray[np.float64]]
 
 def leverages(inverse: NDArray[np.float64], sensed: Sensed) -> PerResidual:
     """Leverage h = diag(J Σ Jᵀ) of every residual, from Σ (dim, dim)."""
-    samples = {source.sparse_jacobian for source in sensed if isinstance(source, PointLinearization)}
-    at_points = {one: propagated(one, inverse) for one in samples}
+    at_points: Memo[SparseJacobian, NDArray[np.float64]] = Memo()  # sensors share the points of the mesh
     return [
-        source.leverage(at_points[source.sparse_jacobian] if isinstance(source, PointLinearization) else inverse)
+        source.leverage(at_points.get(source.sparse_jacobian, partial(propagated, covariance=inverse)))
+        if isinstance(source, PointLinearization)
+        else source.leverage(inverse)
         for source in sensed
     ]
 

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.models.base import Surface
+from abs_service.tracker.terms.base import line_of_sight
 from calib.jit import kernel, prange
 from calib.no_return import NoReturn
 from calib.noise.texture import WINDOW_M
@@ -79,12 +80,7 @@ def _look(
 ) -> None:
     """Distances (n,) of vertices (3, n) from a centre (3,) [m], and cosines of their incidence, 0 to 1."""
     for v in range(distance.size):
-        square, along = 0.0, 0.0
-        for i in range(3):
-            sight = np.float64(vertices[i, v]) - center[i]
-            square += sight * sight
-            along += normals[i, v] * sight
-        distance[v] = np.sqrt(square)
+        distance[v], along = line_of_sight(vertices, normals, v, center)
         cosine[v] = min(max(-along / distance[v], 0.0), 1.0)
 
 

@@ -39,11 +39,11 @@ def gains(measured: NDArray[np.floating], expected: NDArray[np.floating]) -> NDA
     known = [ratio[:number] for ratio, number in zip(ratios, count.tolist())]
     result = [_gain(some) if len(some) >= MIN_SAMPLES else None for some in known]
     own = [gain for gain in result if gain is not None]
-    if len(own) < channels or max(own) > MAX_TINT * min(own):
-        shared = _gain(np.concatenate(known)) if count[channels] >= MIN_SAMPLES else 1.0
-        is_exposure = bool(own) and max(own) <= MAX_TINT * min(own)
-        result = [gain if gain is not None and is_exposure else shared for gain in result]
-    return np.array(result, np.float32)
+    is_exposure = bool(own) and max(own) <= MAX_TINT * min(own)
+    if is_exposure and len(own) == channels:
+        return np.array(result, np.float32)
+    shared = _gain(np.concatenate(known)) if count[channels] >= MIN_SAMPLES else 1.0
+    return np.array([gain if gain is not None and is_exposure else shared for gain in result], np.float32)
 
 
 @kernel

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.pairing.images import Window
-from abs_service.tracker.terms.depth.classification.neighbourhood import grown
+from abs_service.tracker.detection.segments.neighbourhood import grown
 from calib.jit import kernel
 
 #: A connected area of missing returns is background if it shares so many pixels with that of the first image. The

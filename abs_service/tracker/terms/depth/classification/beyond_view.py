@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.pairing.images import Window
-from abs_service.tracker.terms.depth.classification.neighbourhood import grown, square
+from abs_service.tracker.detection.segments.neighbourhood import grown, square
 
 #: A field of view fills at least this share of the image: less may be objects before a background without return.
 MIN_AREA = 0.5

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.pairing.images import Window
+from abs_service.tracker.detection.segments.neighbourhood import grown
 from abs_service.tracker.synthesis.window import corner
-from abs_service.tracker.terms.depth.classification.neighbourhood import grown
 from calib.jit import kernel
 
 #: Pixels this near to the predicted mesh may be on the object's outline: a mesh ends up to a cell inside.

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.pairing.images import Window
-from abs_service.tracker.terms.depth.classification.neighbourhood import grown
+from abs_service.tracker.detection.segments.neighbourhood import grown
 from calib.camera import Camera
 
 #: Cameras measure from 0.1 (RealSense D4xx, PMD), 0.4 (Kinect v1), 0.5 (Kinect v2, Azure Kinect) or 0.6 m (Astra) on.

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.detection.segments.depth_segments import Surfaces, connected_surfaces
+from abs_service.tracker.detection.segments.neighbourhood import grown
 from abs_service.tracker.terms.depth.classification.background import MAX_DEPTH_M
-from abs_service.tracker.terms.depth.classification.neighbourhood import grown
 from calib.jit import kernel
 
 #: Measurements this near to the predicted distance show the object; it may have moved by as much since [m].

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.models.base import Surface
+from abs_service.tracker.terms.base import line_of_sight
 from abs_service.tracker.terms.depth.classification.beyond_view import BLIND_SHARE, MIN_RETURNS
 from abs_service.tracker.terms.depth.outline.rim import Rim, read
 from abs_service.tracker.terms.depth.outline.round_side import is_round_side
@@ -209,10 +210,6 @@ def _turn_away(
     for k in range(outer.size):
         beyond = 0.0
         for v, share in ((outer[k], 2.0), (inner[k], -1.0)):
-            square, along = 0.0, 0.0
-            for i in range(3):
-                sight = np.float64(vertices[i, v]) - center[i]
-                square += sight * sight
-                along += normals[i, v] * sight
-            beyond += share * abs(along) / np.sqrt(square)
+            distance, along = line_of_sight(vertices, normals, v, center)
+            beyond += share * abs(along) / distance
         result[k] = beyond < MIN_COSINE
