@@ -37,6 +37,13 @@ def publish_until_received(publisher, arrived, *message):
     raise AssertionError("nothing arrived within ten seconds")
 
 
+def next_after(arrived, earlier):
+    """The next message that is not a repetition of `earlier`."""
+    while (sample := arrived.get(timeout=10)).payload == earlier:
+        pass
+    return sample
+
+
 @pytest.mark.parametrize("qos", [STATE, EVENTS, IMAGES])
 def test_a_message_arrives_as_it_was_sent(buses, qos):
     _, sender, receiver = buses
@@ -49,6 +56,18 @@ def test_a_message_arrives_as_it_was_sent(buses, qos):
     assert publish_until_received(bare, listen(receiver, "tf"), b"") == Sample(
         "tf", "foxglove.FrameTransforms", b"", b""
     )
+
+
+def test_a_burst_of_estimates_arrives_whole(buses):
+    _, sender, receiver = buses
+    arrived = listen(receiver, "sheet/state")
+    publisher = sender.publisher("sheet/state", "absmsg.v1.DeformationState", STATE)
+    publish_until_received(publisher, arrived, b"first")
+    for burst in range(500):
+        sent = [b"%d/%d" % (burst, number) + bytes(20_000) for number in range(12)]
+        for payload in sent:
+            publisher.put(payload)
+        assert [next_after(arrived, b"first").payload for _ in sent] == sent
 
 
 def test_a_latched_publisher_answers_queries_with_its_last_message(buses):
