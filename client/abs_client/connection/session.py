@@ -5,7 +5,7 @@ import socket
 
 import zenoh
 
-from abs_client.connection import shared_memory
+from abs_client.connection import refusal, shared_memory
 from abs_client.connection.tls import Tls
 from abs_client.errors import UnreachableError
 
@@ -19,7 +19,7 @@ def opened(endpoint: str, tls: Tls | None = None) -> zenoh.Session:
     """A client's session with the router at an endpoint.
 
     Raises:
-        UnreachableError: nothing answers there, or its name has no address.
+        UnreachableError: nothing answers there, its name has no address, or one side refuses the other's certificate.
     """
     try:
         return zenoh.open(zenoh.Config.from_json5(json.dumps(client_settings(endpoint, tls))))
@@ -30,6 +30,8 @@ def opened(endpoint: str, tls: Tls | None = None) -> zenoh.Session:
         except (OSError, UnicodeError) as unresolved:  # an empty part, or one of more than 63 letters
             reason = getattr(unresolved, "strerror", "it is no name")
             raise UnreachableError(f'the name "{host}" in {endpoint} cannot be resolved: {reason}') from error
+        if refused := refusal.reason(endpoint, tls):
+            raise UnreachableError(f"{endpoint}: {refused}") from error
         raise UnreachableError(f"nothing answers at {endpoint} within {CONNECT_S:g} s: is it running?") from error
 
 
