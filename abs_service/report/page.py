@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 #: Mark beside each level's word, so that the level does not depend on colour.
 MARKS = {Level.GOOD: "✓", Level.DOUBTFUL: "!", Level.BAD: "✗"}
 
+#: Both forms of a report say where it comes from.
+_SIGN = b'provenance"'
+
 
 class ReportFileError(Exception):
     """A report that cannot be written."""
@@ -27,13 +30,37 @@ def write(report: Report, path: Path) -> tuple[Path, Path]:
     Raises:
         ReportFileError: one of them cannot be written.
     """
-    page, data = path.with_suffix(".html"), path.with_suffix(".json")
+    page, data = _paths(path)
     try:
         atomic.write(page, to_html(report))
         atomic.write(data, json.dumps(to_json(report), ensure_ascii=False, indent=1) + "\n")
     except OSError as error:
         raise ReportFileError(f"{error.filename}: the report cannot be written: {error.strerror}") from error
     return page, data
+
+
+def check_replaceable(path: Path) -> None:
+    """Checks, before the minutes after which a report is written, that it will replace nothing but an earlier one.
+
+    Args:
+        path: as for `write`.
+
+    Raises:
+        ReportFileError: a file of its name, which ends in `.html` or `.json`, is something else.
+    """
+    for old in _paths(path):
+        try:
+            is_other = _SIGN not in old.read_bytes()
+        except FileNotFoundError:
+            continue
+        except OSError as error:
+            raise ReportFileError(f"{old}: the report cannot be written: {error.strerror}") from error
+        if is_other:
+            raise ReportFileError(f"{old}: exists and is no report, which would replace it; choose another name")
+
+
+def _paths(path: Path) -> tuple[Path, Path]:
+    return path.with_suffix(".html"), path.with_suffix(".json")
 
 
 def to_html(report: Report) -> str:

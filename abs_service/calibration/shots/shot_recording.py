@@ -30,6 +30,7 @@ class ShotRecording:
     def __init__(self, path: Path, headers: HeaderFactory, cameras: Mapping[str, Camera], rig_toml: str) -> None:
         self._path = path
         self._headers = headers
+        self._is_empty = True
         try:
             self._stream = path.open("xb")
         except FileExistsError:
@@ -52,11 +53,12 @@ class ShotRecording:
                 wall_ns = self._headers.clock.wall(frame.t_host_ns)
                 write_frame(self._file, frame, self._headers.at(frame.t_host_ns, frame.seq), wall_ns)
             self._file.flush()
+            self._is_empty = False
         except OSError as error:
             raise ShotFileError(f"{self._path}: cannot be written: {error.strerror}") from error
 
     def finish(self) -> None:
-        """Closes the file.
+        """Closes the file; one without a shot is removed.
 
         Raises:
             ShotFileError: the disk is full or unavailable.
@@ -67,3 +69,5 @@ class ShotRecording:
             raise ShotFileError(f"{self._path}: cannot be written: {error.strerror}") from error
         finally:
             self._stream.close()
+            if self._is_empty:
+                self._path.unlink(missing_ok=True)

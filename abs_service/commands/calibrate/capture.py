@@ -11,7 +11,7 @@ the sensor's image, and the board faces where its print does.
 
 Writes the recording OUT, from which the other commands calibrate, the corners it found (OUT.corners.npz), from which
 `rig` and `intrinsics` do, too, and a picture OUT-SENSOR.png of what each sensor has seen: where it is red, it has not
-seen the board. Exit code 0: enough; 1: ended before it was enough; 2: of no use.
+seen the board. Without a view, it writes nothing. Exit code 0: enough; 1: ended before it was enough; 2: of no use.
 """
 
 import argparse
@@ -85,7 +85,8 @@ def run(arguments: argparse.Namespace) -> int:
                 _collect(target, shots, cameras, collector, recording, guide, arguments.out)
         finally:
             recording.finish()
-    corner_file.write(collector.seen, corner_file.path_beside(arguments.out))
+    if collector.kept:
+        corner_file.write(collector.seen, corner_file.path_beside(arguments.out))
     return _conclude(collector, arguments)
 
 
@@ -162,10 +163,12 @@ def _conclude(collector: Collector, arguments: argparse.Namespace) -> int:
     if arguments.json:
         missing = [{"sensor": missing.sensor, "text": missing.text} for missing in missing_views]
         found = {"verdict": str(level), "exit_code": int(level), "shots": collector.kept, "poses": poses}
-        print(json.dumps({**found, "problem": problem, "missing": missing, "recording": str(arguments.out)}))
+        recording = str(arguments.out) if collector.kept else None
+        print(json.dumps({**found, "problem": problem, "missing": missing, "recording": recording}))
         return int(level)
     counts = ", ".join(f"{number} of {sensor}" for sensor, number in poses.items())
-    print(f"{arguments.out}: {collector.kept} shots; distinct poses: {counts}")
+    kept = f"{collector.kept} shots; distinct poses: {counts}" if collector.kept else "not written, without a shot"
+    print(f"{arguments.out}: {kept}")
     if problem:
         print(f"No calibration can be made of this. {problem}", file=sys.stderr)
     for missing in missing_views:

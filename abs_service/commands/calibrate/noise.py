@@ -93,6 +93,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Reads the sources, fits, writes and reports."""
     if arguments.out is not None:
         check_folder(arguments.out, "--out")
+        page.check_replaceable(_out(arguments.out, "", 0))
     console = Console(stderr=True)
     with bars() as progress:
         task = progress.add_task("depth images", total=arguments.frames * len(arguments.sources))

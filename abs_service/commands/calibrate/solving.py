@@ -50,8 +50,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", metavar="FILE", type=Path, required=True, help="calibration to write; must not exist")
     parser.add_argument("--start", metavar="FILE", type=Path, help="calibration or rig file to start from, or to keep")
     parser.add_argument(
-        "--lens", metavar="NAME=KIND", action="append", default=[], help=f"kind of lens: {', '.join(KINDS)}"
-    )
+        "--lens", type=_lens, metavar="NAME=KIND", action="append", default=[],
+        help=f"kind of lens: {', '.join(KINDS)}",
+    )  # fmt: skip
     parser.add_argument(
         "--fix", metavar="[NAME=]PARAMETERS", action="append", default=[],
         help="intrinsics that stay as they begin, such as k3,aspect; repeatable",
@@ -107,11 +108,19 @@ def _add_sources(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--target", metavar="FILE", type=Path, required=True, help="description of the board, TOML")
 
 
+def _lens(text: str) -> str:
+    """Type of `--lens`: its kind has to be one."""
+    kind = text.rpartition("=")[2]
+    if kind not in KINDS:
+        raise argparse.ArgumentTypeError(f"{text}: {allowed_instead(kind, KINDS)}")
+    return text
+
+
 def sensor_task(name: str, arguments: argparse.Namespace, found: Material, keeps: bool, **terms: object) -> SensorTask:
     """Task of one sensor, from its image size, previous calibration and options.
 
     Raises:
-        OptionError: fixed intrinsics that are unknown, or no such kind of lens.
+        OptionError: fixed intrinsics that are unknown, or a lens of no sensor.
     """
     size = found.seen.sizes[name]
     factory = (replace(found.known[name].camera),) if name in found.known else ()
@@ -121,8 +130,6 @@ def sensor_task(name: str, arguments: argparse.Namespace, found: Material, keeps
             allowed = allowed_instead(other, found.seen.sizes)
             raise OptionError(f"--lens {other}={lenses[other]}: no sensor that saw the board, {allowed}")
     kind = lenses.get(name, kind_of(factory[0].lens).name if factory else "brown-conrady")
-    if kind not in KINDS:
-        raise OptionError(f"--lens {name}={kind}: {allowed_instead(kind, KINDS)}")
     if factory and name in lenses and kind_of(factory[0].lens).make is not KINDS[kind].make and not keeps:
         factory = ()  # of another lens family: no initial values
     if keeps and not factory:

@@ -75,6 +75,8 @@ def run(arguments: argparse.Namespace) -> int:
     """Verifies, reports and judges."""
     if arguments.report is not None:
         check_folder(arguments.report, "--report")
+    path = arguments.report or arguments.calibration.with_name(f"{arguments.calibration.stem}-verify.html")
+    page.check_replaceable(path)
     known = calibrations.load(arguments.calibration)
     target = target_file.read(arguments.target)
     seen, files = _look(arguments, target, known)
@@ -82,7 +84,6 @@ def run(arguments: argparse.Namespace) -> int:
         cameras = {name: sensor.camera for name, sensor in known.sensors.items()}
         seen = replace(seen, corners=tuple(numbered_alike(seen.corners, cameras)))
     origin = provenance.trace(arguments.command_line, [arguments.calibration, arguments.target, *files])
-    path = arguments.report or arguments.calibration.with_name(f"{arguments.calibration.stem}-verify.html")
     try:
         report = verification.verify(known, seen, origin)
     except ValueError as error:

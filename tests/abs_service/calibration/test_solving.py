@@ -79,6 +79,13 @@ def test_options_that_do_not_fit_are_answered_with_what_would(
         assert message in capsys.readouterr().err
 
 
+def test_a_kind_of_lens_that_does_not_exist_is_told_before_boards_are_looked_for(capsys) -> None:
+    with pytest.raises(SystemExit) as ended:
+        cli.main(["calibrate", "rig", "no.mcap", "--target", "no.toml", "--out", "x.toml", "--lens", "color=fish"])
+    assert ended.value.code == 2
+    assert '--lens: color=fish: did you mean "fisheye"?' in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [

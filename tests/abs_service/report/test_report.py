@@ -167,3 +167,14 @@ def test_counted_coverage_is_what_the_map_shows() -> None:
     corners = np.array([[1.0, 1.0], [70.0, 50.0]])
     assert np.count_nonzero(figures.coverage_counts([corners, corners[:1]], 80, 60)) == 2
     assert figures.coverage_counts([corners, corners[:1]], 80, 60).max() == 2
+
+
+@pytest.mark.parametrize("ending", ["html", "json"])
+def test_a_report_replaces_an_earlier_one_and_nothing_else(tmp_path: Path, ending: str) -> None:
+    path = tmp_path / "lab.toml"
+    page.check_replaceable(path)
+    page.write(report(BAD), path)
+    page.check_replaceable(path)
+    (tmp_path / f"lab.{ending}").write_text('{"of": "the user"}')
+    with pytest.raises(page.ReportFileError, match=rf"lab\.{ending}: exists and is no report"):
+        page.check_replaceable(path)

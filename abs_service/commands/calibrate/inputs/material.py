@@ -15,6 +15,7 @@ from abs_service.calibration.shots.shot_sources import FolderShots, RecordingSho
 from abs_service.calibration.shots.shots import Shot
 from abs_service.commands.calibrate.inputs import calibrations, live, skipping
 from abs_service.commands.parts.options import OptionError, assignments, check_folder, check_new
+from abs_service.report import page
 from calib.board import coverage
 from calib.board.distinct import counts_of, distinct_poses
 from calib.board.target import Target
@@ -48,10 +49,11 @@ def material(arguments: argparse.Namespace) -> Material:
     Raises:
         OptionError: incompatible options.
         UnusableImagesError: no board, or too few views; the message says why.
-        TargetFileError, ShotsError, RecordingError, ConfigError: files that cannot be used.
+        TargetFileError, ShotsError, RecordingError, ConfigError, ReportFileError: files that cannot be used.
         ViewsAlikeError, MirroredSensorError, SameImagesError: the views do not allow a calibration.
     """
     check_new(arguments.out, "--out")
+    page.check_replaceable(arguments.out)
     if arguments.corners is not None:
         check_folder(arguments.corners, "--corners")
     if (arguments.source is None or mrcal_corners.is_vnl(arguments.source)) == (not arguments.images):

@@ -72,6 +72,19 @@ def test_a_recording_that_exists_is_not_overwritten(files: list[str], tmp_path: 
     assert (tmp_path / "board.mcap").read_bytes() == b"dear"
 
 
+def test_without_a_view_nothing_is_written_and_the_command_can_be_given_again(
+    files: list[str], tmp_path, capsys
+) -> None:
+    other = TARGETS["charuco"]
+    target_file.write(other, tmp_path / "target.toml")
+    before = {*tmp_path.iterdir()}
+    for _ in range(2):
+        assert cli.main(["calibrate", "capture", *files, "--limit-s", "1", "--json"]) == Exit.USER
+        said = json.loads(capsys.readouterr().out)
+        assert (said["shots"], said["recording"]) == (0, None)
+        assert {*tmp_path.iterdir()} == before
+
+
 def test_controls_of_the_rig_file_are_set_as_for_tracking(files: list[str], tmp_path: Path, capsys) -> None:
     """A value that the device does not take is rejected, by the name of its table."""
     with (tmp_path / "rig.toml").open("a", encoding="utf-8") as file:
