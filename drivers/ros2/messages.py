@@ -48,18 +48,21 @@ class Bag:
             ForeignRecordingError: as `topics`, and for a corrupt message.
         """
         with self._reader() as reader:
+            from rosbags.typesys import Stores, get_typestore  # noqa: PLC0415  an extra
+
+            # Definitions in the bag are not read: SQLite files of older releases have none, MCAP files have those of
+            # services as well, on which rosbags fails; and the types that are used here are the same in all releases.
+            types = get_typestore(Stores.ROS2_HUMBLE)
             wanted = [one for one in reader.connections if one.topic in topics]
             # An empty list would select all connections.
             for connection, time_ns, data in reader.messages(wanted) if wanted else ():
-                yield Message(connection.topic, time_ns, reader.deserialize(data, connection.msgtype))
+                yield Message(connection.topic, time_ns, types.deserialize_cdr(data, connection.msgtype))
 
     @contextmanager
     def _reader(self) -> Iterator[Any]:
         """Opens the bag; translates exceptions into errors that name the file and the remedy."""
         with rosbag_errors(self._path, "ROS 2"):
-            from rosbags.highlevel import AnyReader  # noqa: PLC0415  an extra
-            from rosbags.typesys import Stores, get_typestore  # noqa: PLC0415
+            from rosbags.rosbag2 import Reader  # noqa: PLC0415  an extra
 
-            # SQLite files of older releases do not describe their messages; those used here are the same in all.
-            with AnyReader([self._path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
+            with Reader(self._path) as reader:
                 yield reader

@@ -49,6 +49,14 @@ class Take:
             self._connections[topic] = self._writer.add_connection(topic, name, typestore=self._store)
         self._writer.write(self._connections[topic], time_ns, self._store.serialize_cdr(message, name))
 
+    def service(self, topic: str) -> None:
+        """A call of a service, defined as `ros2 bag record` does; rosbags cannot read that."""
+        definition, digest = "int64 a\nint64 b\n---\nint64 sum\n", f"RIHS01_{'0' * 64}"
+        name = "example_interfaces/srv/AddTwoInts_Event"
+        self._writer.write(
+            self._writer.add_connection(topic, name, msgdef=definition, rihs01=digest), STAMP_NS, b"\0\1\0\0"
+        )
+
     def image(self, topic: str, frame_id: str, encoding: str, data: np.ndarray, time_ns: int = STAMP_NS) -> None:
         flat = np.ascontiguousarray(data).view(np.uint8).ravel()
         size = {"height": data.shape[0], "width": data.shape[1], "step": flat.size // data.shape[0]}

@@ -109,6 +109,16 @@ def test_cameras_with_the_same_last_name_are_told_apart(tmp_path: Path) -> None:
     assert all(frame.undistorted for frame in read.frames())
 
 
+@pytest.mark.parametrize("storage", ["MCAP", "SQLITE3"])
+def test_calls_of_services_in_a_bag_are_passed_over(tmp_path: Path, storage: str) -> None:
+    with Take(tmp_path / "take", storage) as take:
+        take.service("/add/_service_event")
+        take.info(f"{D}/camera_info")
+        take.image(f"{D}/image_rect_raw", "one", "16UC1", DEPTH)
+    (frame,) = Ros2Bag(tmp_path / "take").frames()
+    np.testing.assert_array_equal(frame.data, DEPTH)
+
+
 def not_calibrated(take: Take) -> None:
     take.image(f"{D}/image_raw", "one", "16UC1", DEPTH)
 
