@@ -164,7 +164,7 @@ class ObservedColor:
         rows = noiseless_color_rows(self.image, self.view.camera, vertices[use], inverse).reshape(-1, 3)
         points = np.repeat(use, residual.shape[1])
         samples = seen.interpolation.follow(sparse_jacobian)
-        bias = self.bias.derivatives(vertices, rows, points)
+        bias = partial(self.bias.derivatives, vertices, rows, points)
         own = partial(self._of_appearance, seen, use, vertices[use], inverse)
         center = self.view.camera.center
         return [PointLinearization(residual[use].ravel(), rows, points, samples, vertices, bias, center, own)]

@@ -81,8 +81,9 @@ class ObservedRimOutline:
         rows = right * by_place[:, 0] + down * by_place[:, 1]
         jacobian = np.zeros((len(use), sparse_jacobian.dimension))
         chain(rows, self.edges.some(use), sparse_jacobian.blocks, jacobian)
-        shared = _shared_by_side(jacobian, residual[use], gradients[use])
-        return Linearization(residual[use], jacobian, points[use], rows, shared, partial(self._of_ends, surface, use))
+        residual = residual[use]
+        shared = partial(_shared_by_side, jacobian, residual, gradients[use])
+        return Linearization(residual, jacobian, points[use], rows, shared, partial(self._of_ends, surface, use))
 
     def _of_ends(self, surface: Surface, use: NDArray[np.intp], rows: NDArray[np.float64]) -> NDArray[np.float64]:
         """Derivatives (m, 3) of the edges `use`; zero where the outline is not known to be the end of the object.
