@@ -119,7 +119,8 @@ def _direction_error(part: Part) -> float:
 def _frame(vertices: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
     """Centre (3,) of vertices (n, 3), and root mean square of their distances from it [m]."""
     center = vertices.mean(axis=0)
-    return center, float(np.sqrt(np.mean(np.square(vertices - center).sum(axis=1))))
+    arms = vertices - center
+    return center, float(np.sqrt(np.vdot(arms, arms) / len(arms)))
 
 
 def _information(

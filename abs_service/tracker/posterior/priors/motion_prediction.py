@@ -94,4 +94,5 @@ class MotionPrediction:
 
     def _mean_innovation(self, theta: NDArray[np.float64]) -> float:
         """Root mean square innovation of theta (dim,) [m/s]."""
-        return float(np.sqrt(np.mean(self.innovation(theta) ** 2)))
+        innovation = self.innovation(theta)
+        return float(np.sqrt(innovation @ innovation / len(innovation)))
