@@ -85,7 +85,7 @@ class Linearization:
         """diag(J Σ Jᵀ) (m,) of a covariance Σ (dim, dim) of theta."""
         return np.vecdot(self.jacobian @ covariance, self.jacobian)
 
-    def add_scores(self, clusters: NDArray[np.int64], scores: NDArray[np.float64]) -> None:
+    def add_scores(self, clusters: NDArray[np.int64], scores: NDArray[np.floating]) -> None:
         """Adds the score Jᵀr of every residual to that of its cluster (m,), one of the rows of `scores` (…, dim)."""
         chain_rule.add_dense_scores(clusters, self.residual, self.jacobian, scores)
 
@@ -156,7 +156,7 @@ class PointLinearization:
         chain_rule.find_leverages(self.rows, self.points, at_points, result)
         return result
 
-    def add_scores(self, clusters: NDArray[np.int64], scores: NDArray[np.float64]) -> None:
+    def add_scores(self, clusters: NDArray[np.int64], scores: NDArray[np.floating]) -> None:
         """Adds the score Jᵀr of every residual to that of its cluster (m,), one of the rows of `scores` (…, dim)."""
         chain_rule.add_scores(clusters, self.residual, self.rows, self.points, self.sparse_jacobian.blocks, scores)
 
