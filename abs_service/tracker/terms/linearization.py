@@ -18,7 +18,7 @@ OfSurface = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
 
 def nothing_shared() -> NDArray[np.float64]:
-    """Of residuals without an error in common: (0, 0)."""
+    """No derivatives (0, 0): the residuals have no error in common."""
     return np.zeros((0, 0))
 
 

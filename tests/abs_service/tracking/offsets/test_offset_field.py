@@ -47,11 +47,11 @@ def test_variances_are_those_of_messages_along_every_edge(seed):
     square = {(i, j): (prior.coupling * 6 / min(degree[i], degree[j])) ** 2 for i, j in messages}
     diagonal = np.diag(dense(precision, prior))
     for _ in range(2):
-        heard = {edge: square[edge] * message for edge, message in messages.items()}
+        received = {edge: square[edge] * message for edge, message in messages.items()}
         known = diagonal.copy()
-        for (_, to), each in heard.items():
+        for (_, to), each in received.items():
             known[to] -= each
-        messages = {(i, j): 1 / (known[i] + heard[j, i]) for i, j in messages}
+        messages = {(i, j): 1 / (known[i] + received[j, i]) for i, j in messages}
         rest = diagonal.copy()
         for (i, to), each in messages.items():
             rest[to] -= square[i, to] * each

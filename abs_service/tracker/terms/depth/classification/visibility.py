@@ -121,7 +121,7 @@ def classify(
         hole, past = _holes(missing & ~(single | beyond), np.isfinite(predicted), near, focal, empty)
         hole |= beyond
     free_m = _depth_inside(~shown)
-    keep_free(behind, past, near, np.float32(focal), free_m)
+    keep_free(behind | past, near, np.float32(focal), free_m)
     return Visibility(shown, foreground, hole, single, nothing | beyond, free_m, nothing, nothing)
 
 
@@ -167,25 +167,12 @@ def _compare(
 
 
 @kernel
-def keep_free(
-    behind: NDArray[np.bool_],
-    past: NDArray[np.bool_],
-    near: NDArray[np.float32],
-    focal: np.float32,
-    away: NDArray[np.float32],
-) -> None:
-    """Distances from the object [px] become those across the line of sight [m], 0 where neither mask is set.
-
-    Args:
-        behind, past: pixels (height, width) in free space, measured and without return.
-        near: distances of the nearest place on the object [m].
-        focal: focal length of the camera [px].
-        away: distances from the object.
-    """
+def keep_free(free: NDArray[np.bool_], near: NDArray[np.float32], focal: np.float32, away: NDArray[np.float32]) -> None:
+    """Distances from the object [px] become metres at the distance of its nearest place [m], 0 outside free space."""
     for row in range(away.shape[0]):
         for column in range(away.shape[1]):
             at = row, column
-            away[at] = away[at] * near[at] / focal if behind[at] or past[at] else np.float32(0)
+            away[at] = away[at] * near[at] / focal if free[at] else np.float32(0)
 
 
 def _holes(
