@@ -27,10 +27,15 @@ class NoReturn:
     per_m: Annotated[float, Interval(ge=-20, le=20)] = 0.0
     grazing: Annotated[float, Interval(ge=0, le=20)] = 0.0
 
+    @property
+    def coefficients(self) -> tuple[float, float, float]:
+        """Log-odds of a surface that faces the sensor at 1 m, and their growth with the distance and with the angle."""
+        return float(scipy.special.logit(self.share)), float(self.per_m), float(self.grazing)
+
     def log_odds(self, x: ArrayLike, cosine: ArrayLike) -> NDArray[np.float64]:
         """Logarithm of p / (1 − p) at distances `x` [m] and cosines of incidence, in their common shape."""
-        away, turned = np.asarray(x, np.float64) - 1, 1 - np.asarray(cosine, np.float64)
-        return scipy.special.logit(self.share) + self.per_m * away + self.grazing * turned
+        facing, per_m, grazing = self.coefficients
+        return facing + per_m * (np.asarray(x, np.float64) - 1) + grazing * (1 - np.asarray(cosine, np.float64))
 
     def probability(self, x: ArrayLike, cosine: ArrayLike) -> NDArray[np.float64]:
         """Probability p of no return, in the common shape of distances [m] and cosines of incidence."""

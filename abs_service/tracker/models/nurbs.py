@@ -165,7 +165,7 @@ class Nurbs:
         self._offset = offset[order].astype(np.float32)
         tables = spline.rational_basis(u[order], w[order], degree, weights)
         local = np.take_along_axis(np.stack(tables), self._span_control[span[order]][None], axis=2)
-        self._basis = np.ascontiguousarray(local.transpose(0, 2, 1), np.float32)
+        self._basis = np.ascontiguousarray(local, np.float32)
         self._patches = Patches(u[order], w[order], offset[order], weights, degree)
         self.mesh = replace(ordered, vertices=self.deform(self.rest[None]).vertices[0].T.astype(np.float64))
 
@@ -181,7 +181,7 @@ class Nurbs:
     @property
     def vertex_basis(self) -> VertexBasis:
         """Rational basis functions of every vertex, and their derivatives along both directions."""
-        value, along_u, along_w = self._basis.transpose(0, 2, 1)
+        value, along_u, along_w = self._basis
         return VertexBasis(self._span_control[self._span], value, along_u, along_w)
 
     def set_offsets(self, offset: NDArray[np.float64], deviation: NDArray[np.float64]) -> None:
@@ -217,7 +217,7 @@ def _moves(
         control: (control points, 3).
         span_start: first vertex of every span, and the number of vertices, (spans + 1,).
         span_control: control points of every span (spans, q).
-        basis: R, ∂R/∂u, ∂R/∂w of every vertex for its span's control points (3, q, n).
+        basis: R, ∂R/∂u, ∂R/∂w of every vertex for its span's control points (3, n, q).
         offset: o of eq. 7 (n,).
         result: derivatives (n, 3, 3 · q) with respect to the control points of each vertex's span.
     """
@@ -225,7 +225,7 @@ def _moves(
         for v in range(span_start[s], span_start[s + 1]):
             ux, uy, uz, wx, wy, wz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
             for q in range(span_control.shape[1]):
-                point, by_u, by_w = control[span_control[s, q]], basis[1, q, v], basis[2, q, v]
+                point, by_u, by_w = control[span_control[s, q]], basis[1, v, q], basis[2, v, q]
                 ux, uy, uz = ux + by_u * point[0], uy + by_u * point[1], uz + by_u * point[2]
                 wx, wy, wz = wx + by_w * point[0], wy + by_w * point[1], wz + by_w * point[2]
             nx, ny, nz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
@@ -236,7 +236,7 @@ def _moves(
             bx, by, bz = back * (ny * uz - nz * uy), back * (nz * ux - nx * uz), back * (nx * uy - ny * ux)
             x_row, y_row, z_row = result[v, 0], result[v, 1], result[v, 2]
             for q in range(span_control.shape[1]):
-                here, by_u, by_w, d = basis[0, q, v], basis[1, q, v], basis[2, q, v], 3 * q
+                here, by_u, by_w, d = basis[0, v, q], basis[1, v, q], basis[2, v, q], 3 * q
                 x, y, z = by_u * ax + by_w * bx, by_u * ay + by_w * by, by_u * az + by_w * bz
                 x_row[d], x_row[d + 1], x_row[d + 2] = x * nx + here, x * ny, x * nz
                 y_row[d], y_row[d + 1], y_row[d + 2] = y * nx, y * ny + here, y * nz

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.synthesis.centers import at_centers
-from abs_service.tracker.synthesis.perspective import metres_per_pixel
+from abs_service.tracker.synthesis.perspective import image_gradients
 from abs_service.tracker.synthesis.sampling import sampler, stepping_sampler
 from calib.camera import Camera
 from calib.lenses.lens import LensModel
@@ -135,8 +135,8 @@ class FirstOrder:
 
         Tangents deform with the surface, so their directions in the image follow from the edges around a vertex.
         """
-        flat = metres_per_pixel(self._camera, predicted.vertices[0].T, self._edges, self._lengths)
-        gradients = np.ascontiguousarray(self._per_metre @ flat, np.float32)
+        vertices = predicted.vertices[0].T
+        gradients = image_gradients(self._camera, vertices, self._edges, self._lengths, self._per_metre)
         return FirstOrderInImage(gradients, np.ascontiguousarray(gradients.transpose(1, 2, 0)))
 
 

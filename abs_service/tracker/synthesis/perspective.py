@@ -33,20 +33,25 @@ def project_with_jacobian(
     return places, jacobian
 
 
-def metres_per_pixel(
-    camera: Camera, vertices: NDArray[np.floating], edges: NDArray[np.int32], lengths: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Derivative of the tangential coordinates with respect to the pixel (n, 2, 2) [m/px], at every vertex.
+def image_gradients(
+    camera: Camera,
+    vertices: NDArray[np.floating],
+    edges: NDArray[np.int32],
+    lengths: NDArray[np.float64],
+    per_metre: NDArray[np.float64],
+) -> NDArray[np.float32]:
+    """Gradients of attributes in the image (n, channels, 2) [1/px], right and down, at every vertex.
 
     Args:
         camera: the camera.
         vertices: (n, 3) [m].
         edges: (k, 2); the edges around a vertex give the directions of its tangents in the image.
         lengths: components of every edge along the tangents at both its ends (2, k, 2) [m].
+        per_metre: gradients along the tangents (n, channels, 2) [1/m].
     """
     places, _ = project_with_jacobian(camera, vertices)
-    result = np.empty((len(places), 2, 2))
-    _regress(places, edges, lengths, result)
+    result = np.empty(per_metre.shape, np.float32)
+    _regress(places, edges, lengths, per_metre, result)
     return result
 
 
@@ -85,9 +90,13 @@ def _project(
 
 @kernel
 def _regress(
-    place: NDArray[np.float64], edges: NDArray[np.int32], lengths: NDArray[np.float64], result: NDArray[np.float64]
+    place: NDArray[np.float64],
+    edges: NDArray[np.int32],
+    lengths: NDArray[np.float64],
+    per_metre: NDArray[np.float64],
+    result: NDArray[np.float32],
 ) -> None:
-    """See `metres_per_pixel`; places (n, 2) are NaN where unknown. `SHORT_EDGE_PX` regularises towards zero."""
+    """See `image_gradients`; places (n, 2) are NaN where unknown. `SHORT_EDGE_PX` regularises towards zero."""
     sums = np.zeros((place.shape[0], 7))
     for e in range(edges.shape[0]):
         u = place[edges[e, 1], 0] - place[edges[e, 0], 0]
@@ -107,7 +116,8 @@ def _regress(
     for n in range(place.shape[0]):
         a, b, d = sums[n, 0] + least, sums[n, 1], sums[n, 2] + least
         determinant = a * d - b * b
-        for i in range(2):
-            x, y = sums[n, 3 + 2 * i], sums[n, 4 + 2 * i]
-            result[n, i, 0] = (x * d - y * b) / determinant
-            result[n, i, 1] = (y * a - x * b) / determinant
+        for channel in range(per_metre.shape[1]):
+            first, second = per_metre[n, channel]
+            x, y = first * sums[n, 3] + second * sums[n, 5], first * sums[n, 4] + second * sums[n, 6]
+            result[n, channel, 0] = (x * d - y * b) / determinant
+            result[n, channel, 1] = (y * a - x * b) / determinant

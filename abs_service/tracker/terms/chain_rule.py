@@ -187,7 +187,7 @@ def add_scores(
     rows: NDArray[np.float64],
     points: NDArray[np.int64],
     jacobian: JacobianBlocks,
-    scores: NDArray[np.float64],
+    scores: NDArray[np.floating],
 ) -> None:
     """Adds residual row D of every residual to the row of `scores` (…, dim) that its cluster (m,) names."""
     (group, parameters, local), x, y, z = jacobian, 0.0, 0.0, 0.0
@@ -207,7 +207,7 @@ def add_dense_scores(
     clusters: NDArray[np.int64],
     residual: NDArray[np.float64],
     jacobian: NDArray[np.float64],
-    scores: NDArray[np.float64],
+    scores: NDArray[np.floating],
 ) -> None:
     """The same from a Jacobian (m, dim) with respect to all parameters."""
     for m in range(clusters.size):

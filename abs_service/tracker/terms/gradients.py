@@ -77,13 +77,13 @@ def noiseless_color_rows(
 
     Args:
         image, camera, vertices: see `color_rows`.
-        weight: of the measurements (n, channels) [1/image unit].
+        weight: of the measurements (n or 1, channels) [1/image unit].
     """
     places, projection = project_with_jacobian(camera, vertices)
     rows = _image_rows(image, places, projection, weight)
     weighted = np.square(noise_deviation(image, places) * weight).sum(axis=1)
     entries = projection.reshape(len(projection), 6)
-    return _shortened(rows, _NOISE_GAIN * float(weighted @ np.vecdot(entries, entries)))
+    return _shortened(rows, _NOISE_GAIN * float(np.sum(weighted * np.vecdot(entries, entries))))
 
 
 def _shortened(rows: NDArray[np.float64], noise: float) -> NDArray[np.float64]:

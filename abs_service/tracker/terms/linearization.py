@@ -10,8 +10,16 @@ from abs_service.tracker.models.base import SparseJacobian
 from abs_service.tracker.terms import chain_rule
 from abs_service.tracker.terms.grouped import GroupedLinearization, add_group_squares
 
+#: Derivatives with respect to errors that residuals share, found when a covariance asks for them.
+Shared = Callable[[], NDArray[np.float64]]
+
 #: Derivatives (m, 3) of residuals by what is known of the surface itself, from those by the measurements (m, 3).
 OfSurface = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+
+
+def nothing_shared() -> NDArray[np.float64]:
+    """No derivatives (0, 0): the residuals have no error in common."""
+    return np.zeros((0, 0))
 
 
 def as_measured(rows: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -42,7 +50,7 @@ class Linearization:
         jacobian: (m, dim).
         places: of the points that they belong to (m, 3) [m]; empty (0, 3) if they belong to none.
         rows: derivatives (m, 3) with respect to the positions of these [1/m]; likewise.
-        shared: sum of the derivatives (s, dim) of the residuals that share an error, times that error's deviation.
+        shared: tells the sum of the derivatives (s, dim) of the residuals that share an error, times its deviation.
         of_surface: see `PointLinearization`.
     """
 
@@ -50,7 +58,7 @@ class Linearization:
     jacobian: NDArray[np.float64]
     places: NDArray[np.floating] = field(default_factory=lambda: np.zeros((0, 3)))
     rows: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 3)))
-    shared: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
+    shared: Shared = nothing_shared
     of_surface: OfSurface = as_measured
 
     def moved(self, by: NDArray[np.float64]) -> "Linearization":
@@ -63,7 +71,7 @@ class Linearization:
 
     def shared_gradients(self) -> NDArray[np.float64]:
         """Sums of derivatives (s, dim), see `shared`."""
-        return self.shared
+        return self.shared()
 
     def add_gradient(self, total: NDArray[np.float64]) -> None:
         """Adds Jᵀr to a gradient (dim,)."""
@@ -77,7 +85,7 @@ class Linearization:
         """diag(J Σ Jᵀ) (m,) of a covariance Σ (dim, dim) of theta."""
         return np.vecdot(self.jacobian @ covariance, self.jacobian)
 
-    def add_scores(self, clusters: NDArray[np.int64], scores: NDArray[np.float64]) -> None:
+    def add_scores(self, clusters: NDArray[np.int64], scores: NDArray[np.floating]) -> None:
         """Adds the score Jᵀr of every residual to that of its cluster (m,), one of the rows of `scores` (…, dim)."""
         chain_rule.add_dense_scores(clusters, self.residual, self.jacobian, scores)
 
@@ -92,7 +100,7 @@ class PointLinearization:
         points: index (m,) of the point.
         sparse_jacobian: derivative of the points with respect to theta.
         positions: of all points (n, 3) [m].
-        shared: derivatives (m, s) with respect to errors that the residuals share, times those errors' deviations.
+        shared: tells the derivatives (m, s) with respect to errors that the residuals share, times their deviations.
         center: of the camera (3,) [m] that tells of motion across its lines of sight only; empty (0,) for distances.
         of_surface: what of the derivatives the surface itself has; only this tells which part of it is where.
     """
@@ -102,7 +110,7 @@ class PointLinearization:
     points: NDArray[np.int64]
     sparse_jacobian: SparseJacobian
     positions: NDArray[np.floating]
-    shared: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
+    shared: Shared = nothing_shared
     center: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     of_surface: OfSurface = as_measured
 
@@ -139,7 +147,8 @@ class PointLinearization:
 
     def shared_gradients(self) -> NDArray[np.float64]:
         """Sum of the derivatives (s, dim) of the residuals that share an error, times that error's deviation."""
-        return self.transposed_times(self.shared, self.sparse_jacobian.dimension).T
+        shared = self.shared()
+        return self.transposed_times(shared, self.sparse_jacobian.dimension).T if shared.shape[1] else shared
 
     def leverage(self, at_points: NDArray[np.float64]) -> NDArray[np.float64]:
         """diag(J Σ Jᵀ) (m,), from the covariances (n, 3, 3) of the points by a covariance Σ of theta."""
@@ -147,7 +156,7 @@ class PointLinearization:
         chain_rule.find_leverages(self.rows, self.points, at_points, result)
         return result
 
-    def add_scores(self, clusters: NDArray[np.int64], scores: NDArray[np.float64]) -> None:
+    def add_scores(self, clusters: NDArray[np.int64], scores: NDArray[np.floating]) -> None:
         """Adds the score Jᵀr of every residual to that of its cluster (m,), one of the rows of `scores` (…, dim)."""
         chain_rule.add_scores(clusters, self.residual, self.rows, self.points, self.sparse_jacobian.blocks, scores)
 

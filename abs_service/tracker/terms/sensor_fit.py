@@ -121,16 +121,15 @@ def summarize(
         mean_log_likelihood: see `SensorFit`.
         channels: number of values per measurement.
     """
-    inlier = measured & (residual < INLIER_DEVIATIONS)
-    square = float(np.mean(residual[inlier] ** 2)) if inlier.any() else float("nan")
-    spread, tally = deviation_within(square, INLIER_DEVIATIONS, channels), masks.tally(measured, inlier)
+    tally, squares = masks.tally(measured, residual, INLIER_DEVIATIONS)
+    square = squares / tally.inliers if tally.inliers else float("nan")
     return SensorFit(
         sensor,
         visible=tally.visible,
         occluded=tally.occluded,
-        samples=int(np.count_nonzero(measured)),
-        inliers=int(np.count_nonzero(inlier)),
+        samples=tally.samples,
+        inliers=tally.inliers,
         mean_log_likelihood=mean_log_likelihood,
-        normalized_residual=spread,
+        normalized_residual=deviation_within(square, INLIER_DEVIATIONS, channels),
         counts=tally.of(len(measured)),
     )

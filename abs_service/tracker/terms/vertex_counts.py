@@ -62,11 +62,19 @@ class VertexMasks(NamedTuple):
     behind_occluder: NDArray[np.bool_]
     unjudged: NDArray[np.bool_]
 
-    def tally(self, measured: NDArray[np.bool_], agreeing: NDArray[np.bool_]) -> "Tally":
-        """Numbers of samples, by masks (n,) of those that are measured and those that agree."""
+    def tally(
+        self, measured: NDArray[np.bool_], residual: NDArray[np.float64], minimum: float
+    ) -> tuple["Tally", float]:
+        """Numbers of samples, and the sum of the squared residuals of those that agree.
+
+        Args:
+            measured: mask (n,) of the samples with a measurement.
+            residual: their absolute residuals (n,).
+            minimum: residual of a measurement that disagrees.
+        """
         counts = np.zeros(len(Tally._fields), np.int64)
-        count_samples(self, measured, agreeing, counts)
-        return Tally(*counts.tolist())
+        squares = count_samples(self, measured, residual, minimum, counts)
+        return Tally(*counts.tolist()), squares
 
 
 class Tally(NamedTuple):
@@ -76,6 +84,7 @@ class Tally(NamedTuple):
         visible: in the image, and nothing hides them; their measurement may be missing.
         missing, behind_occluder, behind_itself, outside, unjudged: see `VertexCounts`.
         measured, agreeing: of the visible ones.
+        samples, inliers: measured and agreeing ones of all.
     """
 
     visible: int
@@ -86,6 +95,8 @@ class Tally(NamedTuple):
     unjudged: int
     measured: int
     agreeing: int
+    samples: int
+    inliers: int
 
     @property
     def occluded(self) -> int:
@@ -109,11 +120,19 @@ class Tally(NamedTuple):
 
 @kernel
 def count_samples(
-    masks: VertexMasks, measured: NDArray[np.bool_], agreeing: NDArray[np.bool_], counts: NDArray[np.int64]
-) -> None:
-    """Adds the numbers of a `Tally` to zeros."""
+    masks: VertexMasks,
+    measured: NDArray[np.bool_],
+    residual: NDArray[np.float64],
+    minimum: float,
+    counts: NDArray[np.int64],
+) -> float:
+    """Adds the numbers of a `Tally` to zeros; the sum of the squared residuals of those that agree."""
+    squares = 0.0
     for v in range(masks.pixel.size):
-        pixel = masks.pixel[v]
+        pixel, agrees = masks.pixel[v], measured[v] and residual[v] < minimum
+        counts[8] += 1 if measured[v] else 0
+        counts[9] += 1 if agrees else 0
+        squares += residual[v] * residual[v] if agrees else 0.0
         if pixel <= 0:
             if masks.facing[v]:
                 counts[3 if pixel < 0 else 4] += 1
@@ -126,4 +145,5 @@ def count_samples(
         else:
             counts[0] += 1
             counts[6] += 1 if measured[v] else 0
-            counts[7] += 1 if agreeing[v] else 0
+            counts[7] += 1 if agrees else 0
+    return squares

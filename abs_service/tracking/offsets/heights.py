@@ -1,12 +1,11 @@
 """Heights of measured points above a mesh: residual of a depth image at every vertex, along the normal."""
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.pairing.images import DepthImage
+from abs_service.pairing.images import DepthImage, Limits
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.synthesis.perspective import project_with_jacobian
 from abs_service.tracker.terms.sensor_fit import INLIER_DEVIATIONS
@@ -21,8 +20,7 @@ MIN_COSINE = 0.3
 MAX_RADIUS_PX = 2.5
 
 
-@dataclass(frozen=True, eq=False)
-class Heights:
+class Heights(NamedTuple):
     """Heights above the vertices' tangential planes, along the normals.
 
     Attributes:
@@ -79,14 +77,18 @@ class Planes(NamedTuple):
     Attributes:
         sight: vertices relative to the camera (n, 3) [m].
         normals: their unit normals (n, 3).
+        cosine: of the angle between the two (n,).
         mean: mean offset of their measurements (n,) [m]; NaN where nothing is to be measured.
-        limit: largest height of an inlier (n,) [m].
+        deviation: σ of these (n,) [m].
+        variance: of what is known of the heights (n,) [m²], which decides what is an outlier.
     """
 
     sight: NDArray[np.float64]
     normals: NDArray[np.float64]
+    cosine: NDArray[np.float64]
     mean: NDArray[np.float64]
-    limit: NDArray[np.float64]
+    deviation: NDArray[np.float64]
+    variance: NDArray[np.float64]
 
 
 class HeightSensor:
@@ -116,29 +118,25 @@ class HeightSensor:
             vertices, normals: see above.
             variance: of what is known of the heights (n,) [m²], which decides what is an outlier.
         """
-        sight, distance, cosine, row, column, seen = self._look(vertices, normals)
-        top, left = int(row.min()) - self._reach, int(column.min()) - self._reach
-        window = slice(top, int(row.max()) + self._reach + 1), slice(left, int(column.max()) + self._reach + 1)
-        measured, amplitude = image.within(window)
+        (sight, distance, cosine, row, column, seen), (top, bottom, left, right) = self._look(vertices, normals)
+        measured, amplitude = image.within((slice(top, bottom), slice(left, right)))
         own = amplitude[row - top, column - left].astype(np.float64)
         deviation, mean = self._noise_of(own, distance, (row, column), seen & (cosine > MIN_COSINE))
-        sigma = deviation * cosine
-        limit = INLIER_DEVIATIONS * np.sqrt(sigma**2 + variance)
-        height, pixels = np.empty_like(sigma), np.empty_like(sigma)
+        found = Heights(*np.empty((2, len(vertices))))
         # One memory layout, for which the kernel is compiled.
         cutout = Cutout(np.ascontiguousarray(measured), top, left)
-        planes = Planes(sight, normals, mean, limit)
-        _mean_heights(cutout, self._rays, VertexPixels(row, column, self._steps), planes, height, pixels)
-        return Heights(height, pixels / np.where(pixels, sigma, 1) ** 2)
+        planes = Planes(sight, normals, cosine, mean, deviation, variance)
+        _mean_heights(cutout, self._rays, VertexPixels(row, column, self._steps), planes, found)
+        return found
 
-    def _look(self, vertices: NDArray[np.float64], normals: NDArray[np.float64]) -> Sighted:
-        """Vertices (n, 3) [m] with unit normals (n, 3) as the camera sees them."""
+    def _look(self, vertices: NDArray[np.float64], normals: NDArray[np.float64]) -> tuple[Sighted, Limits]:
+        """Vertices (n, 3) [m] with unit normals (n, 3) as the camera sees them, and the part of the image with them."""
         camera, n = self._camera, len(vertices)
         (distance, cosine), (rows, columns) = np.empty((2, n)), np.empty((2, n), np.int64)
         found = Sighted(np.empty((n, 3)), distance, cosine, rows, columns, np.empty(n, np.bool_))
         places = project_with_jacobian(camera, vertices)[0]
-        _look(vertices, normals, camera.center, places, (camera.height, camera.width), self._reach, found)
-        return found
+        shape = camera.height, camera.width
+        return found, _look(vertices, normals, camera.center, places, shape, self._reach, found)
 
     def _noise_of(
         self,
@@ -163,10 +161,10 @@ def _look(
     shape: tuple[int, int],
     reach: int,
     found: Sighted,
-) -> None:
+) -> Limits:
     """Writes what a camera with a centre (3,) [m] and images of a shape sees of vertices at places (n, 2) [px].
 
-    Their pixels are up to so many rows and columns away from their own.
+    Their pixels are up to so many rows and columns away from their own. Returns the limits of them all.
     """
     (height, width), any_row, any_column = shape, reach, reach
     for v in range(vertices.shape[0] - 1, -1, -1):
@@ -183,9 +181,13 @@ def _look(
         if found.seen[v]:  # of the first of them in the end
             any_row, any_column = int(row), int(column)
             found.rows[v], found.columns[v] = any_row, any_column
+    top, bottom, left, right = any_row, any_row, any_column, any_column
     for v in range(vertices.shape[0]):
         if not found.seen[v]:
             found.rows[v], found.columns[v] = any_row, any_column
+        top, bottom = min(top, found.rows[v]), max(bottom, found.rows[v])
+        left, right = min(left, found.columns[v]), max(right, found.columns[v])
+    return top - reach, bottom + reach + 1, left - reach, right + reach + 1
 
 
 @kernel
@@ -194,8 +196,7 @@ def _mean_heights(
     rays: NDArray[np.float64],
     places: VertexPixels,
     planes: Planes,
-    height: NDArray[np.float64],
-    pixels: NDArray[np.float64],
+    found: Heights,
 ) -> None:
     """Mean height of the inliers among every vertex's pixels, if they are more than half; else it is not measured.
 
@@ -204,18 +205,21 @@ def _mean_heights(
         rays: unit directions of all pixels in the rig frame (height, width, 3).
         places: the pixels of every vertex.
         planes: the planes above which heights are measured.
-        height, pixels: results (n,) [m], and the number of inliers (n,); both 0 without enough of them.
+        found: results.
     """
-    (distance, top, left), (rows, columns, steps), (sight, normals, mean, limit) = cutout, places, planes
+    (distance, top, left), (rows, columns, steps) = cutout, places
+    sight, normals, cosine, mean, deviation, variance = planes
     for v in range(rows.size):
+        sigma = deviation[v] * cosine[v]
+        limit = INLIER_DEVIATIONS * np.sqrt(sigma * sigma + variance[v])
         x, y, z = normals[v, 0], normals[v, 1], normals[v, 2]
         vertex, total, count = sight[v, 0] * x + sight[v, 1] * y + sight[v, 2] * z, 0.0, 0
         for k in range(steps.shape[0]):
             row, column = rows[v] + steps[k, 0], columns[v] + steps[k, 1]
             ray = rays[row, column]
             away = (distance[row - top, column - left] - mean[v]) * (ray[0] * x + ray[1] * y + ray[2] * z) - vertex
-            if abs(away) < limit[v]:  # False for NaN
+            if abs(away) < limit:  # False for NaN
                 total += away
                 count += 1
         enough = 2 * count > steps.shape[0]
-        height[v], pixels[v] = (total / count, count) if enough else (0.0, 0)
+        found.mean[v], found.precision[v] = (total / count, count / (sigma * sigma)) if enough else (0.0, 0.0)

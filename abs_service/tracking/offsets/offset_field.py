@@ -56,13 +56,13 @@ class OffsetField:
         n, edges = len(mesh.vertices), mesh.edges
         both = np.concatenate([edges, edges[:, ::-1]])
         order = np.argsort(both[:, 0], kind="stable")
-        self._from, self._to = both[order].T.astype(np.int64)
-        self._start = np.searchsorted(self._from, np.arange(n + 1))
+        source, self._to = both[order].T.astype(np.int64)
+        self._start = np.searchsorted(source, np.arange(n + 1))
         place = np.argsort(order)
         self._back = place[(order + len(edges)) % len(both)]  # each direction's opposite
         degree = np.diff(self._start)
-        self._share = DEGREE / np.minimum(degree[self._from], degree[self._to])
-        self._total = np.bincount(self._from, self._share, n)
+        self._share = DEGREE / np.minimum(degree[source], degree[self._to])
+        self._total = np.bincount(source, self._share, n)
         self._messages = np.zeros(len(both))
 
     def solve(
@@ -87,11 +87,10 @@ class OffsetField:
             precision: of the vertices' own evidence (n,) [1/m²].
             prior: see there.
         """
-        diagonal, squares = self._diagonal(precision, prior), (prior.coupling * self._share) ** 2
-        incoming = squares * self._messages
-        known = diagonal - np.bincount(self._to, incoming, len(diagonal))
-        self._messages = 1 / (known[self._from] + incoming[self._back])
-        return 1 / (diagonal - np.bincount(self._to, squares * self._messages, len(diagonal)))
+        result = np.empty(len(precision))
+        squares = (prior.coupling * self._share) ** 2
+        _tell(self._start, self._back, squares, self._diagonal(precision, prior), self._messages, result)
+        return result
 
     def _diagonal(self, precision: NDArray[np.float64], prior: Prior) -> NDArray[np.float64]:
         return precision + prior.precision + prior.coupling * self._total
@@ -127,6 +126,39 @@ def _sweep(
             deviation[v] = value
         if moved < EXACT_M:
             break
+
+
+@kernel
+def _tell(
+    start: NDArray[np.int64],
+    back: NDArray[np.int64],
+    squares: NDArray[np.float64],
+    diagonal: NDArray[np.float64],
+    messages: NDArray[np.float64],
+    variance: NDArray[np.float64],
+) -> None:
+    """One round of messages, and the variances (n,) [m²] that follow.
+
+    Args:
+        start: first neighbour of every vertex, and the number of all, (n + 1,).
+        back: index (k,) of the opposite of every direction of an edge.
+        squares: of their weights (k,) [1/m⁴].
+        diagonal: of the equations (n,) [1/m²].
+        messages: along every direction (k,) [m²], from the round before; replaced.
+        variance: result.
+    """
+    before = messages.copy()
+    for v in range(variance.size):
+        known = diagonal[v]
+        for k in range(start[v], start[v + 1]):
+            known -= squares[back[k]] * before[back[k]]
+        for k in range(start[v], start[v + 1]):
+            messages[k] = 1 / (known + squares[back[k]] * before[back[k]])
+    for v in range(variance.size):
+        rest = diagonal[v]
+        for k in range(start[v], start[v + 1]):
+            rest -= squares[back[k]] * messages[back[k]]
+        variance[v] = 1 / rest
 
 
 def offset_prior(offset: NDArray[np.float64], deviation: NDArray[np.float64], mesh: Mesh, parameters: int) -> Prior:

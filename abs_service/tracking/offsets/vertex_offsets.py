@@ -126,6 +126,7 @@ class LearntOffsets:
         self._first = self._mean = self._offset = np.array(model.offset, np.float64)
         self._precision = 1 / self.variance
         self._around = edges_around(mesh)
+        self._lowest, self._highest = (self._first + sign * MAX_CHANGE * self._around for sign in (-1, 1))
         self._prior = offset_prior(self._first, deviation, mesh, len(model.rest))
         self._t_ns: int | None = None
 
@@ -168,8 +169,7 @@ class LearntOffsets:
     def _infer(self) -> None:
         """The most probable offsets, bounded by the lengths of their vertices' edges."""
         offset = self._field.solve(self._mean, self._precision, self._prior, self._offset)
-        most = MAX_CHANGE * self._around
-        self._offset = np.clip(offset, self._first - most, self._first + most)
+        self._offset = np.minimum(np.maximum(offset, self._lowest), self._highest)
         self.variance = self._field.variance(self._precision, self._prior)
         self._model.set_offsets(self._offset, np.sqrt(self.variance))
 

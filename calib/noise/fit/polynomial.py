@@ -113,7 +113,7 @@ def evaluate(
         np.ascontiguousarray(coefficients, np.float64),
         (place if place.size == 1 else np.broadcast_to(place, one)).astype(np.int64).ravel(),
         x.reshape(out.shape),
-        (np.broadcast_to(a, one) if coefficients.shape[1] > 1 else a).astype(np.float64).ravel(),
+        (np.broadcast_to(a, one) if coefficients.shape[1] > 1 and a.shape != one else a).astype(np.float64).ravel(),
         np.array([*distances, *amplitudes], np.float64),
         out,
     )

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from absmsg.v1.common_pb2 import Header
+from absmsg.v1.deformation_state_pb2 import DeformationState
 
 from abs_service.pairing.observation import Source
 from abs_service.tracker.estimates.estimate import Estimate, SearchReport, Status
@@ -55,6 +56,16 @@ def test_the_covariance_travels_as_its_upper_triangle_row_by_row():
     assert list(state.covariance) == pytest.approx([1.0, 0.1, 0.2, 2.0, 0.3, 3.0])
     assert state.covariance_valid
     assert state.log_likelihood == -12.5
+
+
+@pytest.mark.parametrize("dimension", [0, 1, 7, 8, 20, 100])
+def test_a_covariance_of_any_size_arrives_in_single_precision(dimension):
+    covariance = np.random.default_rng(dimension).random((dimension, dimension))
+    estimate = replace(ESTIMATE, theta=np.zeros(dimension), covariance=covariance)
+    sent = estimate_messages.state(Header(), estimate, IDENTITY, Effort(1.0, 24.0, 2.0, 0.5, 0, {}))
+    state = DeformationState.FromString(sent.SerializeToString())
+    expected = covariance[np.triu_indices(dimension)].astype(np.float32)
+    assert list(sent.covariance) == list(state.covariance) == expected.tolist()
 
 
 @pytest.mark.parametrize("status", [Status.LOST, Status.INITIALIZING])

@@ -65,7 +65,8 @@ class DesignEffects:
         if not len(places):
             return np.zeros(2)
         clusters = np.empty(len(places), np.int64)
-        scores = np.zeros((_find_clusters(places, 1 / self._side_m, clusters), len(inverse)))
+        shape = _find_clusters(places, 1 / self._side_m, clusters), len(inverse)
+        scores = np.zeros(shape, np.float32)  # enough for a ratio, in half the time
         part.add_scores(clusters, scores)
         # Of a matrix times itself, half is computed. The squared length of a single score is r² h.
         return np.array([np.vdot(scores.T @ scores, inverse), np.vdot(part.residual**2, leverage)], np.float64)

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.mesh import Mesh, mean_around, ring_means
 from abs_service.tracker.terms.sensor_fit import INLIER_DEVIATIONS
+from calib.jit import kernel
 
 #: Share of the vertices that miss the measurements above which the mesh may slide, and below which it fits again.
 MAJORITY, HARDLY_ANY = 0.5, 0.1
@@ -62,7 +63,6 @@ class CommonDistance:
 
     def __init__(self, mesh: Mesh):
         self.mean = mean_around(mesh)
-        self._squared = self.mean.power(2)
         self._vertices_of_ring = self.mean.nnz / self.mean.shape[0]
 
     def excess(self, distance: NDArray[np.float64], variance: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -72,29 +72,46 @@ class CommonDistance:
             distance: of the vertices (n,) [m].
             variance: of independent noise of these (n,) [m²].
         """
-        squares, noise = self._squares(distance, variance)
-        return _beyond(squares, noise)
+        return self.excess_and_unnoticed(distance, variance)[0]
 
     def excess_and_unnoticed(
         self, distance: NDArray[np.float64], variance: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], float, bool]:
         """`excess`, and the mean square [m²] of the means up to it, less noise; True if beyond its deviations."""
-        squares, noise = self._squares(distance, variance)
-        within = np.minimum(squares, INLIER_DEVIATIONS**2 * noise)
-        expected = float(noise.mean())
+        n, excess = len(distance), np.empty(len(distance))
+        ring = self.mean.indptr, self.mean.indices, self.mean.data
+        within, noise = find_excess(*ring, distance, variance, excess)
+        expected = noise / n
         # Rings overlap: so many are independent as there are rings without a vertex in common.
-        independent = len(distance) / self._vertices_of_ring
-        common = float(within.mean()) - expected
-        is_certain = common > INLIER_DEVIATIONS * expected * np.sqrt(2 / independent)
-        return _beyond(squares, noise), common, bool(is_certain)
-
-    def _squares(
-        self, distance: NDArray[np.float64], variance: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Squares of the mean distances, and their means by noise alone, each (n,) [m²]."""
-        return ring_means(self.mean, distance) ** 2, ring_means(self._squared, variance)
+        independent = n / self._vertices_of_ring
+        common = within / n - expected
+        return excess, common, bool(common > INLIER_DEVIATIONS * expected * np.sqrt(2 / independent))
 
 
-def _beyond(squares: NDArray[np.float64], noise: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Squares beyond `INLIER_DEVIATIONS` of noise, 0 below."""
-    return np.maximum(squares - INLIER_DEVIATIONS**2 * noise, 0.0)
+@kernel
+def find_excess(
+    start: NDArray[np.int32],
+    around: NDArray[np.int32],
+    weights: NDArray[np.float64],
+    distance: NDArray[np.float64],
+    variance: NDArray[np.float64],
+    excess: NDArray[np.float64],
+) -> tuple[float, float]:
+    """Sums over all rings of the squares up to `INLIER_DEVIATIONS` of noise, and of the squares by noise alone [m²].
+
+    Args:
+        start, around, weights: of the mean over every ring, a sparse matrix (n, n).
+        distance, variance: of the vertices (n,) [m] and [m²].
+        excess: result, what the squares have beyond (n,) [m²].
+    """
+    total, expected = 0.0, 0.0
+    for v in range(excess.size):
+        mean, noise = 0.0, 0.0
+        for k in range(start[v], start[v + 1]):
+            mean += weights[k] * distance[around[k]]
+            noise += weights[k] * weights[k] * variance[around[k]]
+        most = INLIER_DEVIATIONS**2 * noise
+        excess[v] = max(mean * mean - most, 0.0)
+        total += min(mean * mean, most)
+        expected += noise
+    return total, expected

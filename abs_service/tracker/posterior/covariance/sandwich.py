@@ -58,6 +58,7 @@ def gradient_covariance(
 def shared_covariance(sensed: Sensed, dimension: int) -> NDArray[np.float64]:
     """Covariance (dim, dim) of the gradient by errors that many residuals share, the same in all frames."""
     result = np.zeros((dimension, dimension))
-    for gradients in (source.shared_gradients() for source in sensed if source.shared.size):
-        result += gradients.T @ gradients
+    for gradients in (source.shared_gradients() for source in sensed):
+        if gradients.size:
+            result += gradients.T @ gradients
     return result

@@ -119,7 +119,8 @@ def _direction_error(part: Part) -> float:
 def _frame(vertices: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
     """Centre (3,) of vertices (n, 3), and root mean square of their distances from it [m]."""
     center = vertices.mean(axis=0)
-    return center, float(np.sqrt(np.mean(np.square(vertices - center).sum(axis=1))))
+    arms = vertices - center
+    return center, float(np.sqrt(np.vdot(arms, arms) / len(arms)))
 
 
 def _information(
@@ -135,12 +136,9 @@ def _information(
     """
     known, possible = np.zeros((2, 6, 6))
     if len(part.rows):
+        eye = np.ascontiguousarray(part.center) if isinstance(part, PointLinearization) else np.zeros(0)
         places = np.ascontiguousarray(part.places, np.float64)
-        own, sight = part.of_surface(part.rows), np.zeros_like(places)
-        if isinstance(part, PointLinearization) and part.center.size:  # of an image
-            sight = places - part.center
-            sight /= np.sqrt(np.einsum("mi,mi->m", sight, sight))[:, None]
-        add_information(part.rows, own, places, sight, center, size, known, possible)
+        add_information(part.rows, part.of_surface(part.rows), places, eye, center, size, known, possible)
     return known, possible
 
 
@@ -149,7 +147,7 @@ def add_information(
     rows: NDArray[np.float64],
     own: NDArray[np.float64],
     places: NDArray[np.float64],
-    sight: NDArray[np.float64],
+    eye: NDArray[np.float64],
     center: NDArray[np.float64],
     size: float,
     known: NDArray[np.float64],
@@ -162,11 +160,12 @@ def add_information(
     Args:
         rows, places: derivatives [1/m] of residuals with respect to their places [m], each (m, 3).
         own: the same derivatives (m, 3), by the surface itself.
-        sight: directions s (m, 3) in which an error of the row's direction does not lie, of length 1; or 0.
+        eye: centre (3,) [m] of the lines of sight s, in which an error of the row's direction does not lie; (0,) if s
+            is 0.
         center, size: of the motions (3,) [m] and [m].
         known, possible: the sums (6, 6), zeros before.
     """
-    seen, shown, unseen, along = np.empty(6), np.empty(6), np.empty(6), np.zeros((3, 6))
+    seen, shown, unseen, along = np.empty(6), np.empty(6), np.zeros(6), np.zeros((3, 6))
     along[0, 0] = along[1, 1] = along[2, 2] = 1.0
     for m in range(rows.shape[0]):
         a, b, c = rows[m, 0], rows[m, 1], rows[m, 2]
@@ -180,8 +179,11 @@ def add_information(
         shown[3], shown[4], shown[5] = y * f - z * e, z * d - x * f, x * e - y * d
         along[0, 4], along[0, 5], along[1, 3], along[1, 5], along[2, 3], along[2, 4] = z, -y, -z, x, y, -x
         square = a * a + b * b + c * c
-        for i in range(6):
-            unseen[i] = sight[m, 0] * along[0, i] + sight[m, 1] * along[1, i] + sight[m, 2] * along[2, i]
+        if eye.size:
+            a, b, c = places[m, 0] - eye[0], places[m, 1] - eye[1], places[m, 2] - eye[2]
+            length = np.sqrt(a * a + b * b + c * c)
+            for i in range(6):
+                unseen[i] = (a * along[0, i] + b * along[1, i] + c * along[2, i]) / length
         for i in range(6):
             for j in range(i, 6):
                 known[i, j] += 0.5 * (seen[i] * shown[j] + shown[i] * seen[j])

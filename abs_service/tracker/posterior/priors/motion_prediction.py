@@ -1,6 +1,7 @@
 """Motion prior of one frame: Θ is normal around its prediction."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,7 @@ MAX_DEVIATIONS = 4.0
 MARGIN = 2.0
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class MotionPrediction:
     """Motion prior of one frame.
 
@@ -40,7 +41,7 @@ class MotionPrediction:
         """Radius around the predicted surface within which the surface is searched [m]."""
         return np.inf if self.is_first else MAX_DEVIATIONS * self._widest_m
 
-    @property
+    @cached_property
     def precision(self) -> NDArray[np.float64]:
         """Inverse covariance W (dim, dim) of the parameters around the predicted ones."""
         return self.metric.matrix / self._deviation_m**2
@@ -93,4 +94,5 @@ class MotionPrediction:
 
     def _mean_innovation(self, theta: NDArray[np.float64]) -> float:
         """Root mean square innovation of theta (dim,) [m/s]."""
-        return float(np.sqrt(np.mean(self.innovation(theta) ** 2)))
+        innovation = self.innovation(theta)
+        return float(np.sqrt(innovation @ innovation / len(innovation)))

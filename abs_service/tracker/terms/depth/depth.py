@@ -16,7 +16,7 @@ from abs_service.tracker.terms.depth.depth_cost import missing_cost
 from abs_service.tracker.terms.depth.fluctuation import Fluctuation
 from abs_service.tracker.terms.depth.observed_depth import ObservedDepth
 from abs_service.tracker.terms.depth.outline.base import NoOutline, Outline
-from abs_service.tracker.terms.depth.pixel_classes import ClassImages
+from abs_service.tracker.terms.depth.pixel_classes import ClassImages, WindowClasses
 from abs_service.tracker.terms.depth.texels import Unusable, texels
 from calib import pose
 from calib.camera import Camera
@@ -67,16 +67,14 @@ class DepthTerm:
         expected = np.ascontiguousarray(rendered[window])
         seen = self._classifier.classify(distance, expected, window, self._texels.shape)
         outline = self._outline.observe(distance, seen, expected, predicted, window)
-        free_m = seen.free_m.copy()
-        free_m[outline.doubtful] = 0
-        masked = seen.foreground | seen.hole | outline.doubtful
+        classes = WindowClasses.of(seen, outline.doubtful)
         return ObservedDepth(
             sensor=self.sensor,
             view=view,
             bounds=self._bounds,
             texels=self._texels,
-            missing=self._explain(Unusable(masked, free_m, seen.object), predicted),
-            classes=self._classes.put(seen, outline.doubtful, free_m, window, self._texels.shape),
+            missing=self._explain(Unusable(classes.masked, classes.free_m, seen.object), predicted),
+            classes=self._classes.put(classes, window, self._texels.shape),
             occluders=_points(self._view.camera, distance, seen.foreground, window),
             outline=outline,
             remainder=self._continuation.observe(seen.object, window),

@@ -65,23 +65,27 @@ def missing_cost(law: NoReturn, predicted: Surface, center: NDArray[np.float64],
         center: of the camera (3,) [m].
         maximum: upper bound [nats].
     """
-    distance, cosine = np.empty((2, predicted.vertices.shape[2]))
-    _look(predicted.vertices[0], predicted.normals[0], center, distance, cosine)
-    return np.clip(-law.log_odds(distance, cosine), 0, maximum)[None].astype(np.float32)
+    result = np.empty((1, predicted.vertices.shape[2]), np.float32)
+    write_missing_cost(predicted.vertices[0], predicted.normals[0], center, law.coefficients, maximum, result[0])
+    return result
 
 
 @kernel
-def _look(
+def write_missing_cost(
     vertices: NDArray[np.float32],
     normals: NDArray[np.float32],
     center: NDArray[np.float64],
-    distance: NDArray[np.float64],
-    cosine: NDArray[np.float64],
+    law: tuple[float, float, float],
+    maximum: float,
+    cost: NDArray[np.float32],
 ) -> None:
-    """Distances (n,) of vertices (3, n) from a centre (3,) [m], and cosines of their incidence, 0 to 1."""
-    for v in range(distance.size):
-        distance[v], along = line_of_sight(vertices, normals, v, center)
-        cosine[v] = min(max(-along / distance[v], 0.0), 1.0)
+    """Writes what `missing_cost` returns (n,) for vertices (3, n) [m], from the coefficients of `NoReturn`."""
+    facing, per_m, grazing = law
+    for v in range(cost.size):
+        distance, along = line_of_sight(vertices, normals, v, center)
+        cosine = min(max(-along / distance, 0.0), 1.0)
+        odds = facing + per_m * (distance - 1) + grazing * (1 - cosine)
+        cost[v] = min(max(-odds, 0.0), maximum)
 
 
 def median_inlier_cost(texels: NDArray[np.float32], shown: NDArray[np.bool_]) -> float:

@@ -13,13 +13,12 @@ from abs_service.tracker.terms.base import Bounds, facing
 from abs_service.tracker.terms.depth.depth_cost import FREE_SCALE_M, DepthResiduals, depth_cost, normalize
 from abs_service.tracker.terms.depth.fluctuation import Fluctuation
 from abs_service.tracker.terms.depth.outline.base import ObservedOutline
-from abs_service.tracker.terms.depth.pixel_classes import BEYOND, COVERED, DOUBTFUL, LOST, UNKNOWN, PixelClasses
+from abs_service.tracker.terms.depth.pixel_classes import UNKNOWN, PixelClasses
 from abs_service.tracker.terms.depth.texels import Texels
 from abs_service.tracker.terms.gradients import color_rows, depth_rows
 from abs_service.tracker.terms.linearization import Part, PointLinearization, of_anything
 from abs_service.tracker.terms.patches import Patches
 from abs_service.tracker.terms.sensor_fit import Remainder, SensorFit, summarize
-from abs_service.tracker.terms.vertex_counts import VertexMasks
 from calib.jit import kernel
 
 #: Nearer to the object than this, a sample in free space is pulled back no more stiffly [m].
@@ -113,14 +112,10 @@ class ObservedDepth:
         """Agreement of the sensor with a population of one."""
         seen = self.view.synthesize(surface)
         residual, _, cost = self.residuals.get(seen, self._residuals)
-        measured, pixel = cost < np.inf, np.where(self.classes.at(seen.pixel[0]).has(BEYOND), 0, seen.pixel[0])
-        classes = self.classes.at(pixel)
-        free = (classes.free_m > 0) & (pixel > 0)
-        front = facing(seen, surface, self.view.camera.center)
-        masks = VertexMasks(pixel, front, *(classes.has(bit) for bit in (LOST, COVERED, DOUBTFUL)))
+        masks, free = self.classes.of_samples(seen.pixel[0], facing(seen, surface, self.view.camera.center))
         mean = -float(self._measured_cost(seen)[0]) / residual.size
         size = np.where(free, np.inf, np.abs(residual))
-        found = summarize(self.sensor, masks, measured | free, size, mean)
+        found = summarize(self.sensor, masks, (cost < np.inf) | free, size, mean)
         return replace(
             found,
             normalized_residual=found.normalized_residual * self.scale,  # by the model as it is stated

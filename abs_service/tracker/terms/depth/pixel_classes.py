@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from abs_service.pairing.images import Window
 from abs_service.tracker.synthesis.window import Placed
 from abs_service.tracker.terms.depth.classification.visibility import Visibility
+from abs_service.tracker.terms.vertex_counts import VertexMasks
 from calib.jit import kernel
 
 #: Bits of the classes: no return where the object should be, of an area or of single pixels; shows an occluder; lies
@@ -21,7 +22,7 @@ UNKNOWN = LOST | COVERED | DOUBTFUL
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PixelClasses:
-    """Classes of the pixels of one image (height + 2, width + 2) with a border of one pixel, or of samples (m,).
+    """Classes of the pixels of one image (height + 2, width + 2) with a border of one pixel.
 
     Attributes:
         bits: those of the classes.
@@ -31,13 +32,35 @@ class PixelClasses:
     bits: NDArray[np.uint8]
     free_m: NDArray[np.float32]
 
-    def at(self, pixel: NDArray[np.integer]) -> "PixelClasses":
-        """Classes of samples at indices (m,) into the flattened image, see `Synthesis`."""
-        return PixelClasses(self.bits.take(pixel), self.free_m.take(pixel))
+    def of_samples(self, pixel: NDArray[np.int32], facing: NDArray[np.bool_]) -> tuple[VertexMasks, NDArray[np.bool_]]:
+        """Classes of samples (m,), and a mask of those in free space.
 
-    def has(self, bit: int) -> NDArray[np.bool_]:
-        """True for those of a class."""
-        return (self.bits & bit) > 0
+        Args:
+            pixel: indices into the flattened image, see `Synthesis`; beyond the field of view, samples are outside.
+            facing: mask of the samples that are turned towards the sensor.
+        """
+        free, *masks = np.empty((4, pixel.size), np.bool_)
+        found = VertexMasks(np.empty_like(pixel), facing, *masks)
+        sort_samples(pixel, self.bits.reshape(-1), self.free_m.reshape(-1), found, free)
+        return found, free
+
+
+@kernel
+def sort_samples(
+    pixel: NDArray[np.int32],
+    bits: NDArray[np.uint8],
+    free_m: NDArray[np.float32],
+    masks: VertexMasks,
+    free: NDArray[np.bool_],
+) -> None:
+    """Writes what `PixelClasses.of_samples` returns, from classes of all pixels, flattened."""
+    for v in range(pixel.size):
+        place = np.int32(0) if bits[max(pixel[v], 0)] & BEYOND else pixel[v]
+        masks.pixel[v] = place
+        own = bits[max(place, 0)]
+        masks.missing[v], masks.behind_occluder[v] = own & LOST > 0, own & COVERED > 0
+        masks.unjudged[v] = own & DOUBTFUL > 0
+        free[v] = place > 0 and free_m[place] > 0
 
 
 class Masks(NamedTuple):
@@ -50,41 +73,54 @@ class Masks(NamedTuple):
     doubtful: NDArray[np.bool_]
 
 
+class WindowClasses(NamedTuple):
+    """Classes of the pixels of a window (rows, columns).
+
+    Attributes:
+        bits: those of the classes.
+        free_m: distances from the object where the sensor looks past it [m], 0 elsewhere and if left to the outline.
+        masked: True behind an occluder, in a hole, or if left to the outline.
+    """
+
+    bits: NDArray[np.uint8]
+    free_m: NDArray[np.float32]
+    masked: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, seen: Visibility, doubtful: NDArray[np.bool_]) -> "WindowClasses":
+        """The classes of pixels, of which some are left to the outline."""
+        shape, masks = doubtful.shape, Masks(seen.hole, seen.dropout, seen.foreground, seen.beyond, doubtful)
+        found = cls(np.empty(shape, np.uint8), np.empty(shape, np.float32), np.empty(shape, np.bool_))
+        join_classes(masks, seen.free_m, found)
+        return found
+
+
 class ClassImages:
     """The memory of one sensor's classes, reused between frames."""
 
     def __init__(self) -> None:
         self._bits, self._free_m = Placed(np.uint8), Placed(np.float32)
 
-    def put(
-        self,
-        seen: Visibility,
-        doubtful: NDArray[np.bool_],
-        free_m: NDArray[np.float32],
-        window: Window,
-        shape: tuple[int, int],
-    ) -> PixelClasses:
+    def put(self, found: WindowClasses, window: Window, shape: tuple[int, int]) -> PixelClasses:
         """The classes of an image of a shape (height, width); valid until the next call.
 
         Args:
-            seen: classes of the pixels (rows, columns) in the window.
-            doubtful: those that are left to the outline.
-            free_m: distances from the object [m] of the others.
+            found: those in the window.
             window: of the image; outside it nothing is known of any pixel.
             shape: of the image.
         """
-        bits = np.empty(doubtful.shape, np.uint8)
-        masks = Masks(seen.hole, seen.dropout, seen.foreground, seen.beyond, doubtful)
-        join_classes(masks, bits)
-        return PixelClasses(self._bits.put(window, bits, *shape), self._free_m.put(window, free_m, *shape))
+        bits, free_m = self._bits.put(window, found.bits, *shape), self._free_m.put(window, found.free_m, *shape)
+        return PixelClasses(bits, free_m)
 
 
 @kernel
-def join_classes(masks: Masks, bits: NDArray[np.uint8]) -> None:
-    """Writes the bits of pixels (rows, columns)."""
-    for row in range(bits.shape[0]):
-        for column in range(bits.shape[1]):
+def join_classes(masks: Masks, free_m: NDArray[np.float32], found: WindowClasses) -> None:
+    """Writes the classes of pixels (rows, columns), from distances in free space [m]."""
+    for row in range(free_m.shape[0]):
+        for column in range(free_m.shape[1]):
             at = row, column
-            is_lost = masks.hole[at] or masks.dropout[at]
-            covered, beyond = COVERED * masks.foreground[at], BEYOND * masks.beyond[at]
-            bits[at] = LOST * is_lost + covered + beyond + DOUBTFUL * masks.doubtful[at]
+            hole, foreground, doubtful = masks.hole[at], masks.foreground[at], masks.doubtful[at]
+            lost, beyond = LOST * (hole or masks.dropout[at]), BEYOND * masks.beyond[at]
+            found.bits[at] = lost + COVERED * foreground + beyond + DOUBTFUL * doubtful
+            found.free_m[at] = np.float32(0) if doubtful else free_m[at]
+            found.masked[at] = hole or foreground or doubtful

@@ -160,11 +160,11 @@ class ObservedColor:
         residual, square = self._residuals(seen)
         use = (self.normalizer + 0.5 * square < self.bounds.outlier).nonzero()[0]
         vertices = seen.interpolation.spread(surface.vertices[0].T)
-        inverse = np.broadcast_to(self.inverse, residual.shape)[use]
+        inverse = self.inverse[use] if len(self.inverse) > 1 else self.inverse
         rows = noiseless_color_rows(self.image, self.view.camera, vertices[use], inverse).reshape(-1, 3)
         points = np.repeat(use, residual.shape[1])
         samples = seen.interpolation.follow(sparse_jacobian)
-        bias = self.bias.derivatives(vertices, rows, points)
+        bias = partial(self.bias.derivatives, vertices, rows, points)
         own = partial(self._of_appearance, seen, use, vertices[use], inverse)
         center = self.view.camera.center
         return [PointLinearization(residual[use].ravel(), rows, points, samples, vertices, bias, center, own)]
@@ -183,7 +183,7 @@ class ObservedColor:
             seen: the synthesis of a population of one.
             use: indices of its samples (m,).
             vertices: their positions (m, 3) [m].
-            inverse: inverse deviations (m, 3).
+            inverse: inverse deviations (m or 1, 3).
             rows: derivatives (3 m, 3) by gradients of the image.
         """
         gradients = self.view.attribute_gradients(seen)[use] * inverse[..., None]

@@ -97,7 +97,7 @@ class ObservedChannel:
             rows = noiseless_color_rows(values, self.view.camera, vertices[use], weight)[:, 0]
             own = partial(not_longer, partial(of_appearance, weight))
         samples, points = seen.interpolation.follow(sparse_jacobian), use.nonzero()[0]
-        bias, center = self.bias.derivatives(vertices, rows, points), self.view.camera.center
+        bias, center = partial(self.bias.derivatives, vertices, rows, points), self.view.camera.center
         return [PointLinearization(residual[use], rows, points, samples, vertices, bias, center, own)]
 
     def _of_appearance(

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from abs_service.tracker.synthesis.perspective import SHORT_EDGE_PX, metres_per_pixel, project_with_jacobian
+from abs_service.tracker.synthesis.perspective import SHORT_EDGE_PX, image_gradients, project_with_jacobian
 from calib.camera import Camera
 from calib.lenses.lens import Lens
 from tests.abs_service.tracker.scenes import CAMERA, FISHEYE, sheet
@@ -31,7 +31,7 @@ def test_what_is_behind_the_camera_has_no_place():
 
 
 @given(st.integers(0, 2**32 - 1))
-def test_edges_tell_how_long_a_pixel_is(seed):
+def test_edges_tell_how_attributes_change_in_the_image(seed):
     generator, mesh = np.random.default_rng(seed), sheet(4, 5)
     vertices = mesh.vertices + generator.normal(0, 0.01, mesh.vertices.shape)
     vertices[3] = [0, 0, -1]
@@ -46,5 +46,6 @@ def test_edges_tell_how_long_a_pixel_is(seed):
                 square += np.outer(seen, seen)
                 mixed += np.outer(lengths[int(v == j), e], seen)
         expected[v] = mixed @ np.linalg.inv(square)
-    found = metres_per_pixel(CAMERA, vertices, mesh.edges, lengths)
-    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9)
+    per_metre = generator.standard_normal((len(vertices), 3, 2))
+    found = image_gradients(CAMERA, vertices, mesh.edges, lengths, per_metre)
+    np.testing.assert_allclose(found, per_metre @ expected, rtol=1e-5, atol=1e-7)

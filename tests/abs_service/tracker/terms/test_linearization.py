@@ -81,7 +81,8 @@ def drawn(generator: np.random.Generator, count: int) -> PointLinearization:
     points, rows = generator.integers(0, 9, count), generator.standard_normal((count, 3))
     rows[generator.random(count) < 0.3, 0] = 0.0
     positions, shared = generator.standard_normal((9, 3)), generator.standard_normal((count, 2))
-    return PointLinearization(generator.standard_normal(count), rows, points, sparse_jacobian, positions, shared)
+    residual = generator.standard_normal(count)
+    return PointLinearization(residual, rows, points, sparse_jacobian, positions, lambda: shared)
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(0, 20))
@@ -92,7 +93,7 @@ def test_residuals_of_points_are_those_of_their_dense_jacobian(seed, count):
     dense = Linearization(linear.residual, expected.reshape(count, 7))
     np.testing.assert_allclose(linear.jacobian, dense.jacobian, rtol=0, atol=1e-12)
     np.testing.assert_array_equal(linear.places, linear.positions[linear.points])
-    np.testing.assert_allclose(linear.shared_gradients(), linear.shared.T @ dense.jacobian, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(linear.shared_gradients(), linear.shared().T @ dense.jacobian, rtol=0, atol=1e-12)
     step, clusters, half = generator.standard_normal(7), generator.integers(0, 3, count), generator.random((7, 7))
     np.testing.assert_allclose(linear.moved(step).residual, dense.moved(step).residual, rtol=0, atol=1e-12)
     by_cluster = [linear.residual[clusters == c] @ dense.jacobian[clusters == c] for c in range(3)]

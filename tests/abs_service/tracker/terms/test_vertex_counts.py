@@ -124,7 +124,9 @@ def test_each_sample_is_counted_once(seed: int, n: int):
     """An occluder comes before a missing return, and both before what is not judged."""
     generator = np.random.default_rng(seed)
     pixel = generator.integers(-1, 3, n).astype(np.int32)
-    facing, missing, covered, unjudged, measured, agreeing = generator.random((6, n)) < 0.5
+    facing, missing, covered, unjudged, measured = generator.random((5, n)) < 0.5
+    residual = generator.uniform(0, 2, n)
+    agreeing = measured & (residual < 1)
     inside, hidden = pixel > 0, covered | missing
     visible = inside & ~(hidden | unjudged)
     masks = (
@@ -136,8 +138,11 @@ def test_each_sample_is_counted_once(seed: int, n: int):
         inside & unjudged & ~hidden,
         visible & measured,
         visible & agreeing,
+        measured,
+        agreeing,
     )
-    found = VertexMasks(pixel, facing, missing, covered, unjudged).tally(measured, agreeing)
+    found, squares = VertexMasks(pixel, facing, missing, covered, unjudged).tally(measured, residual, 1.0)
+    assert squares == pytest.approx(np.sum(residual[agreeing] ** 2))
     assert found == Tally(*(int(np.count_nonzero(mask)) for mask in masks))
     assert found.of(n).facing + found.of(n).turned_away == n
 

@@ -39,6 +39,25 @@ def test_offsets_are_those_of_the_dense_equations(sigma, size, alike, seed):
     assert share.mean() > 0.85
 
 
+@given(st.integers(0, 2**32 - 1))
+def test_variances_are_those_of_messages_along_every_edge(seed):
+    generator, degree = np.random.default_rng(seed), np.bincount(MESH.edges.ravel())
+    precision, prior = generator.uniform(0, 1e6, N), Prior(np.zeros(N), np.full(N, 1e5), 1e5)
+    field, messages = OffsetField(MESH), {(int(i), int(j)): 0.0 for edge in MESH.edges for i, j in (edge, edge[::-1])}
+    square = {(i, j): (prior.coupling * 6 / min(degree[i], degree[j])) ** 2 for i, j in messages}
+    diagonal = np.diag(dense(precision, prior))
+    for _ in range(2):
+        received = {edge: square[edge] * message for edge, message in messages.items()}
+        known = diagonal.copy()
+        for (_, to), each in received.items():
+            known[to] -= each
+        messages = {(i, j): 1 / (known[i] + received[j, i]) for i, j in messages}
+        rest = diagonal.copy()
+        for (i, to), each in messages.items():
+            rest[to] -= square[i, to] * each
+        np.testing.assert_allclose(field.variance(precision, prior), 1 / rest)
+
+
 def test_without_coupling_every_vertex_is_alone():
     precision = np.linspace(0, 1e6, N)
     prior, mean = Prior(np.zeros(N), np.full(N, 1e5), 0.0), np.linspace(-1e-3, 1e-3, N)

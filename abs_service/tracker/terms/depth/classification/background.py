@@ -4,6 +4,8 @@ A vertex without a measurement is not evidence by itself: the surface may absorb
 the first image had no return either, a missing return beside the object shows that background, not a hole.
 """
 
+from typing import NamedTuple
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -56,32 +58,37 @@ class Background:
             return missing, missing
         count, labels = cv2.connectedComponents(missing.view(np.uint8), connectivity=4)
         areas = np.asarray(labels, np.int32)
-        return _sharing(areas, count, self._empty[window]), _sharing(areas, count, self._returned[window])
+        pixels = FirstPixels(*(np.ascontiguousarray(part[window]) for part in (self._empty, self._returned)))
+        found = FirstPixels(np.empty(missing.shape, np.bool_), np.empty(missing.shape, np.bool_))
+        _mark_shared(areas, pixels, np.zeros((count, 2), np.int64), found)
+        return found.empty, found.returned
 
 
-def _sharing(areas: NDArray[np.int32], count: int, pixels: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """The areas (rows, columns), numbered below a count, that share enough pixels with others; see `_mark_shared`."""
-    result = np.empty(areas.shape, np.bool_)
-    _mark_shared(areas, np.ascontiguousarray(pixels), np.zeros(count, np.int64), result)
-    return result
+class FirstPixels(NamedTuple):
+    """Pixels (rows, columns) of the first image without a return and with one, or areas that share enough with them."""
+
+    empty: NDArray[np.bool_]
+    returned: NDArray[np.bool_]
 
 
 @kernel
-def _mark_shared(
-    labels: NDArray[np.int32], pixels: NDArray[np.bool_], shared: NDArray[np.int64], result: NDArray[np.bool_]
-) -> None:
+def _mark_shared(labels: NDArray[np.int32], pixels: FirstPixels, shared: NDArray[np.int64], found: FirstPixels) -> None:
     """Marks the areas that share enough pixels with what the first image showed.
 
     Args:
         labels: of the areas (rows, columns), 0 for none.
-        pixels: those (rows, columns) of the first image.
-        shared: number of pixels that every area shares with it (areas,), zeros at the start.
-        result: see above (rows, columns).
+        pixels: those of the first image.
+        shared: number of pixels that every area shares with either of them (areas, 2), zeros at the start.
+        found: result.
     """
     for row in range(labels.shape[0]):
         for column in range(labels.shape[1]):
-            if pixels[row, column] and labels[row, column] > 0:
-                shared[labels[row, column]] += 1
+            label = labels[row, column]
+            if label > 0:
+                shared[label, 0] += pixels.empty[row, column]
+                shared[label, 1] += pixels.returned[row, column]
     for row in range(labels.shape[0]):
         for column in range(labels.shape[1]):
-            result[row, column] = labels[row, column] > 0 and shared[labels[row, column]] >= MIN_PIXELS
+            label = labels[row, column]
+            found.empty[row, column] = label > 0 and shared[label, 0] >= MIN_PIXELS
+            found.returned[row, column] = label > 0 and shared[label, 1] >= MIN_PIXELS

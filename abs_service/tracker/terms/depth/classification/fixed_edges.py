@@ -37,6 +37,9 @@ ALONG_PX, ACROSS_PX, AROUND_PX = 8, 2, 6
 HALF_PX = 0.75
 Coordinates = NDArray[np.intp]
 
+#: That of an image without an area of missing returns, see `_outline`.
+_NO_OUTLINE = np.zeros((0, 2), np.intp), np.zeros((0, 2), np.intp), np.zeros(0, np.intp)
+
 #: Steps (row, column) from a pixel to its neighbours towards the left, right, upper and lower side of the image.
 _STEPS = ((0, -1), (0, 1), (-1, 0), (1, 0))
 
@@ -98,7 +101,7 @@ class FixedEdges:
 
     def _begin(self, areas: NDArray[np.bool_], expected: NDArray[np.bool_], window: Window) -> None:
         """Takes the outline of this image for that with which later ones are compared."""
-        last, beside, self._side = _outline(areas, grown(expected, NEAR_PX))
+        last, beside, self._side = _outline(areas, grown(expected, NEAR_PX)) if areas.any() else _NO_OUTLINE
         self._last, self._next = last + corner(window), beside + corner(window)
         self._is_fixed, self._later = np.ones(len(last), np.bool_), 0
         self._begun = True
@@ -109,7 +112,10 @@ class FixedEdges:
 
     def _settle(self) -> None:
         """Finds the places at which the object may end, or the field of view."""
+        self.unsettled = np.zeros(self._shape, np.bool_)
         near = np.flatnonzero(_is_near(self._next, self._side, self._shape))
+        if not near.size:
+            return
         places, side = self._last[near], self._side[near]
         is_fixed = self._is_fixed[near] & ~self._is_seen_beyond(places, side)
         apart = np.abs(places[:, None] - places)
@@ -117,7 +123,6 @@ class FixedEdges:
         beside = (apart <= (ALONG_PX, ACROSS_PX)).all(axis=2) & (side[:, None] == side)
         fixed = np.count_nonzero(beside & is_fixed, axis=1)
         found = places[is_fixed & (fixed >= MIN_SHARE * np.count_nonzero(beside, axis=1))]
-        self.unsettled = np.zeros(self._shape, np.bool_)
         for row, column in found.tolist():
             top, left = max(row - AROUND_PX, 0), max(column - AROUND_PX, 0)
             self.unsettled[top : row + AROUND_PX + 1, left : column + AROUND_PX + 1] = True
@@ -133,7 +138,7 @@ class FixedEdges:
     def _learn(self) -> None:
         """Finds the edges that are fixed, if the rest of the outline is not."""
         is_fixed = self._is_fixed
-        if np.count_nonzero(is_fixed) < MIN_LENGTH:
+        if np.count_nonzero(is_fixed & _is_near(self._next, self._side, self._shape)) < MIN_LENGTH:
             return
         columns = self._shape[1] // CELL_PX + 1
         cell = self._last[:, 0] // CELL_PX * columns + self._last[:, 1] // CELL_PX

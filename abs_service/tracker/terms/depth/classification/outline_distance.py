@@ -35,15 +35,39 @@ def inwards(distance: NDArray[np.float32], seen: Visibility, reach: int) -> tupl
     if not (beside.any() and seen.object.any()):
         return WHOLE, np.full(distance.shape, np.nan, np.float32)
     part = around(~beside, reach)
-    outside = beside[part]
+    outside = np.ascontiguousarray(beside[part])
     to_inside, to_outside = (
-        cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5) for mask in (outside, ~outside)
+        np.asarray(cv2.distanceTransform(mask.view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5), np.float32)
+        for mask in (outside, ~outside)
     )
-    # Each pixel is at no distance from its own side, so one difference serves both.
-    away = np.subtract(to_outside, to_inside)
-    away += np.subtract(outside, np.float32(0.5), dtype=np.float32)
-    away[seen.foreground[part] | seen.hole[part]] = np.nan
+    away = np.empty(outside.shape, np.float32)
+    join_sides(to_inside, to_outside, seen.foreground, seen.hole, (part[0].start, part[1].start), away)
     return part, away
+
+
+@kernel
+def join_sides(
+    to_inside: NDArray[np.float32],
+    to_outside: NDArray[np.float32],
+    foreground: NDArray[np.bool_],
+    hole: NDArray[np.bool_],
+    corner: tuple[int, int],
+    away: NDArray[np.float32],
+) -> None:
+    """Distances inside an outline between pixels (rows, columns), from those to the next pixel of either side [px].
+
+    Args:
+        to_inside, to_outside: 0 on the own side.
+        foreground, hole: pixels of an image (height, width) for which the distance is unknown.
+        corner: first row and column of the part of the image.
+        away: result, NaN where unknown.
+    """
+    (top, left), half = corner, np.float32(0.5)
+    for row in range(away.shape[0]):
+        for column in range(away.shape[1]):
+            at, outwards = (top + row, left + column), to_inside[row, column]
+            inwards = half - outwards if outwards > 0 else to_outside[row, column] - half
+            away[row, column] = np.float32(np.nan) if foreground[at] or hole[at] else inwards
 
 
 def outvoted(dropout: NDArray[np.bool_], beside: NDArray[np.bool_]) -> NDArray[np.bool_]:

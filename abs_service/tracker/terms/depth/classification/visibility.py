@@ -118,12 +118,11 @@ def classify(
     foreground = before & grown(solid, 1) if solid.any() else nothing
     hole, past, single = nothing, nothing, missing & dropout & ~beyond
     if missing.any():
-        hole, past = _holes(missing & ~(single | beyond), np.isfinite(predicted), near / focal, empty)
+        hole, past = _holes(missing & ~(single | beyond), np.isfinite(predicted), near, focal, empty)
         hole |= beyond
-    away = _depth_inside(~shown)
-    away *= near
-    away /= np.float32(focal)
-    return Visibility(shown, foreground, hole, single, nothing | beyond, where(behind | past, away), nothing, nothing)
+    free_m = _depth_inside(~shown)
+    keep_free(behind | past, near, np.float32(focal), free_m)
+    return Visibility(shown, foreground, hole, single, nothing | beyond, free_m, nothing, nothing)
 
 
 @kernel
@@ -167,24 +166,20 @@ def _compare(
             pixels.missing[row, column] = not np.isfinite(distance[row, column])
 
 
-def where(mask: NDArray[np.bool_], values: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Values (height, width) in a mask, zeros elsewhere."""
-    result = np.empty(values.shape, np.float32)
-    _select(mask.ravel(), values.ravel(), result.ravel())
-    return result
-
-
 @kernel
-def _select(mask: NDArray[np.bool_], values: NDArray[np.float32], result: NDArray[np.float32]) -> None:
-    """The result of `where`; `numpy.where` takes five times as long for a mask with a ragged edge."""
-    for k in range(mask.size):
-        result[k] = values[k] if mask[k] else np.float32(0)
+def keep_free(free: NDArray[np.bool_], near: NDArray[np.float32], focal: np.float32, away: NDArray[np.float32]) -> None:
+    """Distances from the object [px] become metres at the distance of its nearest place [m], 0 outside free space."""
+    for row in range(away.shape[0]):
+        for column in range(away.shape[1]):
+            at = row, column
+            away[at] = away[at] * near[at] / focal if free[at] else np.float32(0)
 
 
 def _holes(
     missing: NDArray[np.bool_],
     expected: NDArray[np.bool_],
-    metres: NDArray[np.float32],
+    near: NDArray[np.float32],
+    focal: float,
     empty: NDArray[np.bool_] | np.bool_,
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Missing returns that are holes in the measurement, and those that show the background.
@@ -192,12 +187,14 @@ def _holes(
     Args:
         missing: pixels without return (height, width).
         expected: pixels inside the expected outline.
-        metres: width of a pixel on the object [m].
+        near: distances of the nearest place on the object [m].
+        focal: focal length of the camera [px].
         empty: missing returns that show the background unless they are too deep inside the expected outline.
     """
     inside = missing & expected
     if not inside.any():
         return inside, empty & ~inside
+    metres = near / focal  # the width of a pixel on the object
     with np.errstate(over="ignore"):  # where the object fills the image, its outline is infinitely far away
         depth = _depth_inside(expected) * metres
     hole = inside & (depth > np.where(empty, np.float32(MAX_DEPTH_M), np.float32(RIM_M)))
@@ -247,4 +244,4 @@ def _spread(
 
 def _depth_inside(mask: NDArray[np.bool_]) -> NDArray[np.float32]:
     """Distance of every pixel of a mask from the mask's edge [px]."""
-    return np.asarray(cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5), np.float32)
+    return np.asarray(cv2.distanceTransform(mask.view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5), np.float32)

@@ -81,8 +81,9 @@ class ObservedRimOutline:
         rows = right * by_place[:, 0] + down * by_place[:, 1]
         jacobian = np.zeros((len(use), sparse_jacobian.dimension))
         chain(rows, self.edges.some(use), sparse_jacobian.blocks, jacobian)
-        shared = _shared_by_side(jacobian, residual[use], gradients[use])
-        return Linearization(residual[use], jacobian, points[use], rows, shared, partial(self._of_ends, surface, use))
+        residual = residual[use]
+        shared = partial(_shared_by_side, jacobian, residual, gradients[use])
+        return Linearization(residual, jacobian, points[use], rows, shared, partial(self._of_ends, surface, use))
 
     def _of_ends(self, surface: Surface, use: NDArray[np.intp], rows: NDArray[np.float64]) -> NDArray[np.float64]:
         """Derivatives (m, 3) of the edges `use`; zero where the outline is not known to be the end of the object.
@@ -93,7 +94,7 @@ class ObservedRimOutline:
         edges = self._locate(surface)
         within = self.image.inside(edges.places - self.off_px * edges.directions)
         is_on, sides = (np.abs(edges.away) <= self.off_px) & ~(within < 0), by_side(edges.directions)
-        most = 2 * np.count_nonzero(sides & is_on, axis=1) > np.count_nonzero(sides & ~np.isnan(edges.away), axis=1)
+        most = 2 * (sides & is_on).sum(axis=1) > (sides & ~np.isnan(edges.away)).sum(axis=1)
         return rows * (self.is_sure & is_on & (most @ sides))[use, None]
 
     def match(self, surface: Surface, sparse_jacobian: SparseJacobian) -> PointLinearization:
@@ -151,7 +152,7 @@ class ObservedRimOutline:
         """
         places, before = (project_with_jacobian(self.image.camera, points)[0] for points in (outer, inner))
         away, sides = self.image.inside(places), by_side(places - before)
-        over, known = (np.count_nonzero(sides & part, axis=1) for part in (away < -self.off_px, ~np.isnan(away)))
+        over, known = ((sides & part).sum(axis=1) for part in (away < -self.off_px, ~np.isnan(away)))
         has_slid = np.any((over >= MIN_HANGING) & (2 * over > known))
         return np.inf if has_slid else 0.0
 

@@ -77,9 +77,16 @@ class Edges(NamedTuple):
         extrapolate_rim(surface.vertices, self, points)
         return points
 
-    def directions(self, camera: Camera, surface: Surface, places: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Unit directions out of the mesh in the image (k, 2), at the edges' places (k, 2) [px]."""
-        return unit(places - project_with_jacobian(camera, self.starts(surface))[0])
+    def in_image(
+        self, camera: Camera, surface: Surface
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Ends of the object by a population of one (k, 3) [m], their places in the image (k, 2) [px], and directions.
+
+        The latter are unit ones out of the mesh, in the image (k, 2).
+        """
+        both = np.concatenate([self.points(surface)[0].T, surface.vertices[0].T[self.inner]], dtype=np.float64)
+        places, starts = project_with_jacobian(camera, both)[0].reshape(2, -1, 2)
+        return both[: len(places)], places, unit(places - starts)
 
 
 class LocatedEdges(NamedTuple):
@@ -124,9 +131,8 @@ class OutlineImage:
 
     def locate(self, edges: Edges, surface: Surface) -> LocatedEdges:
         """Edges of a population of one in the image."""
-        points = edges.points(surface)[0].T.astype(np.float64)
-        places = project_with_jacobian(self.camera, points)[0]
-        return LocatedEdges(points, places, self.inside(places), edges.directions(self.camera, surface, places))
+        points, places, directions = edges.in_image(self.camera, surface)
+        return LocatedEdges(points, places, self.inside(places), directions)
 
     def look(self, places: NDArray[np.floating]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Distances (k,) of places (k, 2) inside the outline [px], interpolated, and their image gradients (k, 2)."""

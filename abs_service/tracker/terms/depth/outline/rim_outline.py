@@ -108,7 +108,7 @@ class RimOutline:
         if not self._images:
             self._classify(image, predicted, distance)
         is_cut = self._find_cut(predicted, seen.beyond, window)
-        if not (self._images and np.array_equal(is_cut, self._sorted.is_cut)):
+        if not (self._images and (is_cut is self._sorted.is_cut or np.array_equal(is_cut, self._sorted.is_cut))):
             self._sorted = self._sort(is_cut, predicted.vertices.shape[2])
         edges, hidden = self._in_sight(predicted, expected, window)
         located = image.locate(edges, predicted)
@@ -170,8 +170,8 @@ class RimOutline:
 
     def _beside(self, surface: Surface) -> NDArray[np.float64]:
         """Places (k, 2) in the image of a population of one, `BESIDE_PX` outside the edges."""
-        places = self._camera.project(self._edges.points(surface)[0].T.astype(np.float64))
-        return places + BESIDE_PX * self._edges.directions(self._camera, surface, places)
+        _, places, directions = self._edges.in_image(self._camera, surface)
+        return places + BESIDE_PX * directions
 
     def _find_cut(self, surface: Surface, beyond: NDArray[np.bool_], window: Window) -> NDArray[np.bool_]:
         """True for edges (k,) where the field of view ends, at the first image's or at a population of one.

@@ -5,9 +5,12 @@ Along the surface it lasts beyond the frame that shows it.
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from abs_service.tracker.posterior.covariance.misfit import Misfit
+from abs_service.tracker.posterior.covariance.misfit import CommonDistance, Misfit
+from abs_service.tracker.terms.sensor_fit import INLIER_DEVIATIONS
 from tests.abs_service.tracker.scenes import sheet
 
 MESH = sheet(21, 31)
@@ -96,3 +99,15 @@ def test_a_single_frame_counts_for_a_fifth():
     misfit.update(np.full(N, 2e-3), EXACT)
     along = misfit.update(np.where(np.arange(N) < 0.2 * N, 2e-3, 0), EXACT)[1]
     assert along[-1] == pytest.approx(0.2 * 0.95 * 4e-6)
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_what_rings_have_beyond_their_noise_matches_numpy(seed: int):
+    generator, ring = np.random.default_rng(seed), CommonDistance(MESH)
+    distance, deviation = generator.normal(0, 2e-3, N), generator.uniform(0, 2e-3, N)
+    mean = ring.mean.toarray()
+    squares, noise = (mean @ distance) ** 2, mean**2 @ deviation**2
+    most = INLIER_DEVIATIONS**2 * noise
+    excess, unnoticed, _ = ring.excess_and_unnoticed(distance, deviation**2)
+    np.testing.assert_allclose(excess, np.maximum(squares - most, 0), rtol=1e-9, atol=1e-18)
+    assert unnoticed == pytest.approx(np.mean(np.minimum(squares, most)) - np.mean(noise), rel=1e-6)

@@ -152,14 +152,15 @@ def test_a_strip_whose_gripper_is_fixed_does_not_slide(is_free: bool, expected_m
     assert SlideObservability(model).of(optimum).deviation_m == pytest.approx(expected_m)
 
 
-@given(st.integers(0, 2**32 - 1), st.integers(1, 50))
-def test_information_on_rigid_motions_matches_numpy(seed: int, count: int):
+@given(st.integers(0, 2**32 - 1), st.integers(1, 50), st.booleans())
+def test_information_on_rigid_motions_matches_numpy(seed: int, count: int, is_image: bool):
     generator, center, size = np.random.default_rng(seed), np.array([0.1, -0.2, 0.9]), 0.15
     rows, own, places = generator.standard_normal((3, count, 3))
     known, possible = np.zeros((2, 6, 6))
-    sight = generator.standard_normal((count, 3)) * generator.integers(0, 2, (count, 1))  # none for some
+    eye = generator.standard_normal(3) if is_image else np.zeros(0)
+    sight = places - eye if is_image else np.zeros((count, 3))
     sight /= np.maximum(np.linalg.norm(sight, axis=1, keepdims=True), 1e-9)
-    add_information(rows, own, places, sight, center, size, known, possible)
+    add_information(rows, own, places, eye, center, size, known, possible)
     turns = np.cross(np.eye(3), ((places - center) / size)[:, None])  # turn × place, of every axis
     motions = np.concatenate([np.tile(np.eye(3), (count, 1, 1)), turns], axis=1).transpose(0, 2, 1)
     seen, shown = (np.einsum("mi,mik->mk", each, motions) for each in (rows, own))

@@ -17,6 +17,7 @@ from abs_service.tracker.terms.depth.pixel_classes import (
     LOST,
     Masks,
     PixelClasses,
+    WindowClasses,
     join_classes,
 )
 from calib.camera import Camera
@@ -109,9 +110,31 @@ def test_the_misfit_of_a_vertex_is_what_its_pixel_shows(seed: int):
 
 @given(st.integers(0, 2**32 - 1))
 def test_the_classes_of_a_pixel_are_joined_to_bits(seed: int):
-    masks, bits = Masks(*(np.random.default_rng(seed).random((5, 4, 6)) < 0.3)), np.empty((4, 6), np.uint8)
-    join_classes(masks, bits)
-    found, lost = PixelClasses(bits, np.zeros((4, 6), np.float32)), masks.hole | masks.dropout
+    generator = np.random.default_rng(seed)
+    masks, free_m = Masks(*(generator.random((5, 4, 6)) < 0.3)), generator.random((4, 6)).astype(np.float32)
+    found = WindowClasses(np.empty((4, 6), np.uint8), np.empty_like(free_m), np.empty((4, 6), np.bool_))
+    join_classes(masks, free_m, found)
+    bits = found.bits
+    np.testing.assert_array_equal(found.free_m, np.where(masks.doubtful, 0, free_m))
+    np.testing.assert_array_equal(found.masked, masks.hole | masks.foreground | masks.doubtful)
+    lost = masks.hole | masks.dropout
     by_bit = ((LOST, lost), (COVERED, masks.foreground), (BEYOND, masks.beyond), (DOUBTFUL, masks.doubtful))
     for bit, mask in by_bit:
-        np.testing.assert_array_equal(found.has(bit), mask)
+        np.testing.assert_array_equal((bits & bit) > 0, mask)
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_samples_have_the_classes_of_their_pixels(seed: int):
+    generator, n = np.random.default_rng(seed), 40
+    bits, free_m = np.zeros((6, 8), np.uint8), np.zeros((6, 8), np.float32)
+    bits[1:-1, 1:-1] = generator.integers(0, 2 * DOUBTFUL, (4, 6))
+    free_m[1:-1, 1:-1] = np.maximum(generator.uniform(-0.1, 0.1, (4, 6)), 0)
+    pixel, facing = generator.integers(-1, bits.size, n).astype(np.int32), generator.random(n) < 0.5
+    found, free = PixelClasses(bits, free_m).of_samples(pixel, facing)
+    place = np.where((bits.ravel()[pixel] & BEYOND) > 0, 0, pixel)
+    np.testing.assert_array_equal(found.pixel, place)
+    np.testing.assert_array_equal(free, (place > 0) & (free_m.ravel()[place] > 0))
+    own = bits.ravel()[place]
+    masks = found.missing, found.behind_occluder, found.unjudged
+    for mask, bit in zip(masks, (LOST, COVERED, DOUBTFUL), strict=True):
+        np.testing.assert_array_equal(mask, (own & bit) > 0)

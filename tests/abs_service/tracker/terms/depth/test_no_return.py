@@ -11,6 +11,7 @@ from abs_service.tracker.terms.base import Bounds, Prediction
 from abs_service.tracker.terms.depth.classification.outline_distance import inwards
 from abs_service.tracker.terms.depth.classification.visibility import classify, surfaces_of
 from abs_service.tracker.terms.depth.depth import DepthTerm
+from abs_service.tracker.terms.depth.depth_cost import missing_cost
 from calib.camera import Camera
 from calib.no_return import NEVER, NoReturn
 from calib.noise.constant import Constant
@@ -46,6 +47,16 @@ def cost_without(law: NoReturn, vertex: int) -> float:
     for distance in (whole, lost):
         costs.append(term(law).observe(depth_image(distance), Prediction(SURFACE)).cost(SURFACE)[0])
     return float(costs[1] - costs[0])
+
+
+@given(st.floats(0.001, 0.999), st.integers(-3, 3), st.floats(0, 5), st.floats(0, 6))
+def test_costs_of_missing_returns_are_the_log_odds_of_a_return(share, per_m, grazing, maximum):
+    law, center = NoReturn(share, per_m, grazing), np.array([0.1, -0.05, 0.02])
+    vertices, normals = (part[0].T.astype(np.float64) for part in (SURFACE.vertices, SURFACE.normals))
+    distance = np.linalg.norm(vertices - center, axis=1)
+    cosine = np.clip(np.sum(normals * (center - vertices), axis=1) / distance, 0, 1)
+    expected = np.clip(-law.log_odds(distance, cosine), 0, maximum)
+    np.testing.assert_allclose(missing_cost(law, SURFACE, center, maximum)[0], expected, rtol=1e-5, atol=1e-5)
 
 
 @pytest.mark.parametrize(

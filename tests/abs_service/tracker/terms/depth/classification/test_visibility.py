@@ -12,7 +12,7 @@ from abs_service.tracker.synthesis.rasterization.raster import Raster
 from abs_service.tracker.synthesis.window import WHOLE
 from abs_service.tracker.terms.base import Bounds, Prediction
 from abs_service.tracker.terms.depth.classification.background import MIN_PIXELS, Background
-from abs_service.tracker.terms.depth.classification.visibility import classify, surfaces_of, where
+from abs_service.tracker.terms.depth.classification.visibility import classify, keep_free, surfaces_of
 from abs_service.tracker.terms.depth.depth import DepthTerm
 from abs_service.tracker.terms.depth.depth_cost import FREE_SCALE_M
 from abs_service.tracker.terms.depth.observed_depth import ObservedDepth
@@ -188,12 +188,14 @@ def test_missing_returns_of_an_object_that_fills_the_image_are_holes():
     assert np.array_equal(seen.hole, np.isnan(distance))
 
 
-@pytest.mark.parametrize("shape", [(0, 3), (1, 1), (7, 9)])
-def test_values_in_a_mask_are_those_of_numpy(shape):
-    generator = np.random.default_rng(0)
-    values, mask = generator.normal(size=shape).astype(np.float32), generator.random(shape) < 0.5
-    values[generator.random(shape) < 0.2] = np.nan
-    np.testing.assert_array_equal(where(mask, values), np.where(mask, values, np.float32(0)))
+@given(st.integers(0, 2**32 - 1))
+def test_distances_are_kept_in_free_space_alone(seed):
+    generator, focal = np.random.default_rng(seed), np.float32(528)
+    free, near = generator.random((4, 6)) < 0.5, generator.uniform(0.5, 2, (4, 6)).astype(np.float32)
+    away = generator.uniform(0, 50, (4, 6)).astype(np.float32)
+    expected = np.where(free, away * near / focal, 0)
+    keep_free(free, near, focal, away)
+    np.testing.assert_allclose(away, expected, rtol=1e-6)
 
 
 @given(st.integers(0, 2**32 - 1))

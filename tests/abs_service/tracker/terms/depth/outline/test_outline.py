@@ -15,7 +15,7 @@ from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.objectives import likelihood
 from abs_service.tracker.synthesis.projection import Optics
 from abs_service.tracker.terms.base import Bounds, Prediction
-from abs_service.tracker.terms.depth.classification.outline_distance import inwards, outvoted
+from abs_service.tracker.terms.depth.classification.outline_distance import inwards
 from abs_service.tracker.terms.depth.classification.visibility import classify, surfaces_of
 from abs_service.tracker.terms.depth.outline.rim import Edges, Rim, look_up, read
 from abs_service.tracker.terms.depth.outline.rim_cost import MAX_DEVIATIONS, rim_cost
@@ -148,11 +148,11 @@ def test_edges_that_disagree_with_the_outline_share_a_larger_error():
     assert np.mean(at_rest.residual**2) < 1
     along_x, along_y = 3, 4
     right, left = (
-        slid.shared[0, along_x] / at_rest.shared[0, along_x],
-        slid.shared[2, along_x] / at_rest.shared[2, along_x],
+        slid.shared()[0, along_x] / at_rest.shared()[0, along_x],
+        slid.shared()[2, along_x] / at_rest.shared()[2, along_x],
     )
     np.testing.assert_allclose((right, left), 2 / 0.5, rtol=0.2)
-    np.testing.assert_allclose(slid.shared[[1, 3], along_y], at_rest.shared[[1, 3], along_y], rtol=0.05)
+    np.testing.assert_allclose(slid.shared()[[1, 3], along_y], at_rest.shared()[[1, 3], along_y], rtol=0.05)
 
 
 def test_rows_predict_what_residuals_do():
@@ -235,12 +235,3 @@ def test_distances_near_the_outline_do_not_depend_on_how_far_the_image_goes_on()
     beyond = everywhere.copy()
     beyond[part] = -3
     assert np.nanmax(beyond) <= -3
-
-
-@given(st.integers(0, 2**32 - 1), st.integers(2, 9), st.integers(2, 9))
-def test_dropouts_go_with_most_of_their_neighbours(seed, height, width):
-    generator = np.random.default_rng(seed)
-    dropout, beside = generator.random((2, height, width)) < 0.5
-    votes = np.where(dropout, 0, np.where(beside, 1, -1))
-    around = np.lib.stride_tricks.sliding_window_view(np.pad(votes, 1, mode="reflect"), (3, 3)).sum(axis=(2, 3))
-    np.testing.assert_array_equal(outvoted(dropout, beside), dropout & (around > 0))
