@@ -26,7 +26,7 @@ class ArrivalMonitor:
         self._seen: deque[tuple[int, int]] = deque()
 
     def checked(self, detect: Callable[[], InitialDetection], t_ns: int) -> InitialDetection:
-        """What `detect` finds in the image of a time, CLOCK_MONOTONIC [ns].
+        """The object that `detect` finds in the image of a time, CLOCK_MONOTONIC [ns].
 
         Raises:
             UndecidedError: the image's border cuts it, and more and more of it is in sight.

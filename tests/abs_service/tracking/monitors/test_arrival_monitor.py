@@ -1,4 +1,4 @@
-"""What comes into view over the image's border gets no mesh before it has come."""
+"""An object that comes into view over the image's border gets no mesh before it has come."""
 
 from dataclasses import replace
 
@@ -30,7 +30,7 @@ def nothing() -> InitialDetection:
 
 
 def taken(widths: list[int], first: int = 0) -> list[bool]:
-    """Whether a thing of so many columns in each image is taken; after an image without it."""
+    """True for each image in which a thing of so many columns is taken, after one without it."""
     monitor, result = ArrivalMonitor(), []
     with pytest.raises(DetectionError):
         monitor.checked(nothing, 0)

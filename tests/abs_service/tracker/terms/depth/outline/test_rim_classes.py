@@ -108,21 +108,6 @@ def test_an_edge_up_to_two_cells_before_an_occluder_is_occluded_until_that_leave
     assert seen.uncovered >= 0.9 * hidden.covered  # a corner's own continuation is beside the sheet
 
 
-@pytest.mark.parametrize("shadow_px", [3, 5])
-def test_the_shadow_of_what_stands_before_the_object_is_no_end_of_it(shadow_px: int):
-    """Structured light has no return beside a pole in front of a sheet; on the other side, the sheet ends."""
-    shown = picture(Mesh(MESH.vertices * (1.6, 1, 1), MESH.faces, MESH.colors, MESH.chart))
-    rays = CAMERA.unproject(np.ones((CAMERA.height, CAMERA.width)))
-    first = int(np.argmax((rays[..., 0] / rays[..., 2])[0] > 0.155))
-    shown[:, first : first + shadow_px] = np.nan
-    shown[:, first + shadow_px : first + shadow_px + 8] = 0.8
-    shown[:, :50][shown[:, :50] < 1.3] = picture()[:, :50][shown[:, :50] < 1.3]
-    found = begun(shown).classes
-    x = MESH.vertices[Rim.of(MESH).outer, 0]
-    assert np.mean(found[x > 0.14] == RimClass.OCCLUDED) > 0.8  # but for the corners
-    assert np.mean(found[x < -0.14] == RimClass.FREE) == 1
-
-
 def test_an_edge_at_the_border_of_the_image_may_continue_beyond_it():
     wide = sheet(13, 19, flat, (0.62, 0.2))
     found = classes(picture(wide), wide)
