@@ -239,7 +239,8 @@ class TrackingSession:
 
     def _detection(self, observation: Observation, region: Region) -> InitialDetection:
         found = partial(detect_object, observation, self._rig, self._plan.reference, region, self._plan.vertices)
-        return self._arrival_monitor.checked(found, observation.t_host_ns)
+        # What is found again has to be as large as what was lost, so that a part of it will do.
+        return self._arrival_monitor.checked(found, observation.t_host_ns) if self._tracker is None else found()
 
     def _build(self, observation: Observation, region: Region) -> _Built:
         detection = self._detection(observation, region)
