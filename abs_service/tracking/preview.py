@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from abs_service.tracker.detection.templates.base import Template
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import ModelError
 from abs_service.tracker.terms.depth.outline.first_rim import classified_rim
+from abs_service.tracking.monitors.arrival_monitor import ArrivalMonitor
 from abs_service.tracking.observer import Observer
 from abs_service.tracking.plan import Plan, build_template, derived, make_tracker
 from calib.camera import Camera
@@ -85,13 +87,13 @@ def preview(frame_sets: Iterable[FrameSet], rig: Rig, plan: Plan) -> Preview:
         PreviewError: the reference sensor delivers no depth image.
         ObservationError: the frames do not fit the rig.
     """
-    observer, region = Observer(rig), plan.region.build()
+    observer, region, arrival = Observer(rig), plan.region.build(), ArrivalMonitor()
     template = build_template(plan.template, plan.vertices)
     first: Preview | None = None
     last: Preview | None = None
     number = -1
     for number, frames in enumerate(frame_sets):
-        seen = _look(number, observer.observe(frames), rig, plan, region, template)
+        seen = _look(number, observer.observe(frames), rig, plan, region, arrival, template)
         if seen is None:
             continue
         first, last = first or seen, seen
@@ -103,7 +105,13 @@ def preview(frame_sets: Iterable[FrameSet], rig: Rig, plan: Plan) -> Preview:
 
 
 def _look(
-    number: int, observation: Observation, rig: Rig, plan: Plan, region: Region, template: Template
+    number: int,
+    observation: Observation,
+    rig: Rig,
+    plan: Plan,
+    region: Region,
+    arrival: ArrivalMonitor,
+    template: Template,
 ) -> Preview | None:
     """Preview of one observation; None without a depth image of the reference sensor."""
     image, camera = observation.images.get(plan.reference), rig.sensors[plan.reference].camera
@@ -111,7 +119,8 @@ def _look(
         return None
     selected = np.zeros(image.distance.shape, np.bool_)
     try:
-        detection = detect_object(observation, rig, plan.reference, region, plan.vertices)
+        found = partial(detect_object, observation, rig, plan.reference, region, plan.vertices)
+        detection = arrival.checked(found, observation.t_host_ns)
         selected = np.isfinite(detection.distance)
         tracker, _, _ = make_tracker(plan, template, rig, detection, observation)
     except (DetectionError, ModelError) as error:

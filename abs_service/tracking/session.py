@@ -4,6 +4,7 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from enum import Enum, auto
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -22,6 +23,7 @@ from abs_service.tracker.models.base import DeformationModel, ModelError
 from abs_service.tracker.tracker import Tracker
 from abs_service.tracking.monitors import loss_monitor
 from abs_service.tracking.monitors.appearance_monitor import AppearanceMonitor
+from abs_service.tracking.monitors.arrival_monitor import ArrivalMonitor
 from abs_service.tracking.monitors.first_view import FirstView
 from abs_service.tracking.monitors.growth_monitor import MIN_GROWTH, GrowthMonitor
 from abs_service.tracking.observer import Observer
@@ -91,6 +93,7 @@ class TrackingSession:
         self._loss_monitor = loss_monitor.LossMonitor(plan.reinitialization, plan.status)
         self._growth_monitor = GrowthMonitor(plan.reinitialization.grow_s)
         self._growth_due = False
+        self._arrival_monitor = ArrivalMonitor()
         self._requested: deque[Region] = deque()  # the latest counts; other threads add to it
         self._appearance_monitor = AppearanceMonitor((), plan.reinitialization.every_s)
         self._warnings: tuple[str, ...] = ()
@@ -145,7 +148,7 @@ class TrackingSession:
         self._tracker = None
         self._region = self._configured = self._plan.region.build()
         self._loss_monitor = loss_monitor.LossMonitor(self._plan.reinitialization, self._plan.status)
-        self._growth_due = False
+        self._growth_due, self._arrival_monitor = False, ArrivalMonitor()
 
     def _due(self, observation: Observation) -> _Due | None:
         """The detection that is due in this frame, which then counts as made; None if the object is just tracked."""
@@ -235,7 +238,9 @@ class TrackingSession:
         self.mesh_version += 1
 
     def _detection(self, observation: Observation, region: Region) -> InitialDetection:
-        return detect_object(observation, self._rig, self._plan.reference, region, self._plan.vertices)
+        found = partial(detect_object, observation, self._rig, self._plan.reference, region, self._plan.vertices)
+        # What is found again has to be as large as what was lost, so that a part of it will do.
+        return self._arrival_monitor.checked(found, observation.t_host_ns) if self._tracker is None else found()
 
     def _build(self, observation: Observation, region: Region) -> _Built:
         detection = self._detection(observation, region)

@@ -8,9 +8,10 @@ is added to the covariance of the vertices in all directions. With a noisy senso
 all of them together more: the mean square of what no single ring tells from noise is added if all of a frame tell it.
 What a frame does not tell, the mean over the last frames does: else the covariance would collapse in single ones.
 
-Across the surface, this ends with the frame in which distances agree again. Along it, the mesh may have moved while
-most of it missed, as over wrinkles that wander, and distances of which more agree again do not show it. So there the
-variance is at least a running mean, over mesh and frames, until hardly any vertex misses.
+Across the surface, this ends with the frame in which distances agree again. Along it, all of the mesh may have moved
+while a part of it missed: it goes with wrinkles that wander, and stays where one of two things that touched each other
+was. Distances of which more agree again do not show it. So there the variance is at least a running mean, over mesh and
+frames, until hardly any vertex misses.
 """
 
 import numpy as np
@@ -20,8 +21,8 @@ from abs_service.tracker.mesh import Mesh, mean_around, ring_means
 from abs_service.tracker.terms.sensor_fit import INLIER_DEVIATIONS
 from calib.jit import kernel
 
-#: Share of the vertices that miss the measurements above which the mesh may slide, and below which it fits again.
-MAJORITY, HARDLY_ANY = 0.5, 0.1
+#: Share of the vertices that miss the measurements up to which the mesh cannot have moved along itself.
+HARDLY_ANY = 0.1
 
 #: Weight of a new frame in the running means: of the misfit along the surface if that of the frame, which may be alone,
 #: is larger, and of what a single frame does not tell; and if it is smaller, so that half is left after 14 frames.
@@ -47,10 +48,11 @@ class Misfit:
         excess, unnoticed, is_certain = self._common.excess_and_unnoticed(distance, deviation**2)
         self._unnoticed += RISE * (unnoticed - self._unnoticed)
         across = ring_means(self._common.mean, excess) + max(self._unnoticed, unnoticed if is_certain else 0.0)
-        missing = np.count_nonzero(excess) / len(excess)
-        of_most = float(across.mean()) if missing > MAJORITY else 0.0
-        kept = self._along if missing > HARDLY_ANY else 0.0
-        self._along = kept + (RISE if of_most > kept else FALL) * (of_most - kept)
+        if np.count_nonzero(excess) > HARDLY_ANY * len(excess):
+            of_all = float(across.mean())
+            self._along += (RISE if of_all > self._along else FALL) * (of_all - self._along)
+        else:
+            self._along = 0.0
         return across, np.maximum(across, self._along)
 
 

@@ -24,6 +24,9 @@ MAX_MISS_PX = 4.0
 #: Something hides an edge if it is in front of a point so many steps beyond it.
 _HIDING_STEPS = (0.5, 1.0, 1.5, MAX_GAP_STEPS)
 
+#: What is in front of the object may cast a shadow on it, without return as far as so many steps beyond the outline.
+_SHADOW_STEPS = 0.5
+
 #: A surface that is seen at a smaller cosine at its rim turns away from the sensor: the outline is a silhouette, which
 #: wanders over a body as it turns, not the end of a sheet.
 MIN_COSINE = 0.25
@@ -90,6 +93,7 @@ def classify_rim(
     far = ~goes_on & (inside > MAX_MISS_PX) & (not rim.is_end)
     goes_on[far] = _leaves(camera, (outer + _ALMOST * gap[:, None] * step)[far], distance)
     hidden, unseen = _unseen(camera, [outer + by * step for by in _HIDING_STEPS], inside_at)
+    goes_on |= hidden & (unseen == RimClass.OCCLUDED) & _is_missing(camera, ends + _SHADOW_STEPS * step, distance)
     turned = turns_away(camera, surface, rim.outer, rim.inner)
     unknown = inside > camera.width + camera.height
     at_border = ~_is_within(camera, place, BORDER_PX)
@@ -143,6 +147,12 @@ def _unseen(
     hidden = np.any([np.isnan(inside_at(points)) for points in further], axis=0)
     leaves = np.any([~_is_within(camera, camera.project(points)) for points in further], axis=0)
     return hidden, np.where(leaves, RimClass.BORDER, RimClass.OCCLUDED)
+
+
+def _is_missing(camera: Camera, points: NDArray[np.float64], distance: NDArray[np.float32]) -> NDArray[np.bool_]:
+    """True for points (k, 3) in an image (height, width) that has no return there."""
+    last = distance.shape[1] - 1, distance.shape[0] - 1
+    return np.isnan(read(distance, np.zeros(2, np.float32), camera.project(points), last))
 
 
 def _is_within(camera: Camera, places: NDArray[np.float64], margin: float = 0.0) -> NDArray[np.bool_]:

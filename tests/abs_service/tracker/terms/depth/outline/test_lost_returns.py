@@ -1,4 +1,4 @@
-"""Areas that a sensor loses at the outline, beside a shadow: the object seems to end before them."""
+"""Areas that a sensor loses at the outline, in a shadow or beside one: the object seems to end before them."""
 
 from dataclasses import replace
 
@@ -7,6 +7,8 @@ import pytest
 
 import abs_service as a
 from abs_service.tracker.terms.depth.classification.visibility import classify, surfaces_of
+from abs_service.tracker.terms.depth.outline.rim import Rim
+from abs_service.tracker.terms.depth.outline.rim_classes import RimClass
 from calib.camera import Camera
 from tests.abs_service.tracker.terms.depth.outline import outline_scene as scene
 
@@ -52,3 +54,18 @@ def test_a_print_holds_a_sheet_of_which_the_ends_are_lost(contrast: float, has_w
         found.append(tracker.track(distance, time_s=k / 30, mask=on, image=image))
     assert found[-2].status == "TRACKING", found[-2].reasons
     assert found[-1].status == expected, found[-1].reasons
+
+
+@pytest.mark.parametrize("shadow_px", [3, 5])
+def test_the_shadow_of_what_stands_before_the_object_is_no_end_of_it(shadow_px: int):
+    """Structured light has no return beside a pole in front of a sheet; on the other side, the sheet ends."""
+    shown = scene.picture(replace(scene.MESH, vertices=scene.MESH.vertices * (1.6, 1, 1)))
+    rays = scene.CAMERA.unproject(np.ones((scene.CAMERA.height, scene.CAMERA.width)))
+    first = int(np.argmax((rays[..., 0] / rays[..., 2])[0] > 0.155))
+    shown[:, first : first + shadow_px] = np.nan
+    shown[:, first + shadow_px : first + shadow_px + 8] = 0.8
+    shown[:, :50][shown[:, :50] < 1.3] = scene.picture()[:, :50][shown[:, :50] < 1.3]
+    found = scene.begun(shown).classes
+    x = scene.MESH.vertices[Rim.of(scene.MESH).outer, 0]
+    assert np.mean(found[x > 0.14] == RimClass.OCCLUDED) > 0.8  # but for the corners
+    assert np.mean(found[x < -0.14] == RimClass.FREE) == 1
