@@ -123,6 +123,7 @@ class Recorder:
         self._health.gauge("queue_bytes", self._queue.size)
         self._pre_roll.report(self._health)
         self._losses.report(self._queue.dropped, bool(self._failed))
+        self._writer.ask_for_missing(self._bus)
 
     def _receive(self, sample: Sample) -> None:
         self._losses.arrive(sample)

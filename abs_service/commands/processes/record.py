@@ -64,7 +64,7 @@ def run(arguments: argparse.Namespace) -> int:
     with rig_process.open_bus(rig, arguments, "recorder") as bus:
         health = Health(bus, "record", headers)
         bus.declare_liveliness("record")
-        trigger = _trigger(rig, clock)
+        trigger = make_trigger(rig, clock)
         recorder = Recorder(bus, settings, health, clock, trigger=trigger)
         # In parallel: it may take minutes, and the disk may not answer.
         context = recorder, settings, health, stop, time.time()
@@ -123,12 +123,14 @@ def _settings(rig: config.ServiceConfig) -> RecorderSettings:
     )
 
 
-def _trigger(rig: config.ServiceConfig, clock: WallClock) -> Trigger:
+def make_trigger(rig: config.ServiceConfig, clock: WallClock) -> Trigger:
+    """The trigger that a rig asks for; one whose recording was interrupted a moment ago goes on."""
     table = rig.record
     if table.when == "always":
         return ALWAYS
     trigger = RequestTrigger(table.when == "not_tracking", table.post_roll_s, clock.monotonic)
-    if any(time.time() - changed_s < INTERRUPTED_S for changed_s in leftovers(table.directory).values()):
+    # Not one of the future: the wall clock was set back, and does not tell how old it is.
+    if any(0 <= time.time() - changed_s < INTERRUPTED_S for changed_s in leftovers(table.directory).values()):
         trigger.resume()
     return trigger
 
@@ -159,13 +161,14 @@ def recover_leftovers(settings: RecorderSettings, health: Health, begun_s: float
     Args:
         settings: of the recorder.
         health: of the recorder.
-        begun_s: Unix time [s]; what has been written since may be a file that somebody has not locked yet.
+        begun_s: Unix time [s]; what has been written since may be a file that somebody has not locked yet. What is of
+            the future was written before the wall clock was set back, as by a start without a battery for the clock.
     """
     lacking = ""
     remove_interrupted(settings.directory)
     for path, changed_s in leftovers(settings.directory).items():
         try:
-            if changed_s >= begun_s - TICK_S:
+            if begun_s - TICK_S <= changed_s <= time.time() + TICK_S:
                 continue
             _check_recoverable(path, settings)
             report = recover(path)
