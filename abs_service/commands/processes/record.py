@@ -39,6 +39,8 @@ _log = logging.getLogger(__name__)
 
 #: Time to drain the queue at the end [s].
 DRAIN_S = 2.5
+#: Time without a message after which none is on its way any more, and the longest wait for that at the end [s].
+QUIET_S, LAST_S = 0.2, 1.0
 #: Age of an unfinished file below which the recorder before this one was killed while it recorded [s].
 INTERRUPTED_S = 60.0
 #: Time between two checks whether something is to be recovered [s].
@@ -91,10 +93,22 @@ def run(arguments: argparse.Namespace) -> int:
                 recorder.report()
                 bus.report(health)
                 health.tick()
+        _await_quiet(recorder)
         recorder.stop(DRAIN_S)
         recorder.report()
         health.publish()
     return Exit.FAILED if recorder.failures else Exit.OK
+
+
+def _await_quiet(recorder: Recorder) -> None:
+    """Waits for what was sent before the end and has not arrived, as at a recorder that stood still."""
+    now_s, arrived = time.monotonic(), -1
+    quiet_s = last_s = now_s + LAST_S
+    while now_s < min(quiet_s, last_s):
+        if recorder.arrived != arrived:
+            arrived, quiet_s = recorder.arrived, now_s + QUIET_S
+        time.sleep(0.01)
+        now_s = time.monotonic()
 
 
 def _wait_for_tracking(tracking: FirstTracking, health: Health, stop: threading.Event) -> None:
