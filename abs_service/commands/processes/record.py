@@ -93,15 +93,13 @@ def run(arguments: argparse.Namespace) -> int:
                 recorder.report()
                 bus.report(health)
                 health.tick()
-        _await_quiet(recorder)
-        recorder.stop(DRAIN_S)
-        recorder.report()
+        _end(recorder)
         health.publish()
     return Exit.FAILED if recorder.failures else Exit.OK
 
 
-def _await_quiet(recorder: Recorder) -> None:
-    """Waits for what was sent before the end and has not arrived, as at a recorder that stood still."""
+def _end(recorder: Recorder) -> None:
+    """Ends a recorder when what was sent before has arrived, which takes longer if it stood still."""
     now_s, arrived = time.monotonic(), -1
     quiet_s = last_s = now_s + LAST_S
     while now_s < min(quiet_s, last_s):
@@ -109,6 +107,8 @@ def _await_quiet(recorder: Recorder) -> None:
             arrived, quiet_s = recorder.arrived, now_s + QUIET_S
         time.sleep(0.01)
         now_s = time.monotonic()
+    recorder.stop(DRAIN_S)
+    recorder.report()
 
 
 def _wait_for_tracking(tracking: FirstTracking, health: Health, stop: threading.Event) -> None:

@@ -7,8 +7,6 @@ from dataclasses import replace
 import pytest
 from absmsg.v1 import frame_info_pb2
 from absmsg.v1.common_pb2 import Header
-from absmsg.v1.deformation_state_pb2 import DeformationState
-from absmsg.v1.deformed_mesh_pb2 import DeformedMesh, MeshTopology
 from absmsg.v1.health_pb2 import Health
 from absmsg.v1.sensor_model_pb2 import SensorModel
 from foxglove_schemas_protobuf.PointCloud_pb2 import PointCloud
@@ -210,44 +208,6 @@ def test_images_that_never_came_are_said_once_and_counted(tmp_path):
     assert said[-1].counters[f"lost.{DEPTH}"] == 3
 
 
-def test_estimates_that_never_came_are_said_as_images_are(tmp_path):
-    """Health said OK while a busy bus dropped estimates, and `run` had 0 dropped."""
-    rig = Rig(tmp_path)
-    rig.recorder.start()
-    for seq in (0, 1, 4):
-        for topic, kind in ((keys.state("sheet"), DeformationState), (keys.mesh("sheet"), DeformedMesh)):
-            rig.bus.deliver(message(topic, kind(header=rig.headers.now(seq), tracker="sheet")))
-    rig.recorder.report()
-    rig.recorder.stop(5)
-    assert rig.said.message == "4 messages were lost on their way to the recorder"
-    assert rig.said.counters[f"lost.{keys.state('sheet')}"] == rig.said.counters[f"lost.{keys.mesh('sheet')}"] == 2
-
-
-def test_a_topology_that_did_not_come_is_asked_for_and_recorded_once(tmp_path):
-    """The tracker stood still when the recorder asked at its start, or the bus dropped what is sent once."""
-    rig = Rig(tmp_path)
-    rig.recorder.start()
-    hour_ago = rig.headers.at(rig.clock.monotonic() - 3600 * 10**9, 7)
-    topology = MeshTopology(header=hour_ago, tracker="sheet", mesh_version=7)
-    asked = []
-    rig.bus.answer_queries(
-        keys.topology("sheet"),
-        message_header.TOPOLOGY,
-        lambda: asked.append(topology) or topology.SerializeToString(),
-    )
-    for seq in range(4):
-        mesh = DeformedMesh(header=rig.headers.now(seq), tracker="sheet", mesh_version=7)
-        rig.bus.deliver(message(keys.mesh("sheet"), mesh))
-        assert eventually(lambda least=seq: rig.written(least + 1))
-        rig.recorder.report()
-    rig.recorder.stop(5)
-    messages = read(recordings(tmp_path)[0])[0]
-    (found,) = [m.message for m in messages if m.channel.topic == "/sheet/topology"]
-    assert (found.data, len(asked)) == (topology.SerializeToString(), 1)
-    times = [m.message.log_time for m in messages]
-    assert max(times) - min(times) < 60 * 10**9, "a file does not begin when the mesh was made"
-
-
 def test_a_topic_of_two_hosts_has_no_gap_where_they_alternate(tmp_path):
     rig = Rig(tmp_path)
     rig.recorder.start()
@@ -256,10 +216,6 @@ def test_a_topic_of_two_hosts_has_no_gap_where_they_alternate(tmp_path):
         rig.bus.deliver(Sample("health/capture", Health.DESCRIPTOR.full_name, health.SerializeToString()))
     rig.recorder.stop(5)
     assert metadata(recordings(tmp_path)[0])["missing.health/capture"] == "1"
-
-
-def message(topic, content):
-    return Sample(topic, content.DESCRIPTOR.full_name, content.SerializeToString())
 
 
 def test_messages_of_every_type_have_an_envelope():
