@@ -1,12 +1,17 @@
-"""Losses of a recorder, by cause: images that never came, and messages that its queue did not hold."""
+"""Losses of a recorder, by cause: messages that never came, and those that its queue did not hold."""
 
 from collections.abc import Mapping
+from contextlib import suppress
 
 from abs_service.bus import keys
 from abs_service.bus.contract import Sample
 from abs_service.bus.health import Health, Level
 from abs_service.bus.sequence_gaps import SequenceGaps
+from abs_service.wire import message_header
+from abs_service.wire.estimate_messages import COMPACT, MESH, STATE
 
+#: Messages beside images that their publisher numbers one after the other.
+NUMBERED = frozenset({STATE, MESH, COMPACT, message_header.HEALTH})
 #: Reports, one a second, after which the disk is fast enough again.
 CALM_REPORTS = 10
 
@@ -25,6 +30,10 @@ class Losses:
         """Takes each message in the order of arrival."""
         if keys.is_image(sample.topic):
             self._gaps.add_image(sample)
+        elif sample.message in NUMBERED:
+            with suppress(message_header.MessageHeaderError):  # counted when it is written
+                about = message_header.parse(sample)
+                self._gaps.add(sample.topic, about.publisher, about.seq)
 
     def report(self, dropped: Mapping[str, int], failed: bool) -> None:
         """Reports what is new.
@@ -37,7 +46,7 @@ class Losses:
         self._health.count_up_to(self._gaps.lost, "lost.")
         before, self._lost = self._lost, sum(self._gaps.lost.values())
         new = self._lost - before
-        message = f"{new} images were lost on their way to the recorder" if new else ""
+        message = f"{new} messages were lost on their way to the recorder" if new else ""
         self._health.report("losses", Level.WARNING if new else Level.OK, message)
         new, self._dropped = sum(dropped.values()) - self._dropped, sum(dropped.values())
         if failed:

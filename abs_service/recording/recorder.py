@@ -88,8 +88,8 @@ class Recorder:
         self._losses = Losses(health)
         self.stall = DiskStall(health, clock.monotonic, lambda: self._queue.size)
         self._backoff = Backoff(settings.directory, retry_s, self._stopping.wait, self.stall.alive)
-        self._finished = (0, 0)
-        self.failures = 0
+        self._finished, self.failures = (0, 0), 0
+        self.arrived = 0  # messages, of all kinds
         self.written = (0, 0)  # bytes to all recordings, and to all files of estimates
         self._thread = threading.Thread(target=self._run, name="record", daemon=True)
 
@@ -123,8 +123,10 @@ class Recorder:
         self._health.gauge("queue_bytes", self._queue.size)
         self._pre_roll.report(self._health)
         self._losses.report(self._queue.dropped, bool(self._failed))
+        self._writer.ask_for_missing(self._bus)
 
     def _receive(self, sample: Sample) -> None:
+        self.arrived += 1
         self._losses.arrive(sample)
         self._pre_roll.put(sample)
 

@@ -9,11 +9,12 @@ from google.protobuf.json_format import Error as JsonError
 from google.protobuf.json_format import MessageToJson
 
 from abs_service.bus import keys
-from abs_service.bus.contract import Sample
+from abs_service.bus.contract import Bus, Sample
 from abs_service.bus.health import Health
 from abs_service.bus.sequence_gaps import SequenceGaps
 from abs_service.bus.stamps import STEP_NS, WallClock
 from abs_service.recording.take import Take
+from abs_service.recording.topologies import Topologies
 from abs_service.wire import message_header as header
 from drivers.contract.host_clock import host_clock
 from drivers.encoding.encoded_image import ImageEncoder
@@ -22,6 +23,9 @@ from drivers.encoding.parsing import CodecError
 
 #: Messages repeated at the start of each file, so that every file is self-contained.
 _LATCHED = frozenset({header.CALIBRATION, header.CONFIG, header.MODEL, header.TOPOLOGY, header.TRANSFORMS})
+
+#: Timeout of the query for a topology that did not come [s].
+QUERY_S = 0.2
 
 #: Offsets of the wall clock that are remembered: a step that a process has not noticed may be followed by others.
 _OFFSETS = 8
@@ -45,6 +49,8 @@ class SampleWriter:
         self._host_clock = host_clock()
         self._lock = threading.Lock()
         self._latched: dict[str, Sample] = {}
+        self._late: dict[str, Sample] = {}  # by topic, for the open file
+        self._topologies = Topologies()
         self._gaps = SequenceGaps()
         self._counts: Counter[str] = Counter()  # of the open file
         self._attached: dict[str, str] = {}  # to the open file: calib_id by sensor
@@ -56,6 +62,14 @@ class SampleWriter:
         with self._lock:
             self._latched |= {sample.topic: sample for sample in samples if sample.message in _LATCHED}
 
+    def ask_for_missing(self, bus: Bus) -> None:
+        """Asks for topologies that did not come; they are written with the next message. Called from any thread."""
+        for tracker in self._topologies.missing():
+            answers = bus.query(keys.topology(tracker), QUERY_S)
+            self.latch(answers)
+            with self._lock:
+                self._late |= {one.topic: one for one in answers}
+
     def begin(self, take: Take) -> None:
         """Begins a recording with the metadata that makes it self-contained. Raises as `write`."""
         self._counts = Counter()
@@ -63,7 +77,7 @@ class SampleWriter:
         self._offset_ns = self._clock.wall(0)
         self.unsaved = 0
         with self._lock:
-            latched = list(self._latched.values())
+            latched, self._late = list(self._latched.values()), {}
         for sample in latched:
             self.write(take, sample, is_repeated=True)
 
@@ -83,6 +97,10 @@ class SampleWriter:
         """
         if sample.topic == keys.SCHEMA:
             return
+        with self._lock:
+            late, self._late = self._late, {}
+        for one in late.values():
+            self.write(take, one, is_repeated=True)
         self.unsaved += 1
         try:
             about = header.parse(sample)
@@ -101,6 +119,7 @@ class SampleWriter:
             self._health.label("refused", str(error))
             return
         self._count(sample.topic, about)
+        self._topologies.add(sample, about)
         self.latch([sample])
 
     def summary(self, dropped: Mapping[str, int]) -> dict[str, str]:

@@ -34,7 +34,8 @@ class MessageHeaderError(ValueError):
 class MessageHeader:
     """Time stamp (wall clock) [ns], 0 if the message has none, sequence number, and the process that counts.
 
-    And the same moment on a monotonic clock [ns], with the identity of that clock; 0 and "" if it does not say.
+    And the same moment on a monotonic clock [ns], with the identity of that clock; 0 and "" if it does not say. And the
+    number of its mesh, 0 if it has none.
     """
 
     stamp_ns: int
@@ -42,6 +43,7 @@ class MessageHeader:
     publisher: str = ""
     t_host_ns: int = 0
     host_clock: str = ""
+    mesh_version: int = 0
 
 
 _WITH_HEADER = (
@@ -61,12 +63,12 @@ def _ns(stamp: Timestamp) -> int:
     return stamp.seconds * 1_000_000_000 + stamp.nanos
 
 
-def _of(header: common_pb2.Header, seq: int) -> MessageHeader:
-    return MessageHeader(_ns(header.stamp), seq, header.boot_id, header.t_host_ns, header.host_clock)
+def _of(header: common_pb2.Header, seq: int, mesh_version: int = 0) -> MessageHeader:
+    return MessageHeader(_ns(header.stamp), seq, header.boot_id, header.t_host_ns, header.host_clock, mesh_version)
 
 
 def _of_header(message: Any) -> MessageHeader:
-    return _of(message.header, message.header.seq)
+    return _of(message.header, message.header.seq, getattr(message, "mesh_version", 0))
 
 
 def _of_timestamp(message: Any) -> MessageHeader:

@@ -39,6 +39,8 @@ _log = logging.getLogger(__name__)
 
 #: Time to drain the queue at the end [s].
 DRAIN_S = 2.5
+#: Time without a message after which none is on its way any more, and the longest wait for that at the end [s].
+QUIET_S, LAST_S = 0.2, 1.0
 #: Age of an unfinished file below which the recorder before this one was killed while it recorded [s].
 INTERRUPTED_S = 60.0
 #: Time between two checks whether something is to be recovered [s].
@@ -64,7 +66,7 @@ def run(arguments: argparse.Namespace) -> int:
     with rig_process.open_bus(rig, arguments, "recorder") as bus:
         health = Health(bus, "record", headers)
         bus.declare_liveliness("record")
-        trigger = _trigger(rig, clock)
+        trigger = make_trigger(rig, clock)
         recorder = Recorder(bus, settings, health, clock, trigger=trigger)
         # In parallel: it may take minutes, and the disk may not answer.
         context = recorder, settings, health, stop, time.time()
@@ -91,10 +93,22 @@ def run(arguments: argparse.Namespace) -> int:
                 recorder.report()
                 bus.report(health)
                 health.tick()
-        recorder.stop(DRAIN_S)
-        recorder.report()
+        _end(recorder)
         health.publish()
     return Exit.FAILED if recorder.failures else Exit.OK
+
+
+def _end(recorder: Recorder) -> None:
+    """Ends a recorder when what was sent before has arrived, which takes longer if it stood still."""
+    now_s, arrived = time.monotonic(), -1
+    quiet_s = last_s = now_s + LAST_S
+    while now_s < min(quiet_s, last_s):
+        if recorder.arrived != arrived:
+            arrived, quiet_s = recorder.arrived, now_s + QUIET_S
+        time.sleep(0.01)
+        now_s = time.monotonic()
+    recorder.stop(DRAIN_S)
+    recorder.report()
 
 
 def _wait_for_tracking(tracking: FirstTracking, health: Health, stop: threading.Event) -> None:
@@ -123,12 +137,14 @@ def _settings(rig: config.ServiceConfig) -> RecorderSettings:
     )
 
 
-def _trigger(rig: config.ServiceConfig, clock: WallClock) -> Trigger:
+def make_trigger(rig: config.ServiceConfig, clock: WallClock) -> Trigger:
+    """The trigger that a rig asks for; one whose recording was interrupted a moment ago goes on."""
     table = rig.record
     if table.when == "always":
         return ALWAYS
     trigger = RequestTrigger(table.when == "not_tracking", table.post_roll_s, clock.monotonic)
-    if any(time.time() - changed_s < INTERRUPTED_S for changed_s in leftovers(table.directory).values()):
+    # Not one of the future: the wall clock was set back, and does not tell how old it is.
+    if any(0 <= time.time() - changed_s < INTERRUPTED_S for changed_s in leftovers(table.directory).values()):
         trigger.resume()
     return trigger
 
@@ -159,13 +175,14 @@ def recover_leftovers(settings: RecorderSettings, health: Health, begun_s: float
     Args:
         settings: of the recorder.
         health: of the recorder.
-        begun_s: Unix time [s]; what has been written since may be a file that somebody has not locked yet.
+        begun_s: Unix time [s]; what has been written since may be a file that somebody has not locked yet. What is of
+            the future was written before the wall clock was set back, as by a start without a battery for the clock.
     """
     lacking = ""
     remove_interrupted(settings.directory)
     for path, changed_s in leftovers(settings.directory).items():
         try:
-            if changed_s >= begun_s - TICK_S:
+            if begun_s - TICK_S <= changed_s <= time.time() + TICK_S:
                 continue
             _check_recoverable(path, settings)
             report = recover(path)

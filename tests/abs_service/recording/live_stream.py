@@ -32,6 +32,7 @@ class Stream:
         self.health = queue.SimpleQueue()
         self._received, self._ended = "", ""  # boot identities of the newest recorder, and of one that ended
         self._bus.subscribe("health/record", lambda sample: self.health.put(Health.FromString(sample.payload)))
+        self._published = 0
         self._thread = threading.Thread(target=self._run)
 
     def __enter__(self):
@@ -39,9 +40,14 @@ class Stream:
         return self
 
     def __exit__(self, *_):
+        self.end()
+        self._bus.close()
+
+    def end(self):
+        """Publishes nothing more, but stays connected; returns the number of frames."""
         self._stop.set()
         self._thread.join()
-        self._bus.close()
+        return self._published
 
     def track(self):
         """Publishes an estimate of the tracker "sheet"."""
@@ -67,13 +73,12 @@ class Stream:
 
     def _run(self):
         publisher = self._bus.publisher(TOPIC, codec.IMAGE_SCHEMA, IMAGES)
-        seq = 0
         while not self._stop.wait(0.005):
-            t_ns = self._clock.monotonic()
+            t_ns, seq = self._clock.monotonic(), self._published
             frame = Frame("tof", "depth", Kind.DEPTH, self._pixels, "16UC1", t_ns, t_ns, seq, geometry=Geometry.RADIAL)
             header = self._headers.at(t_ns, seq)
             publisher.put(codec.encode_image(frame, self._clock.wall(t_ns)), codec.encode_info(frame, header))
-            seq += 1
+            self._published += 1
 
 
 def frames(path):

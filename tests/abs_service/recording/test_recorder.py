@@ -204,7 +204,7 @@ def test_images_that_never_came_are_said_once_and_counted(tmp_path):
         rig.recorder.report()
         said.append(rig.said)
     rig.recorder.stop(5)
-    assert [one.message for one in said] == ["", "3 images were lost on their way to the recorder", ""]
+    assert [one.message for one in said] == ["", "3 messages were lost on their way to the recorder", ""]
     assert said[-1].counters[f"lost.{DEPTH}"] == 3
 
 

@@ -199,6 +199,23 @@ def test_sigterm_while_frames_come_ends_with_a_complete_file(rig, endpoint, laun
     assert [seq for seq, _ in saved] == list(range(saved[0][0], saved[-1][0] + 1))
 
 
+@pytest.mark.realtime
+def test_what_was_sent_to_a_recorder_that_stood_still_is_recorded_though_it_is_to_end(rig, endpoint, launch):
+    """The last second of a rig was lost without a word, since its recorder ended as soon as it went on."""
+    recorder = launch("record", rig)
+    with Stream(endpoint) as stream:
+        stream.wait_for(is_recording)
+        recorder.send_signal(signal.SIGSTOP)
+        time.sleep(0.8)
+        published = stream.end()
+        recorder.send_signal(signal.SIGTERM)
+        recorder.send_signal(signal.SIGCONT)
+        assert recorder.wait(5) == 0
+    (path,) = rig.parent.glob("kept/*")
+    saved = frames(path)
+    assert [seq for seq, _ in saved] == list(range(saved[0][0], published))
+
+
 def test_a_rig_that_does_not_run_is_explained(rig, launch):
     recorder = launch("record", rig)
     assert recorder.wait(20) == 3

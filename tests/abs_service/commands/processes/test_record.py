@@ -11,6 +11,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from abs_service import config
 from abs_service.bus.health import Health
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.commands.processes import record
@@ -100,6 +101,27 @@ def test_a_file_that_a_recorder_has_made_this_moment_stays(tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.mcap.active", "b.mcap.active"]
     record.recover_leftovers(settings, health, LATER_S)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.mcap.active", "b.mcap.broken"]
+
+
+def test_what_was_left_before_the_wall_clock_was_set_back_is_recovered(tmp_path):
+    """After a power cut, a host without a battery for its clock starts in the past."""
+    RecordingFile(tmp_path / "a.mcap", 0, {}).abandon()
+    later_s = time.time() + 3600
+    os.utime(tmp_path / "a.mcap.active", (later_s, later_s))
+    health = Health(LoopbackBus(), "record", HeaderFactory("demo", WallClock()))
+    record.recover_leftovers(RecorderSettings(tmp_path, "demo", "", minimum_free_bytes=0), health, time.time())
+    assert [path.name for path in tmp_path.iterdir()] == ["a.mcap"]
+
+
+@pytest.mark.parametrize(("age_s", "goes_on"), [(30, True), (90, False), (-90, False)])
+def test_a_recorder_goes_on_with_what_was_interrupted_within_a_minute(tmp_path, age_s, goes_on):
+    RecordingFile(tmp_path / "a.mcap", 0, {}).abandon()
+    changed_s = time.time() - age_s
+    os.utime(tmp_path / "a.mcap.active", (changed_s, changed_s))
+    rig = config.load_default()
+    table = rig.record.model_copy(update={"directory": tmp_path, "when": "requested"})
+    trigger = record.make_trigger(rig.model_copy(update={"record": table}), WallClock())
+    assert bool(trigger.reason) == goes_on
 
 
 def test_what_a_failing_disk_leaves_is_recovered_when_there_is_room_without_another_start(tmp_path, monkeypatch):
