@@ -158,4 +158,4 @@ def _at_points(part: Part) -> NDArray[np.float64]:
     """Sum of the residuals at each point (n,); (0,) for residuals that belong to no points."""
     if not isinstance(part, PointLinearization):
         return np.zeros(0)
-    return np.bincount(part.points, part.residual, len(part.sparse_jacobian.local))
+    return np.bincount(part.points, part.residual, len(part.sparse_jacobian.local)).astype(np.float64)
