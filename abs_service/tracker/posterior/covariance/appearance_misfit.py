@@ -51,7 +51,7 @@ class NoDisplacement:
     """No displacement: the rig has no images of the appearance."""
 
     def variance(self, optimum: Optimum, possible: NDArray[np.float64]) -> NDArray[np.float64]:
-        """What is possible (n,): nothing excludes any of it."""
+        """The possible variance (n,): nothing excludes any of it."""
         return possible
 
 
@@ -64,7 +64,7 @@ class AppearanceMisfit:
         self._minimum_precision = len(mesh.vertices) / (mesh.area * REACH**2)
 
     def variance(self, optimum: Optimum, possible: NDArray[np.float64]) -> NDArray[np.float64]:
-        """What images leave of the possible variance (n,) [m²], and show; samples between the vertices show none."""
+        """The rest of the possible variance (n,) [m²] and that shown; samples between the vertices show none."""
         vertices, n = optimum.linearized.sparse_jacobian, optimum.surface.vertices.shape[2]
         squares, gradient = np.zeros((n, 3, 3)), np.zeros((n, 3, 1))
         for part in optimum.sensed:
