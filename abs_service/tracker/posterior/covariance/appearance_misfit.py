@@ -12,6 +12,10 @@ where L is the distance within which gradients hold. Noise alone makes |d|² as 
 the sum of its diagonal, on average. What |d|² has beyond three deviations of noise is averaged over vertex and
 neighbours, and over the mesh, since a part of it may be plain. The larger of the two is added along either tangent,
 which is twice as much: colours that do not agree at all are outliers, without which d is too short.
+
+Where images show no displacement, they hold the vertices. A mesh that misses the surface may have moved along it by as
+much (`misfit`), with a variance a; but images know its place with the covariance H = (A + 1 / L²)⁻¹. With both, and h
+half the sum of H's diagonal, a h / (a + h) is left of it.
 """
 
 from typing import Protocol
@@ -33,17 +37,22 @@ REACH = 2.0
 class SurfaceDisplacement(Protocol):
     """Displacement of the vertices along the surface that images show."""
 
-    def variance(self, optimum: Optimum) -> NDArray[np.float64]:
-        """Variance (n,) [m²] of the vertices of an estimate, in either direction along the surface."""
+    def variance(self, optimum: Optimum, possible: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Variance (n,) [m²] of the vertices of an estimate, in either direction along the surface.
+
+        Args:
+            optimum: the estimate.
+            possible: variance (n,) [m²] that images may exclude.
+        """
         ...
 
 
 class NoDisplacement:
     """No displacement: the rig has no images of the appearance."""
 
-    def variance(self, optimum: Optimum) -> NDArray[np.float64]:
-        """Zeros (n,)."""
-        return np.zeros(optimum.surface.vertices.shape[2])
+    def variance(self, optimum: Optimum, possible: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The possible variance (n,): nothing excludes any of it."""
+        return possible
 
 
 class AppearanceMisfit:
@@ -54,18 +63,19 @@ class AppearanceMisfit:
         self._around = self._mean @ self._mean  # within two edges
         self._minimum_precision = len(mesh.vertices) / (mesh.area * REACH**2)
 
-    def variance(self, optimum: Optimum) -> NDArray[np.float64]:
-        """Variance (n,) [m²] of the vertices of an estimate; samples between the vertices show none."""
+    def variance(self, optimum: Optimum, possible: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The rest of the possible variance (n,) [m²] and that shown; samples between the vertices show none."""
         vertices, n = optimum.linearized.sparse_jacobian, optimum.surface.vertices.shape[2]
         squares, gradient = np.zeros((n, 3, 3)), np.zeros((n, 3, 1))
         for part in optimum.sensed:
             if isinstance(part, PointLinearization) and part.sparse_jacobian is vertices:
                 chain_rule.sum_squares(part.rows, part.points, np.ones(len(part.points)), squares)
                 chain_rule.sum_at_points(part.rows, part.points, part.residual[:, None], gradient)
-        excess, around = np.empty(n), (self._around.indptr, self._around.indices)
-        beyond_noise(*around, squares, gradient, optimum.surface.normals[0], self._minimum_precision, excess)
+        (excess, held), around = np.empty((2, n)), (self._around.indptr, self._around.indices)
+        normals = optimum.surface.normals[0]
+        beyond_noise(*around, squares, gradient, normals, self._minimum_precision, excess, held)
         np.maximum(excess, 0.0, out=excess)
-        return np.maximum(ring_means(self._mean, excess), excess.mean())
+        return possible * held / (possible + held) + np.maximum(ring_means(self._mean, excess), excess.mean())
 
 
 @kernel
@@ -77,15 +87,16 @@ def beyond_noise(
     normals: NDArray[np.float32],
     minimum_precision: float,
     excess: NDArray[np.float64],
+    held: NDArray[np.float64],
 ) -> None:
-    """|d|² beyond `INLIER_DEVIATIONS` of noise (n,) [m²], into `excess`; negative where there is none.
+    """|d|² beyond `INLIER_DEVIATIONS` of noise (n,) [m²], into `excess`, negative where there is none; h into `held`.
 
     Args:
         start, around: first place (n + 1,) of every vertex in the list of those around it, itself included (k,).
         squares, gradient: JᵀJ (n, 3, 3) [1/m²] and Jᵀr (n, 3, 1) [1/m] of every vertex.
         normals: of the surface (3, n).
         minimum_precision: 1 / L² [1/m²].
-        excess: result.
+        excess, held: results (n,) [m²].
     """
     for v in range(excess.size):
         x, y, z = np.float64(normals[0, v]), np.float64(normals[1, v]), np.float64(normals[2, v])
@@ -112,6 +123,7 @@ def beyond_noise(
             f += tx * force[0, 0] + ty * force[1, 0] + tz * force[2, 0]
             g += ux * force[0, 0] + uy * force[1, 0] + uz * force[2, 0]
         determinant = a * c - b * b
+        held[v] = 0.5 * (a + c) / determinant
         one, other = c * f - b * g, a * g - b * f
         # With G = (A + 1 / L²)⁻¹, the trace of G A G is that of G − G² / L².
         noise = (a + c) / determinant - minimum_precision * (a * a + 2 * b * b + c * c) / determinant**2

@@ -3,10 +3,12 @@
 A model of few parameters cannot follow every shape. Its covariance does not know: at the optimum, what its parameters
 can do balances the residuals, and outliers have no part in it. Where it misses the shape, neighbouring vertices miss it
 to the same side; noise and an outlier of the sensor stand alone. So the signed distances are averaged over each vertex
-and its neighbours. What the squares of these means have beyond three of their deviations by noise, averaged once more,
-is added to the covariance of the vertices in all directions. With a noisy sensor a ring of neighbours shows little, and
-all of them together more: the mean square of what no single ring tells from noise is added if all of a frame tell it.
-What a frame does not tell, the mean over the last frames does: else the covariance would collapse in single ones.
+and its neighbours. Pixels between object and background are off by many deviations, and far more than what surrounds
+them: they are left out. What the squares of these means have beyond three of their deviations by noise, averaged once
+more, is added to the covariance of the vertices in all directions. With a noisy sensor a ring of neighbours shows
+little, and all of them together more: the mean square of what no single ring tells from noise is added if all of a
+frame tell it. What a frame does not tell, the mean over the last frames does: else the covariance would collapse in
+single ones.
 
 Across the surface, this ends with the frame in which distances agree again. Along it, all of the mesh may have moved
 while a part of it missed: it goes with wrinkles that wander, and stays where one of two things that touched each other
@@ -24,6 +26,10 @@ from calib.jit import kernel
 #: Share of the vertices that miss the measurements up to which the mesh cannot have moved along itself.
 HARDLY_ANY = 0.1
 
+#: An outlier that its neighbours do not confirm is off by more than so many deviations. By noise alone, one of 16,000
+#: distances is, which takes a thousandth from their variance; beyond three deviations lie three hundredths of it.
+SINGLE_DEVIATIONS = 4.0
+
 #: Weight of a new frame in the running means: of the misfit along the surface if that of the frame, which may be alone,
 #: is larger, and of what a single frame does not tell; and if it is smaller, so that half is left after 14 frames.
 RISE, FALL = 0.2, 0.05
@@ -34,18 +40,22 @@ class Misfit:
 
     def __init__(self, mesh: Mesh):
         self._common = CommonDistance(mesh)
+        self._neighbours = np.diff(self._common.mean.indptr) - 1
         self._along = self._unnoticed = 0.0
 
     def update(
-        self, distance: NDArray[np.float64], deviation: NDArray[np.float64]
+        self, distance: NDArray[np.float64], deviation: NDArray[np.float64], of_mesh: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Variances across the surface and along it, each (n,) [m²], after another frame.
 
         Args:
             distance: signed distances of the vertices from their measurements (n,) [m].
-            deviation: of independent noise of these (n,) [m].
+            deviation: of independent noise of these (n,) [m], 0 of those without noise.
+            of_mesh: variance (n,) [m²] of the vertices' own errors, which are in their covariance already.
         """
-        excess, unnoticed, is_certain = self._common.excess_and_unnoticed(distance, deviation**2)
+        noise = np.where(deviation > 0, deviation**2 + of_mesh, 0.0)
+        shared = self._without_single(distance, np.sqrt(noise))
+        excess, unnoticed, is_certain = self._common.excess_and_unnoticed(shared, noise)
         self._unnoticed += RISE * (unnoticed - self._unnoticed)
         across = ring_means(self._common.mean, excess) + max(self._unnoticed, unnoticed if is_certain else 0.0)
         if np.count_nonzero(excess) > HARDLY_ANY * len(excess):
@@ -54,6 +64,17 @@ class Misfit:
         else:
             self._along = 0.0
         return across, np.maximum(across, self._along)
+
+    def _without_single(self, distance: NDArray[np.float64], deviation: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Distances (n,) [m], of which outliers that their neighbours do not confirm are replaced by these' mean."""
+        mean, limit = self._common.mean, SINGLE_DEVIATIONS * deviation
+        around = (ring_means(mean, distance) * (self._neighbours + 1) - distance) / np.maximum(self._neighbours, 1)
+        is_single = (deviation > 0) & (np.abs(distance) > limit) & (np.abs(distance - around) > limit)
+        if not is_single.any():
+            return distance
+        others = np.where(is_single, 0.0, distance)
+        known = ring_means(mean, (~is_single).astype(np.float64))
+        return np.where(is_single, ring_means(mean, others) / np.maximum(known, np.finfo(float).tiny), distance)
 
 
 class CommonDistance:

@@ -38,20 +38,31 @@ def leverages(inverse: NDArray[np.float64], sensed: Sensed) -> PerResidual:
     ]
 
 
-def gradient_covariance(
-    priors: NDArray[np.float64], sensed: Sensed, leverage: PerResidual, effects: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Covariance (dim, dim) of the gradient: B = Jᵀ diag(D r² / (1 − h)) J + P.
+def variances(sensed: Sensed, leverage: PerResidual, effects: NDArray[np.float64]) -> PerResidual:
+    """Variance v = D r² / (1 − h) of every residual, with what it shares with its neighbours.
 
     Args:
-        priors: P (dim, dim).
-        sensed: r and J of the sensors.
+        sensed: r of the sensors.
         leverage: h.
         effects: design effect D (sources,) of the residuals of every source, see `design_effect`.
     """
-    result, each = priors.copy(), zip(sensed, leverage, effects)
-    weights = [source.residual**2 * (effect / np.maximum(1 - h, MIN_KEPT)) for source, h, effect in each]
-    add_squares(sensed, weights, result)
+    each = zip(sensed, leverage, effects)
+    return [source.residual**2 * (effect / np.maximum(1 - h, MIN_KEPT)) for source, h, effect in each]
+
+
+def gradient_covariance(
+    priors: NDArray[np.float64], sensed: Sensed, variance: PerResidual, shares: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Covariance (dim, dim) of the gradient: B = Jᵀ diag(v) J + P, or that of shares of the errors.
+
+    Args:
+        priors: P (dim, dim), or the part.
+        sensed: J of the sensors.
+        variance: v.
+        shares: of the errors of every source (sources,).
+    """
+    result = priors.copy()
+    add_squares(sensed, [own * share for own, share in zip(variance, shares)], result)
     return result
 
 

@@ -5,10 +5,21 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.models.base import DeformationModel
 from abs_service.tracker.posterior.covariance.design_effect import DesignEffects
-from abs_service.tracker.posterior.covariance.error_propagation import ErrorPropagation, FrameErrors, Motion
+from abs_service.tracker.posterior.covariance.error_propagation import (
+    LASTING,
+    ErrorPropagation,
+    FrameErrors,
+    LastingShares,
+    Motion,
+)
 from abs_service.tracker.posterior.covariance.observability import held_back, unobserved_motion
 from abs_service.tracker.posterior.covariance.registration_error import registration_covariance
-from abs_service.tracker.posterior.covariance.sandwich import gradient_covariance, leverages, shared_covariance
+from abs_service.tracker.posterior.covariance.sandwich import (
+    gradient_covariance,
+    leverages,
+    shared_covariance,
+    variances,
+)
 from abs_service.tracker.posterior.optimum import Optimum
 from abs_service.tracker.posterior.priors.motion_prediction import MotionPrediction
 from abs_service.tracker.posterior.priors.motion_prior import RecentMotion
@@ -23,7 +34,7 @@ class ThetaCovariance:
     """
 
     def __init__(self, model: DeformationModel, registration_m: float):
-        self._effects = DesignEffects(model.mesh)
+        self._effects, self._lasting = DesignEffects(model.mesh), LastingShares()
         self._errors = ErrorPropagation(registration_covariance(model, registration_m))
 
     def restart(self, covariance: NDArray[np.float64]) -> None:
@@ -32,14 +43,16 @@ class ThetaCovariance:
 
     def update(self, optimum: Optimum, prediction: MotionPrediction, recent: RecentMotion) -> NDArray[np.float64]:
         """Covariance (dim, dim) of the estimate of a frame."""
-        inverse, linearized, sensed = optimum.inverse_curvature, optimum.linearized, optimum.sensed
-        leverage = leverages(inverse, sensed)
-        effects = self._effects.update(inverse, sensed, leverage)
+        inverse, sensed, precision = optimum.inverse_curvature, optimum.sensed, prediction.precision
+        leverage, priors = leverages(inverse, sensed), optimum.linearized.priors - precision
+        variance = variances(sensed, leverage, self._effects.update(inverse, sensed, leverage))
+        lasting = self._lasting.update(sensed)
         errors = FrameErrors(
             inverse=inverse,
-            precision=prediction.precision,
-            gradient=gradient_covariance(linearized.priors, sensed, leverage, effects),
-            shared=shared_covariance(sensed, len(optimum.theta)),
+            precision=precision,
+            own=gradient_covariance((1 - LASTING) * priors, sensed, variance, 1 - lasting),
+            lasting=gradient_covariance(LASTING * priors, sensed, variance, lasting)
+            + shared_covariance(sensed, len(optimum.theta)),
         )
         unobserved = unobserved_motion(recent.unmeasured, optimum, prediction)
         covariance = self._errors.update(Motion(recent.unpredicted, unobserved, prediction.persistence), errors)

@@ -60,8 +60,9 @@ class VertexCovariance:
         self._began = True
         along_surface = propagated(near.sparse_jacobian, theta_covariance) + self._parallax.covariance(optimum, frame)
         covariance = along_surface + self._slide.beyond(optimum.surface, along_surface)
-        across, along = self._misfit.update(*frame.misfit(optimum.surface))
-        along = along + self._displacement.variance(optimum)
+        distance, deviation = frame.misfit(optimum.surface)
+        across, along = self._misfit.update(distance, deviation, self._mesh_noise.variance)
+        along = self._displacement.variance(optimum, along)
         add_errors(optimum.surface.normals[0], across + self._mesh_noise.variance, along, covariance)
         return covariance
 

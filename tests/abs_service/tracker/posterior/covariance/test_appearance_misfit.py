@@ -53,9 +53,9 @@ class Found:
         return PointLinearization(residual, rows, points, self.sparse_jacobian, MESH.vertices)
 
 
-def variance(*residuals: Any) -> np.ndarray:
+def variance(*residuals: Any, possible: float = 0.0) -> np.ndarray:
     found: Any = Found(list(residuals))
-    return AppearanceMisfit(MESH).variance(found)
+    return AppearanceMisfit(MESH).variance(found, np.full(N, possible))
 
 
 def test_vertices_beside_their_material_are_off_by_as_much():
@@ -87,7 +87,16 @@ def test_what_is_sampled_elsewhere_says_nothing_of_the_vertices():
     other = Linearization(np.ones(3), np.ones((3, 1)))
     assert not variance(other).any()
     found: Any = Found([])
-    assert not NoDisplacement().variance(found).any()
+    np.testing.assert_array_equal(NoDisplacement().variance(found, np.full(N, 3.0)), 3.0)
+
+
+def test_images_that_agree_leave_no_more_of_a_misfit_than_they_know_of_the_vertices():
+    """Of a vertex inside the mesh, eighteen others within two edges tell as much as it does."""
+    left = variance((ALONG, 0.0, 0.0), possible=4e-6).reshape(13, 17)
+    assert left[6, 8] == pytest.approx(1 / (1 / 4e-6 + 19 / SIGMA**2), rel=0.05)
+    np.testing.assert_allclose(variance((ACROSS, 0.0, 0.0), possible=4e-6), 4e-6, rtol=0.05)
+    shown = variance((ALONG, BESIDE, 0.0), possible=4e-6)
+    np.testing.assert_allclose(shown, 5e-6, rtol=0.05)
 
 
 @given(st.integers(0, 2**32 - 1))
@@ -97,14 +106,14 @@ def test_the_displacement_is_that_of_plain_matrices(seed):
     squares, normals = roots @ roots.transpose(0, 2, 1), generator.standard_normal((n, 3)).astype(np.float32)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     around = [np.unique([v, *generator.integers(0, n, 3)]) for v in range(n)]
-    start, found = np.cumsum([0, *map(len, around)]).astype(np.int32), np.empty(n)
-    beyond_noise(
-        start, np.concatenate(around).astype(np.int32), squares, gradient[..., None], normals.T.copy(), least, found
-    )
+    start, (found, held) = np.cumsum([0, *map(len, around)]).astype(np.int32), np.empty((2, n))
+    places = start, np.concatenate(around).astype(np.int32)
+    beyond_noise(*places, squares, gradient[..., None], normals.T.copy(), least, found, held)
     for v, ring in enumerate(around):
         tangents = np.linalg.svd(normals[v : v + 1].astype(np.float64))[2][1:]
         information = tangents @ squares[ring].sum(axis=0) @ tangents.T
         inverse = np.linalg.inv(information + least * np.eye(2))
         displacement = -inverse @ tangents @ gradient[ring].sum(axis=0)
         expected = displacement @ displacement - 9 * np.trace(inverse @ information @ inverse)
+        np.testing.assert_allclose(held[v], np.trace(inverse) / 2, rtol=1e-4)
         np.testing.assert_allclose(found[v], expected, rtol=1e-4, atol=1e-5)  # normals are of single precision

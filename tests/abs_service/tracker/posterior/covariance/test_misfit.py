@@ -17,10 +17,13 @@ MESH = sheet(21, 31)
 N = len(MESH.vertices)
 EXACT, SIGMA = np.zeros(N), np.full(N, 1e-3)
 
+#: A mesh without noise.
+NONE = np.zeros(N)
+
 
 def variance(distance: NDArray[np.float64], deviation: NDArray[np.float64]) -> NDArray[np.float64]:
     """Variance (n,) [m²] across the surface, which is not larger than that along it."""
-    across, along = Misfit(MESH).update(distance, deviation)
+    across, along = Misfit(MESH).update(distance, deviation, NONE)
     assert np.all(across <= along)
     return across
 
@@ -61,6 +64,18 @@ def test_what_no_ring_tells_from_noise_all_of_them_do(seed):
     assert shown == pytest.approx(np.mean(wave**2), rel=0.4)
 
 
+def test_outliers_that_stand_alone_have_no_part_and_neighbours_that_share_theirs_have():
+    """A pixel in twenty lies between object and background, 30 mm behind; or all of three rows do."""
+    generator = np.random.default_rng(4)
+    noise, single = generator.normal(0, SIGMA), generator.permutation(N)[: N // 20]
+    between = noise.copy()
+    between[single] = 30e-3
+    assert np.mean(variance(between, SIGMA)) < 0.2 * np.mean(SIGMA**2)
+    row = noise.reshape(21, 31).copy()
+    row[9:12] = 30e-3
+    assert variance(row.ravel(), SIGMA).reshape(21, 31)[10].mean() > 0.3 * 30e-3**2
+
+
 def test_what_a_single_frame_does_not_tell_the_mean_over_frames_does():
     """A misfit of half the noise of a ring: without the frames before, its covariance would come and go."""
     generator, wave = np.random.default_rng(3), 2.5e-4 * np.sin(np.linspace(0, 12, 21))
@@ -68,16 +83,30 @@ def test_what_a_single_frame_does_not_tell_the_mean_over_frames_does():
     by_noise = Misfit(MESH)
     for k in range(40):
         drawn = generator.normal(0, SIGMA)
-        shown[k] = np.mean(misfit.update(drawn + np.repeat(wave, 31), SIGMA)[0])
-        noise[k] = np.mean(by_noise.update(drawn, SIGMA)[0])
+        shown[k] = np.mean(misfit.update(drawn + np.repeat(wave, 31), SIGMA, NONE)[0])
+        noise[k] = np.mean(by_noise.update(drawn, SIGMA, NONE)[0])
     assert np.all(shown[10:] > 0.3 * np.mean(wave**2))
     assert np.mean(noise) < 0.3 * np.mean(wave**2)
+
+
+def test_noise_of_the_mesh_is_no_misfit():
+    """Vertices keep half as much noise as a distance has, in all frames; their own covariance has it."""
+    generator, own = np.random.default_rng(5), np.random.default_rng(6).normal(0, 0.5 * SIGMA)
+    known, unknown, shown = Misfit(MESH), Misfit(MESH), np.zeros((2, 30))
+    for k in range(30):
+        distance = own + generator.normal(0, SIGMA)
+        shown[0, k] = np.mean(known.update(distance, SIGMA, 0.25 * SIGMA**2)[0])
+        shown[1, k] = np.mean(unknown.update(distance, SIGMA, NONE)[0])
+    before, now = np.mean(shown[::-1, 10:], axis=1)
+    assert now < 0.2 * before
 
 
 def frames(*shares: float) -> NDArray[np.float64]:
     """Variances across the surface and along it (frames, 2) [m²], means over the mesh of which such shares are off."""
     misfit, by_place = Misfit(MESH), np.arange(N) / N
-    return np.array([np.mean(misfit.update(np.where(by_place < share, 2e-3, 0), EXACT), axis=1) for share in shares])
+    return np.array(
+        [np.mean(misfit.update(np.where(by_place < share, 2e-3, 0), EXACT, NONE), axis=1) for share in shares]
+    )
 
 
 def test_a_lasting_misfit_of_the_mesh_fades_along_the_surface_and_ends_across_it_at_once():
@@ -91,7 +120,7 @@ def test_a_lasting_misfit_of_the_mesh_fades_along_the_surface_and_ends_across_it
 def test_a_lasting_misfit_of_a_part_of_the_mesh_counts_along_all_of_it():
     """Two blocks side by side, of which one moves off: the table shows where it was."""
     misfit, off = Misfit(MESH), np.where(np.arange(N) < 0.15 * N, 2e-3, 0)
-    across, along = [misfit.update(off, EXACT) for _ in range(20)][-1]
+    across, along = [misfit.update(off, EXACT, NONE) for _ in range(20)][-1]
     assert across[-1] == 0
     assert np.all(along > 0.7 * 0.15 * 4e-6)
 
@@ -104,8 +133,8 @@ def test_nothing_lasts_once_hardly_any_vertex_misses(shares):
 
 def test_a_single_frame_counts_for_a_fifth():
     misfit = Misfit(MESH)
-    misfit.update(np.full(N, 2e-3), EXACT)
-    across, along = misfit.update(np.where(np.arange(N) < 0.15 * N, 2e-3, 0), EXACT)
+    misfit.update(np.full(N, 2e-3), EXACT, NONE)
+    across, along = misfit.update(np.where(np.arange(N) < 0.15 * N, 2e-3, 0), EXACT, NONE)
     assert along[-1] == pytest.approx((0.95 * 0.2 + 0.05 * np.mean(across) / 4e-6) * 4e-6)
 
 

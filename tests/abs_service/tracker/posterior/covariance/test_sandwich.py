@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from abs_service.tracker.posterior.covariance.sandwich import gradient_covariance, leverages
+from abs_service.tracker.posterior.covariance.sandwich import gradient_covariance, leverages, variances
 from abs_service.tracker.terms.linearization import Linearization
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -14,8 +14,8 @@ SEEDS = st.integers(0, 2**32 - 1)
 def sandwich(inverse: np.ndarray, residual: np.ndarray, rows: np.ndarray) -> np.ndarray:
     """Covariance of the solutions, of independent residuals."""
     curvature, sensed = np.asarray(np.linalg.inv(inverse), np.float64), [Linearization(residual, rows)]
-    leverage = leverages(inverse, sensed)
-    return inverse @ gradient_covariance(curvature - rows.T @ rows, sensed, leverage, np.ones(1)) @ inverse
+    variance = variances(sensed, leverages(inverse, sensed), np.ones(1))
+    return inverse @ gradient_covariance(curvature - rows.T @ rows, sensed, variance, np.ones(1)) @ inverse
 
 
 @given(SEEDS)
