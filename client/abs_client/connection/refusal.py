@@ -1,4 +1,4 @@
-"""Why a router that is there is not reached: only one side speaks TLS, or one refuses the certificate of the other."""
+"""Reasons for which a router is not reached though it is there: TLS on one side only, certificates that are refused."""
 
 import socket
 import ssl
@@ -10,7 +10,7 @@ ANSWER_S = 2.0
 
 
 def reason(endpoint: str, tls: Tls | None) -> str:
-    """What stands between this program and what listens at an endpoint; "" if that is unknown.
+    """Obstacle between this program and the router at an endpoint; "" if unknown.
 
     Connects once more, since zenoh says only that there is no answer.
     """
@@ -54,7 +54,7 @@ def _context(tls: Tls | None) -> ssl.SSLContext:
 
 
 def _answer(link: ssl.SSLSocket, protocol: str, tls: Tls | None) -> str:
-    """What a router says that speaks TLS: it judges the certificate after the handshake."""
+    """Answer of a router that speaks TLS: it judges the certificate after the handshake."""
     if protocol == "tcp" or tls is None:
         return "TLS is spoken there: give an endpoint tls/… and the certificates of a Tls"
     try:

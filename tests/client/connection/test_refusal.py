@@ -1,4 +1,4 @@
-"""What keeps a client from a router that is there is told: TLS on one side only, and certificates of another lab."""
+"""Obstacles between a client and a router are told: TLS on one side only, and certificates of another lab."""
 
 import pytest
 from abs_client import Rig, Tls, UnreachableError
