@@ -86,7 +86,7 @@ def with_mesh(identity: Identity, mesh: Mesh, version: int, derived: Mapping[str
 
 def state(header: common_pb2.Header, estimate: Estimate, identity: Identity, effort: Effort) -> State:
     """An estimate as a message."""
-    message = State(
+    return State(
         header=header,
         tracker=identity.tracker,
         status=f"STATUS_{estimate.status}",
@@ -109,6 +109,7 @@ def state(header: common_pb2.Header, estimate: Estimate, identity: Identity, eff
         skipped=effort.skipped,
         mesh_version=identity.mesh_version,
         inlier_share=estimate.inlier_share,
+        covariance=estimate.covariance.ravel()[_upper_of(len(estimate.theta))].tolist(),
         covariance_valid=_is_known(estimate),
         samples=sum(fit.samples for fit in estimate.fits),
         clock_sigma_ns=max((source.t_sigma_ns for source in estimate.sources.values()), default=0),
@@ -119,21 +120,6 @@ def state(header: common_pb2.Header, estimate: Estimate, identity: Identity, eff
         warnings=estimate.warnings,
         derived={key: NumberList(values=numbers) for key, numbers in identity.derived.items()},
     )
-    upper = estimate.covariance.ravel()[_upper_of(len(estimate.theta))]
-    message.MergeFromString(_encoded(State.COVARIANCE_FIELD_NUMBER, upper))
-    return message
-
-
-def _encoded(field: int, values: NDArray[np.float64]) -> bytes:
-    """A repeated field of floats as protobuf packs it: thousands of them, in a twentieth of the time of a list."""
-    content = values.astype("<f4").tobytes()
-    return _varint(field << 3 | 2) + _varint(len(content)) + content
-
-
-def _varint(number: int) -> bytes:
-    """A number as protobuf encodes it: groups of seven bits, the lowest first, all but the last with a bit more."""
-    groups = [number >> shift & 0x7F for shift in range(0, max(number.bit_length(), 1), 7)]
-    return bytes([*(group | 0x80 for group in groups[:-1]), groups[-1]])
 
 
 def _sensors(estimate: Estimate, dropped: Mapping[str, int]) -> Iterator[State.Sensor]:
