@@ -20,9 +20,10 @@ from abs_service.tracker.posterior.covariance.sandwich import (
     shared_covariance,
     variances,
 )
+from abs_service.tracker.posterior.frame_posterior import FramePosterior
 from abs_service.tracker.posterior.optimum import Optimum
-from abs_service.tracker.posterior.priors.motion_prediction import MotionPrediction
 from abs_service.tracker.posterior.priors.motion_prior import RecentMotion
+from abs_service.tracker.posterior.priors.stretch_evidence import StretchEvidence
 
 
 class ThetaCovariance:
@@ -34,15 +35,16 @@ class ThetaCovariance:
     """
 
     def __init__(self, model: DeformationModel, registration_m: float):
-        self._effects, self._lasting = DesignEffects(model.mesh), LastingShares()
+        self._effects, self._lasting, self._stretch = DesignEffects(model.mesh), LastingShares(), StretchEvidence()
         self._errors = ErrorPropagation(registration_covariance(model, registration_m))
 
     def restart(self, covariance: NDArray[np.float64]) -> None:
         """Restarts with errors of a covariance (dim, dim), after a relocation."""
         self._errors.restart(covariance)
 
-    def update(self, optimum: Optimum, prediction: MotionPrediction, recent: RecentMotion) -> NDArray[np.float64]:
+    def update(self, optimum: Optimum, frame: FramePosterior, recent: RecentMotion) -> NDArray[np.float64]:
         """Covariance (dim, dim) of the estimate of a frame."""
+        prediction = frame.motion
         inverse, sensed, precision = optimum.inverse_curvature, optimum.sensed, prediction.precision
         leverage, priors = leverages(inverse, sensed), optimum.linearized.priors - precision
         variance = variances(sensed, leverage, self._effects.update(inverse, sensed, leverage))
@@ -52,7 +54,8 @@ class ThetaCovariance:
             precision=precision,
             own=gradient_covariance((1 - LASTING) * priors, sensed, variance, 1 - lasting),
             lasting=gradient_covariance(LASTING * priors, sensed, variance, lasting)
-            + shared_covariance(sensed, len(optimum.theta)),
+            + shared_covariance(sensed, len(optimum.theta))
+            + self._stretch.excess(optimum, frame),
         )
         unobserved = unobserved_motion(recent.unmeasured, optimum, prediction)
         covariance = self._errors.update(Motion(recent.unpredicted, unobserved, prediction.persistence), errors)

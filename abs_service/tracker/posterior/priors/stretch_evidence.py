@@ -1,0 +1,57 @@
+"""Evidence for the scale of the stretch prior: a surface may stretch by far more than `priors.stretch` says.
+
+What measurements force a mesh to stretch by tells how far it may have stretched where none of them shows it. Let E be
+the sum of the edges' squared normalised length changes at an optimum. A prior whose deviation is s times that of the
+setting has most evidence at
+
+    s² = E(s) / γ(s),    γ(s) = tr(X N),    X = (N + H / s²)⁻¹
+
+(MacKay, Bayesian interpolation, Neural Computation 4, 1992) with the information N of the measurements and the curvature
+H of the prior as it is set; γ is the number of directions that measurements determine. The estimate keeps that prior.
+To first order X g (1 − 1 / s²) leads from it to the optimum under the other one, g being the prior's gradient.
+
+The gradient of the prior at the true Θ has the covariance s² H then, instead of H (`sandwich`). It is the same in all
+frames, as the stretch that causes it lasts.
+
+s is not below one: a sheet of rubber that nothing has stretched yet looks like paper.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.tracker.posterior.curvature import Quadratic, posterior_covariance
+from abs_service.tracker.posterior.frame_posterior import FramePosterior
+from abs_service.tracker.posterior.optimum import Optimum
+
+#: The prior as it is set holds while E is within so many deviations of what it is by chance, χ² of γ directions.
+CERTAIN = 3.0
+
+#: Deviation of an edge's relative change of length that is not exceeded: rubber's.
+MAX_DEVIATION = 0.2
+
+#: N is not less than what a second without measurements would leave of a place [s].
+UNSEEN_S = 1.0
+
+
+class StretchEvidence:
+    """The scale of most evidence over time; every frame takes one step towards it."""
+
+    def __init__(self) -> None:
+        self._square = 1.0  # s²
+
+    def excess(self, optimum: Optimum, frame: FramePosterior) -> NDArray[np.float64]:
+        """What the covariance of the prior's gradient has beyond H: (s² − 1) H (dim, dim), or zero (1, 1)."""
+        near, energy = optimum.linearized, 2 * float(frame.stretch.cost(optimum.surface)[0])
+        # With the motion prior, which the curvature has in it already, no more directions are determined than without.
+        determined = max(len(optimum.theta) - float(np.vdot(optimum.inverse_curvature, near.priors)), 0.0)
+        if energy <= determined + CERTAIN * np.sqrt(2 * determined):
+            self._square = 1.0
+            return np.zeros((1, 1))
+        stretch = frame.stretched(optimum.theta)
+        known = near.quadratic.curvature - near.priors + frame.motion.unseen_precision(UNSEEN_S)
+        inverse = posterior_covariance(Quadratic(stretch.gradient, known + stretch.curvature / self._square))
+        step = inverse @ stretch.gradient * (1 - 1 / self._square)
+        energy += float(step @ (2 * stretch.gradient + stretch.curvature @ step))
+        widest = max(MAX_DEVIATION / frame.stretch.deviation, 1.0)
+        self._square = float(np.clip(energy / np.vdot(inverse, known), 1.0, widest**2))
+        return (self._square - 1) * stretch.curvature
