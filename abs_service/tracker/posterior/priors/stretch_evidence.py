@@ -29,12 +29,15 @@ CERTAIN = 3.0
 #: Deviation of an edge's relative change of length that is not exceeded: rubber's.
 MAX_DEVIATION = 0.2
 
+#: Steps towards the scale of most evidence in every frame: a fixed point that many of them approach.
+STEPS = 4
+
 #: N is not less than what a second without measurements would leave of a place [s].
 UNSEEN_S = 1.0
 
 
 class StretchEvidence:
-    """The scale of most evidence over time; every frame takes one step towards it."""
+    """The scale of most evidence, approached from frame to frame."""
 
     def __init__(self) -> None:
         self._square = 1.0  # s²
@@ -42,16 +45,16 @@ class StretchEvidence:
     def excess(self, optimum: Optimum, frame: FramePosterior) -> NDArray[np.float64]:
         """What the covariance of the prior's gradient has beyond H: (s² − 1) H (dim, dim), or zero (1, 1)."""
         near, energy = optimum.linearized, 2 * float(frame.stretch.cost(optimum.surface)[0])
-        # With the motion prior, which the curvature has in it already, no more directions are determined than without.
+        # The curvature has the motion prior in it: without that, no fewer directions are determined.
         determined = max(len(optimum.theta) - float(np.vdot(optimum.inverse_curvature, near.priors)), 0.0)
         if energy <= determined + CERTAIN * np.sqrt(2 * determined):
             self._square = 1.0
             return np.zeros((1, 1))
-        stretch = frame.stretched(optimum.theta)
+        stretch, widest = frame.stretched(optimum.theta), max(MAX_DEVIATION / frame.stretch.deviation, 1.0)
         known = near.quadratic.curvature - near.priors + frame.motion.unseen_precision(UNSEEN_S)
-        inverse = posterior_covariance(Quadratic(stretch.gradient, known + stretch.curvature / self._square))
-        step = inverse @ stretch.gradient * (1 - 1 / self._square)
-        energy += float(step @ (2 * stretch.gradient + stretch.curvature @ step))
-        widest = max(MAX_DEVIATION / frame.stretch.deviation, 1.0)
-        self._square = float(np.clip(energy / np.vdot(inverse, known), 1.0, widest**2))
+        for _ in range(STEPS):
+            inverse = posterior_covariance(Quadratic(stretch.gradient, known + stretch.curvature / self._square))
+            step = inverse @ stretch.gradient * (1 - 1 / self._square)
+            there = energy + float(step @ (2 * stretch.gradient + stretch.curvature @ step))
+            self._square = float(np.clip(there / np.vdot(inverse, known), 1.0, widest**2))
         return (self._square - 1) * stretch.curvature
