@@ -23,7 +23,7 @@ from abs_service.tracker.posterior.covariance.sandwich import (
 from abs_service.tracker.posterior.frame_posterior import FramePosterior
 from abs_service.tracker.posterior.optimum import Optimum
 from abs_service.tracker.posterior.priors.motion_prior import RecentMotion
-from abs_service.tracker.posterior.priors.stretch_evidence import StretchEvidence
+from abs_service.tracker.posterior.stretch_evidence import StretchEvidence
 
 
 class ThetaCovariance:

@@ -6,12 +6,13 @@ setting has most evidence at
 
     s² = E(s) / γ(s),    γ(s) = tr(X N),    X = (N + H / s²)⁻¹
 
-(MacKay, Bayesian interpolation, Neural Computation 4, 1992) with the information N of the measurements and the curvature
-H of the prior as it is set; γ is the number of directions that measurements determine. The estimate keeps that prior.
-To first order X g (1 − 1 / s²) leads from it to the optimum under the other one, g being the prior's gradient.
+(MacKay, Bayesian interpolation, Neural Computation 4, 1992) with the information N of the measurements and the
+curvature H of the prior as it is set; γ is the number of directions that measurements determine. The estimate keeps
+that prior. To first order X g (1 − 1 / s²) leads from it to the optimum under the other one, g being the gradient of
+the prior.
 
-The gradient of the prior at the true Θ has the covariance s² H then, instead of H (`sandwich`). It is the same in all
-frames, as the stretch that causes it lasts.
+The gradient of the prior at the true Θ has the covariance s² H then, instead of H (`sandwich`). Its excess is the same
+in all frames, as the stretch that causes it lasts.
 
 s is not below one: a sheet of rubber that nothing has stretched yet looks like paper.
 """
