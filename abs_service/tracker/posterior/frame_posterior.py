@@ -63,10 +63,6 @@ class FramePosterior:
         surface, sparse_jacobian = self.surfaces.with_jacobian(theta)
         return self._priors(surface, sparse_jacobian, theta)
 
-    def stretched(self, theta: NDArray[np.float64]) -> Quadratic:
-        """Gauss–Newton approximation of the stretch prior alone near theta (dim,)."""
-        return gauss_newton(self.stretch.linearize(*self.surfaces.with_jacobian(theta)), self.dimension)
-
     def cross_curvature(self, theta: NDArray[np.float64], offsets: NDArray[np.float64]) -> NDArray[np.float64]:
         """JᵀJE (dim, n) at theta (dim,): derivatives with respect to theta, and to an offset (n, 3) [m] per vertex."""
         (surface, sparse_jacobian), each = self.surfaces.with_jacobian(theta), np.arange(len(offsets))

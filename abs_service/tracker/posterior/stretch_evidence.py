@@ -20,7 +20,7 @@ s is not below one: a sheet of rubber that nothing has stretched yet looks like 
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.posterior.curvature import Quadratic, posterior_covariance
+from abs_service.tracker.posterior.curvature import Quadratic, gauss_newton, posterior_covariance
 from abs_service.tracker.posterior.frame_posterior import FramePosterior
 from abs_service.tracker.posterior.optimum import Optimum
 
@@ -30,8 +30,9 @@ CERTAIN = 3.0
 #: Deviation of an edge's relative change of length that is not exceeded: rubber's.
 MAX_DEVIATION = 0.2
 
-#: Steps towards the scale of most evidence in every frame: a fixed point that many of them approach.
-STEPS = 4
+#: Most steps of a frame towards the scale of most evidence, a fixed point that many of them approach, and relative
+#: change of s² that is no step.
+STEPS, MIN_CHANGE = 4, 0.05
 
 #: N is not less than what a second without measurements would leave of a place [s].
 UNSEEN_S = 1.0
@@ -51,11 +52,14 @@ class StretchEvidence:
         if energy <= determined + CERTAIN * np.sqrt(2 * determined):
             self._square = 1.0
             return np.zeros((1, 1))
-        stretch, widest = frame.stretched(optimum.theta), max(MAX_DEVIATION / frame.stretch.deviation, 1.0)
+        stretch = gauss_newton(frame.stretch.linearize(optimum.surface, near.sparse_jacobian), len(optimum.theta))
         known = near.quadratic.curvature - near.priors + frame.motion.unseen_precision(UNSEEN_S)
+        widest = max(MAX_DEVIATION / frame.stretch.deviation, 1.0) ** 2
         for _ in range(STEPS):
             inverse = posterior_covariance(Quadratic(stretch.gradient, known + stretch.curvature / self._square))
             step = inverse @ stretch.gradient * (1 - 1 / self._square)
-            there = energy + float(step @ (2 * stretch.gradient + stretch.curvature @ step))
-            self._square = float(np.clip(there / np.vdot(inverse, known), 1.0, widest**2))
+            ratio = (energy + step @ (2 * stretch.gradient + stretch.curvature @ step)) / np.vdot(inverse, known)
+            before, self._square = self._square, float(np.clip(ratio, 1.0, widest))
+            if abs(self._square - before) < MIN_CHANGE * before:
+                break
         return (self._square - 1) * stretch.curvature
