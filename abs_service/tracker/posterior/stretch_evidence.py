@@ -11,8 +11,7 @@ curvature H of the prior as it is set; γ is the number of directions that measu
 that prior. To first order X g (1 − 1 / s²) leads from it to the optimum under the other one, g being the gradient of
 the prior.
 
-The gradient of the prior at the true Θ has the covariance s² H then, instead of H (`sandwich`). Its excess is the same
-in all frames, as the stretch that causes it lasts.
+The gradient of the prior at the true Θ has the covariance s² H then, instead of H (`sandwich`).
 
 s is not below one: a sheet of rubber that nothing has stretched yet looks like paper.
 """

@@ -14,8 +14,8 @@ is left. Where nothing is measured, G is one, and the errors add up:
   object goes on moving as it does: the velocity lasts as long as the motion prior takes it to last,
   v_t = ρ v_{t−1} + n_t.
 - A part of s is the same in every frame, with the covariance L: the noise of the first frame in mesh and appearance
-  (`LastingShares`), the error of whole sides of the outline, and a stretch beyond its prior (`stretch_evidence`). Its
-  error is R_t s with R_t = G R_{t−1} + Σ. The rest is this frame's own noise, with the covariance F, and independent.
+  (`LastingShares`), and the error of whole sides of the outline. Its error is R_t s with R_t = G R_{t−1} + Σ. The rest
+  is this frame's own noise, with the covariance F, and independent.
 
 With the covariances E of the error by q, v and the frame's own noise, V of v, and C of that error with v:
 

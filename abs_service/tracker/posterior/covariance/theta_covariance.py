@@ -46,7 +46,8 @@ class ThetaCovariance:
         """Covariance (dim, dim) of the estimate of a frame."""
         prediction = frame.motion
         inverse, sensed, precision = optimum.inverse_curvature, optimum.sensed, prediction.precision
-        leverage, priors = leverages(inverse, sensed), optimum.linearized.priors - precision
+        leverage = leverages(inverse, sensed)
+        priors = optimum.linearized.priors - precision + self._stretch.excess(optimum, frame)
         variance = variances(sensed, leverage, self._effects.update(inverse, sensed, leverage))
         lasting = self._lasting.update(sensed)
         errors = FrameErrors(
@@ -54,8 +55,7 @@ class ThetaCovariance:
             precision=precision,
             own=gradient_covariance((1 - LASTING) * priors, sensed, variance, 1 - lasting),
             lasting=gradient_covariance(LASTING * priors, sensed, variance, lasting)
-            + shared_covariance(sensed, len(optimum.theta))
-            + self._stretch.excess(optimum, frame),
+            + shared_covariance(sensed, len(optimum.theta)),
         )
         unobserved = unobserved_motion(recent.unmeasured, optimum, prediction)
         covariance = self._errors.update(Motion(recent.unpredicted, unobserved, prediction.persistence), errors)
