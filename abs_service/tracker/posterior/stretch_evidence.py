@@ -44,7 +44,7 @@ class StretchEvidence:
         self._square = 1.0  # s²
 
     def excess(self, optimum: Optimum, frame: FramePosterior) -> NDArray[np.float64]:
-        """What the covariance of the prior's gradient has beyond H: (s² − 1) H (dim, dim), or zero (1, 1)."""
+        """Covariance of the prior's gradient beyond H: (s² − 1) H (dim, dim), or zero (1, 1)."""
         near, energy = optimum.linearized, 2 * float(frame.stretch.cost(optimum.surface)[0])
         # The curvature has the motion prior in it: without that, no fewer directions are determined.
         determined = max(len(optimum.theta) - float(np.vdot(optimum.inverse_curvature, near.priors)), 0.0)
