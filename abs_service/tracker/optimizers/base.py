@@ -40,6 +40,10 @@ class FrameProblem(Protocol):
         """Agreement of every contributing sensor with theta (dim,)."""
         ...
 
+    def elsewhere(self, theta: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        """Parameters (dim,) where images show the surface, if that is not near theta (dim,), the end of a search."""
+        ...
+
 
 class Stop(StrEnum):
     """Reason for the end of a search."""
@@ -49,6 +53,7 @@ class Stop(StrEnum):
     GENERATIONS = "generations"
     EVALUATIONS = "evaluations"
     TIME = "time"
+    ELSEWHERE = "elsewhere"  # images show the surface at a theta with which another search is to begin
 
 
 class Budget:

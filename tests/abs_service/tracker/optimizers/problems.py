@@ -51,6 +51,10 @@ class Known:
         """See `Problem`."""
         return Quadratic(theta / self.deviation**2, np.eye(self.dimension) / self.deviation**2)
 
+    def elsewhere(self, theta: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        """See `Problem`."""
+        return None
+
     def fits(self, theta: NDArray[np.float64]) -> tuple[SensorFit, ...]:
         """See `Problem`."""
         inliers = round(MEASUREMENTS * (1 - self.outlier_share_at(theta)))
