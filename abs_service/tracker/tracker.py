@@ -16,7 +16,7 @@ from abs_service.pairing.observation import Observation
 from abs_service.tracker.estimates import status
 from abs_service.tracker.estimates.estimate import Estimate, SearchReport, Status
 from abs_service.tracker.estimates.shape_quality import ShapeComparison
-from abs_service.tracker.optimizers.base import Budget, Optimizer, Outcome, RunningSearch, Search, Stop
+from abs_service.tracker.optimizers.base import Budget, Optimizer, Outcome, RunningSearch, Search
 from abs_service.tracker.posterior.frame_posterior import FramePosterior
 from abs_service.tracker.posterior.posterior import Posterior
 from abs_service.tracker.posterior.relocation import fit_to_points
@@ -78,7 +78,7 @@ class Tracker:
                 frame = frame.allowing(start)
             outcome = self._minimize(frame, search(frame, start, budget), budget)
             start, search = outcome.theta, self._optimizer.follow
-            if outcome.stop != Stop.ELSEWHERE and not frame.motion.is_too_narrow(start):
+            if not outcome.is_start and not frame.motion.is_too_narrow(start):
                 break
         self._frames += 1
         return self._estimate(observation, frame, outcome, budget)

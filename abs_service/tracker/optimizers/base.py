@@ -41,7 +41,7 @@ class FrameProblem(Protocol):
         ...
 
     def elsewhere(self, theta: NDArray[np.float64]) -> NDArray[np.float64] | None:
-        """Parameters (dim,) where images show the surface, if that is not near theta (dim,), the end of a search."""
+        """Parameters (dim,) where images show the surface if that is not at theta (dim,), the end of a search."""
         ...
 
 
@@ -53,7 +53,6 @@ class Stop(StrEnum):
     GENERATIONS = "generations"
     EVALUATIONS = "evaluations"
     TIME = "time"
-    ELSEWHERE = "elsewhere"  # images show the surface at a theta with which another search is to begin
 
 
 class Budget:
@@ -95,6 +94,8 @@ class Outcome:
         linearized: the newest linearisation of the cost that the search made, from which the covariance of theta is
             made if it holds there; None if it made none.
         fits: agreement of the sensors with theta; empty if the search did not ask for it.
+        is_start: True if theta is no optimum, but where images show the surface: another search is to begin there. The
+            cost is higher than that of theta then.
     """
 
     theta: NDArray[np.float64]
@@ -104,6 +105,7 @@ class Outcome:
     deviation: float
     linearized: LinearizedCost | None = None
     fits: tuple[SensorFit, ...] = ()
+    is_start: bool = False
 
     def compared(self, problem: FrameProblem) -> "Outcome":
         """The same with the agreement of the sensors."""

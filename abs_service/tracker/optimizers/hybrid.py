@@ -8,7 +8,7 @@ import numpy as np
 from annotated_types import Ge, Gt, Interval
 from numpy.typing import NDArray
 
-from abs_service.tracker.optimizers.base import Budget, FrameProblem, Outcome, Search, Stop
+from abs_service.tracker.optimizers.base import Budget, FrameProblem, Outcome, Search
 from abs_service.tracker.optimizers.cma_es import CmaEsSampler
 from abs_service.tracker.optimizers.search.ask_and_tell import (
     SIGNIFICANT,
@@ -89,9 +89,9 @@ class Hybrid:
         if share <= self._mean_outliers + limit:
             self._pauses = Pauses(self._settings.fallback_above)
         elif self._pauses.end_at(share):
-            beside = disagreeing_colors(found.fits) >= MANY
+            beside = disagreeing_colors(found.fits) >= MANY and not budget.exhausted()
             if beside and (place := problem.elsewhere(found.theta)) is not None:
-                return replace(found, theta=place, stop=Stop.ELSEWHERE, linearized=None, fits=())
+                return replace(found, theta=place, linearized=None, fits=(), is_start=True)
             tried = (yield from self._fall_back(problem, start, found, budget)).compared(problem)
             self._pauses.tried(tried.cost < found.cost, share)
             found = tried

@@ -100,10 +100,10 @@ class FramePosterior:
         return predicted if matched is None or not self._is_better(matched, predicted) else matched
 
     def elsewhere(self, theta: NDArray[np.float64]) -> NDArray[np.float64] | None:
-        """Where images show the appearance of the mesh if that is not near theta (dim,), the end of a search.
+        """Where images show the appearance of the mesh if that is not at theta (dim,), the end of a search.
 
-        Distances bring a mesh near its print, but colours beside it hold the mesh where they agree by chance. So it is
-        looked for near theta, and near the place that distances alone tell.
+        Print is looked for within some pixels: of theta, and of where distances alone would lay the mesh. They bring it
+        nearer after a large motion, since colours beside their print agree by chance, and hold it there.
         """
         matched = self._matched(theta)
         if matched is not None and self._is_better(matched, theta):
