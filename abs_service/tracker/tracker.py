@@ -16,7 +16,7 @@ from abs_service.pairing.observation import Observation
 from abs_service.tracker.estimates import status
 from abs_service.tracker.estimates.estimate import Estimate, SearchReport, Status
 from abs_service.tracker.estimates.shape_quality import ShapeComparison
-from abs_service.tracker.optimizers.base import Budget, Optimizer, Outcome, RunningSearch, Search
+from abs_service.tracker.optimizers.base import Budget, Optimizer, Outcome, RunningSearch, Search, StartSearch
 from abs_service.tracker.posterior.frame_posterior import FramePosterior
 from abs_service.tracker.posterior.posterior import Posterior
 from abs_service.tracker.posterior.relocation import fit_to_points
@@ -26,8 +26,8 @@ from abs_service.tracker.posterior.uncertainty import Uncertainty
 #: the object moves.
 COLD_FRAMES = 2
 
-#: Searches of a frame: the next one follows a sudden motion, or begins where images show the surface elsewhere.
-MAX_SEARCHES = 3
+#: Searches of a frame after the first one: after a sudden motion, or where images show the surface elsewhere.
+MORE_SEARCHES = 2
 
 
 class Tracker:
@@ -73,13 +73,11 @@ class Tracker:
         budget = Budget(self._evaluations, in_time if self._frames else _without_end)
         search = self._optimizer.follow if self._frames >= COLD_FRAMES else self._optimizer.explore
         start = frame.search_start()  # the prediction, or where images show the surface's print
-        for _ in range(MAX_SEARCHES):
-            if frame.motion.is_too_narrow(start):  # a sudden motion
-                frame = frame.allowing(start)
-            outcome = self._minimize(frame, search(frame, start, budget), budget)
-            start, search = outcome.theta, self._optimizer.follow
-            if not outcome.is_start and not frame.motion.is_too_narrow(start):
+        frame, outcome = self._search(frame, search, start, budget)
+        for _ in range(MORE_SEARCHES):
+            if not outcome.is_start and not frame.motion.is_too_narrow(outcome.theta):
                 break
+            frame, outcome = self._search(frame, self._optimizer.follow, outcome.theta, budget)
         self._frames += 1
         return self._estimate(observation, frame, outcome, budget)
 
@@ -89,6 +87,14 @@ class Tracker:
         motion.restart(fit_to_points(self.model, self._last_tracked, points))
         self._uncertainty.restart(motion.longest_covariance)
         self._frames = 0
+
+    def _search(
+        self, frame: FramePosterior, search: StartSearch, start: NDArray[np.float64], budget: Budget
+    ) -> tuple[FramePosterior, Outcome]:
+        """The outcome of a search from start (dim,), and the frame under a motion prior that allows for the start."""
+        if frame.motion.is_too_narrow(start):
+            frame = frame.allowing(start)
+        return frame, self._minimize(frame, search(frame, start, budget), budget)
 
     def _minimize(self, frame: FramePosterior, search: Search, budget: Budget) -> Outcome:
         """Analysis by synthesis: ask, deform, synthesise, score, tell, until budget or convergence ends the search."""

@@ -94,7 +94,7 @@ class FramePosterior:
         return tuple(self.objective.fits(self.surfaces.deform(theta[None])))
 
     def search_start(self) -> NDArray[np.float64]:
-        """Where a search begins: at the prediction, or where images show the appearance of the mesh beside it (dim,)."""
+        """Where a search begins (dim,): at the prediction, or where images show the mesh's appearance beside it."""
         predicted = self.motion.theta
         matched = self._matched(predicted)
         return predicted if matched is None or not self._is_better(matched, predicted) else matched
@@ -127,7 +127,7 @@ class FramePosterior:
         return gauss_newton([*rows, self.shape.linearize(theta)], self.dimension) + motion
 
     def _matched(self, theta: NDArray[np.float64]) -> NDArray[np.float64] | None:
-        """The place (dim,) to which the images shift patches of the mesh at theta (dim,); None if they leave it there."""
+        """Parameters (dim,) where images show the patches of a mesh at theta (dim,); None if they are at theta."""
         places = self.objective.match(*self.surfaces.with_jacobian(theta), self.patches)
         if not is_beside(places):
             return None
