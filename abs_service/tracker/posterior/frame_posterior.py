@@ -155,8 +155,9 @@ class FramePosterior:
     def _is_better(self, theta: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
         """True if theta (dim,) is more likely than another under a motion prior that allows for it."""
         wider = self.allowing(theta)
-        return wider._cost_at(theta) < wider._cost_at(other) - SIGNIFICANT
+        return _cost(wider, theta) < _cost(wider, other) - SIGNIFICANT
 
-    def _cost_at(self, theta: NDArray[np.float64]) -> float:
-        """Cost of a single theta (dim,): a population would need the noise of all pixels around the prediction."""
-        return float(self.cost(theta[None], self.surfaces.deform(theta[None]))[0])
+
+def _cost(frame: FramePosterior, theta: NDArray[np.float64]) -> float:
+    """Cost of a single theta (dim,): a population would need the noise of all pixels around the prediction."""
+    return float(frame.cost(theta[None], frame.surfaces.deform(theta[None]))[0])
