@@ -5,8 +5,8 @@ when a tracker had learnt to take noise and outlines from its images, and had be
 of noise and outlines that wander by 2 to 6 px; so was the noise that neighbours share on 2026-11-28, and that day 40 %
 of dropouts, with which no object was found before (looked at with 15 to 60 % of them), and a person who holds the
 sheet, looked at while tries of CMA-ES in vain got pauses; images left out at random on 2026-11-30, looked at with five
-other seeds when searches that end beside the print were begun anew. Each change is tracked with colour and by depth alone, before
-nothing, by `nurbs` with all defaults, and compared with the measured points.
+other seeds when searches that end beside the print were begun anew. Each change is tracked with colour and by depth
+alone, before nothing, by `nurbs` with all defaults, and compared with the measured points.
 
 Statistic and goals, those of the unchanged sheet (`recordings`): over all of them, median frame at most 3 mm, worst
 15 mm, 85 to 99 % of the points in their 95 % region, no frame TRACKING and wrong. At most two meshes: one that began

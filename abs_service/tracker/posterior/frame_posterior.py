@@ -94,13 +94,13 @@ class FramePosterior:
         return tuple(self.objective.fits(self.surfaces.deform(theta[None])))
 
     def search_start(self) -> NDArray[np.float64]:
-        """Where a search begins (dim,): at the prediction, or where images show the mesh's appearance beside it."""
+        """Start (dim,) of a search: the prediction, or where images show the appearance of the mesh beside it."""
         predicted = self.motion.theta
         matched = self._matched(predicted)
         return predicted if matched is None or not self._is_better(matched, predicted) else matched
 
     def elsewhere(self, theta: NDArray[np.float64]) -> NDArray[np.float64] | None:
-        """Where images show the appearance of the mesh if that is not at theta (dim,), the end of a search.
+        """Place (dim,) where images show the appearance of the mesh, if that is not at theta (dim,), the end of a search.
 
         Print is looked for within some pixels: of theta, and of where distances alone would lay the mesh. They bring it
         nearer after a large motion, since colours beside their print agree by chance, and hold it there.
