@@ -94,6 +94,12 @@ def image_agrees(fits: Sequence[SensorFit]) -> bool:
     return any(fit.counts.agreeing > NEARLY_ALL * _judged(fit) for fit in images)
 
 
+def disagreeing_colors(fits: Sequence[SensorFit]) -> int:
+    """Number of vertices whose appearance is not that of an image; the largest of such sensors, 0 without."""
+    distances = of_distances(fits)
+    return max((fit.counts.disagreeing for fit in fits if fit not in distances), default=0)
+
+
 def contradicting(fits: Sequence[SensorFit]) -> list[tuple[str, str, float]]:
     """Name, kind of measurement and agreeing share of every sensor that contradicts the mesh.
 
