@@ -100,7 +100,7 @@ class FramePosterior:
         return predicted if matched is None or not self._is_better(matched, predicted) else matched
 
     def elsewhere(self, theta: NDArray[np.float64]) -> NDArray[np.float64] | None:
-        """Place (dim,) where images show the appearance of the mesh, if that is not at theta (dim,), the end of a search.
+        """Place (dim,) where images show the appearance of the mesh if not at theta (dim,), the end of a search.
 
         Print is looked for within some pixels: of theta, and of where distances alone would lay the mesh. They bring it
         nearer after a large motion, since colours beside their print agree by chance, and hold it there.
