@@ -7,7 +7,6 @@ import math
 import re
 from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 
 from abs_service.calibration.cameras import report
@@ -123,7 +122,7 @@ def sensor_task(name: str, arguments: argparse.Namespace, found: Material, keeps
         OptionError: fixed intrinsics that are unknown, or a lens of no sensor.
     """
     size = found.seen.sizes[name]
-    factory = (replace(found.known[name].camera),) if name in found.known else ()
+    factory = (found.known[name].camera,) if name in found.known else ()
     lenses = assignments("--lens NAME=KIND", arguments.lens)
     for other in lenses:
         if other not in found.seen.sizes:

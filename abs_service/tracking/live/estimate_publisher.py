@@ -57,7 +57,8 @@ class EstimatePublisher:
         """Publishes an estimate, after the topology of its mesh if that is new.
 
         Args:
-            estimate, tracking, effort: to publish.
+            estimate, effort: to publish.
+            session: its tracker.
             host_clock: which clock the frames' times are of.
             offset: of that clock; stamps need it.
         """
