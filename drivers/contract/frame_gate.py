@@ -113,10 +113,6 @@ class FrameGate:
             if self._sink is not None:
                 self._sink.on_truth(truth)
 
-    def knows(self, frame: Frame) -> bool:
-        """True if the frame is of a declared stream."""
-        return frame.key in self._streams
-
     def deliver(self, frame: Frame) -> None:
         """Delivers a frame, or counts the drop: `after_stop`, `unknown_stream`, `wrong_size`, `wrong_encoding`."""
         with self._lock:
