@@ -60,7 +60,8 @@ def run(arguments: argparse.Namespace) -> int:
 def _solve(arguments: argparse.Namespace) -> int:
     """Solves the rig."""
     found = material.material(arguments)
-    there = [name for name in found.seen.sizes if any(view.sensor == name for view in _views(found))]
+    seen = {view.sensor for view in (*found.seen.corners, *found.seen.planes)}
+    there = [name for name in found.seen.sizes if name in seen]
     terms = assignments("--depth-terms NAME=TERMS", arguments.depth_terms)
     for option, names in (
         ("--keep", arguments.keep),
@@ -90,10 +91,6 @@ def _solve(arguments: argparse.Namespace) -> int:
     two_ways_up = has_two_ways_up(target_file.read(arguments.target))
     task = Task(sensors, found.seen.corners, found.seen.planes, reference, two_ways_up=two_ways_up)
     return solving.finish(f"Calibration of {', '.join(there)}", task, arguments, found)
-
-
-def _views(found: Material) -> list:
-    return [*found.seen.corners, *found.seen.planes]
 
 
 def _check_names(option: str, names: Iterable[str], there: list[str]) -> None:
