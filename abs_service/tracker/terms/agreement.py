@@ -104,8 +104,8 @@ def contradicting(fits: Sequence[SensorFit]) -> list[tuple[str, str, float]]:
     moved = any(fit.counts.disagreeing > UNLIT_DISTANCES * _judged(fit) or not rims(fits) for fit in distances)
     result = []
     for fit in fits:
-        what, least = ("distances", 1 / 2) if fit in distances else ("colours", MIN_COLORS if moved else 0.0)
-        if _judged(fit) >= MIN_JUDGED and fit.counts.agreeing < least * _judged(fit):
+        what, minimum = ("distances", 1 / 2) if fit in distances else ("colours", MIN_COLORS if moved else 0.0)
+        if _judged(fit) >= MIN_JUDGED and fit.counts.agreeing < minimum * _judged(fit):
             result.append((fit.sensor, what, fit.counts.agreeing / _judged(fit)))
     return result
 

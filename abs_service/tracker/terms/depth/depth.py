@@ -94,8 +94,8 @@ class DepthTerm:
         if not unusable.shown.any():
             return np.zeros((1, predicted.vertices.shape[2]), np.float32)
         agreeing = self._texels.explain(unusable)
-        most = self._bounds.outlier - self._bounds.inlier - agreeing
-        return missing_cost(self._bounds.no_return, predicted, self._view.camera.center, most)
+        maximum = self._bounds.outlier - self._bounds.inlier - agreeing
+        return missing_cost(self._bounds.no_return, predicted, self._view.camera.center, maximum)
 
 
 def _points(
