@@ -31,7 +31,7 @@ from calib.solve.validation.verdict import assess
 
 @contextmanager
 def reported(title: str, arguments: argparse.Namespace) -> Iterator[None]:
-    """Reports what the images do not allow; the calibration is not written, and the error goes on."""
+    """Context that writes a report about images that cannot be used, without a calibration, and passes the error on."""
     try:
         yield
     except Exception as error:

@@ -88,7 +88,7 @@ def distances_share(fits: Sequence[SensorFit]) -> float:
 
 
 def image_agrees(fits: Sequence[SensorFit]) -> bool:
-    """True if nearly all that an image of the appearance shows of the surface agrees."""
+    """True if nearly all vertices that an image of the appearance shows agree with it."""
     distances = of_distances(fits)
     images = [fit for fit in fits if fit not in distances and _judged(fit) >= MIN_JUDGED]
     return any(fit.counts.agreeing > NEARLY_ALL * _judged(fit) for fit in images)

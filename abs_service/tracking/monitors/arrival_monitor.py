@@ -16,7 +16,7 @@ KEPT_NS = 1_000_000_000
 
 
 class ArrivalMonitor:
-    """Numbers of pixels of what was found in the last images, 0 where nothing was.
+    """Delays the detection of an object that moves into the image, until all of it is in sight.
 
     A mesh of the first fingertips, or of the first corner of a sheet, would be of no use. The very first image is taken
     as it is: nothing tells whether what it cuts off comes or stays.

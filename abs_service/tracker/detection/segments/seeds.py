@@ -47,7 +47,7 @@ class Seeded:
 
 @dataclass(frozen=True, slots=True)
 class SurfaceLimits:
-    """Limits of what is one surface, and of what counts as one: see `large_surfaces`."""
+    """Largest step within a surface, and smallest size of one: see `large_surfaces`."""
 
     maximum_step_m: Step
     minimum_pixels: int
