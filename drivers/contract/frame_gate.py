@@ -13,7 +13,7 @@ from drivers.contract.clock import Stamp
 from drivers.contract.device import DeviceError, DeviceState, Sink, Truth
 from drivers.contract.frame import Frame
 
-#: Of so many latest frames of a stream, so many that do not fit are no accident.
+#: Latest frames of a stream that are judged, and number of unfit ones among them that is reported.
 LATEST, MANY = 30, 15
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection, UndecidedError
 from abs_service.tracker.detection.plausibility import at_border
 
-#: It has come when it has so many times as many pixels as so long before, at most [ns].
+#: Largest growth of an object's number of pixels within a time [ns], once all of it is in sight.
 GROWTH, SETTLED_NS = 1.05, 300_000_000
 
 #: What was found longer ago says nothing of how it comes into view now [ns].

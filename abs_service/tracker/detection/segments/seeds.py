@@ -28,7 +28,7 @@ RIM_PX = 5
 #: Pixels of alike colours are connected over gaps of fewer pixels than this, as a print has them.
 PRINT_PX = 5
 
-#: What moved is nearer than before by so many standard deviations of the distances: far walls change by noise alone.
+#: Least approach of what moved, in standard deviations of the distances: far walls change by noise alone.
 MOVING = 4.0
 
 
