@@ -21,6 +21,7 @@ options have to be changed first. What the verdicts mean: docs/how-to/calibratio
 
 import argparse
 from collections.abc import Iterable
+from dataclasses import replace
 
 from abs_service.calibration.files import target_file
 from abs_service.commands.calibrate import solving
@@ -76,11 +77,8 @@ def _solve(arguments: argparse.Namespace) -> int:
             raise OptionError(f"--depth-terms {name}={term}: {allowed_instead(term, TERMS)}")
     with_corners = {view.sensor for view in found.seen.corners}
     sensors = {
-        name: solving.sensor_task(
-            name,
-            arguments,
-            found,
-            keeps=name in arguments.keep or name not in with_corners,
+        name: replace(
+            solving.sensor_task(name, arguments, found, keeps=name in arguments.keep or name not in with_corners),
             fixed_pose=name in arguments.fixed_pose,
             depth_terms=TERMS[terms[name]] if name in terms else (),
             free_running=name in arguments.free_running,

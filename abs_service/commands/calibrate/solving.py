@@ -115,7 +115,7 @@ def _lens(text: str) -> str:
     return text
 
 
-def sensor_task(name: str, arguments: argparse.Namespace, found: Material, keeps: bool, **terms: object) -> SensorTask:
+def sensor_task(name: str, arguments: argparse.Namespace, found: Material, keeps: bool) -> SensorTask:
     """Task of one sensor, from its image size, previous calibration and options.
 
     Raises:
@@ -134,7 +134,7 @@ def sensor_task(name: str, arguments: argparse.Namespace, found: Material, keeps
     if keeps and not factory:
         raise OptionError(f"{name}: nothing is known of its intrinsics, so they cannot be kept; see --start")
     fixed = _fixed(name, arguments.fix, KINDS[kind], found.seen.sizes)
-    return SensorTask(*size, KINDS[kind], factory, keeps, fixed=fixed, **terms)  # pyright: ignore[reportArgumentType]
+    return SensorTask(*size, KINDS[kind], factory, keeps, fixed=fixed)
 
 
 def _fixed(name: str, options: Iterable[str], kind: LensKind, sensors: Collection[str]) -> tuple[str, ...]:
