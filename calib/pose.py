@@ -90,12 +90,12 @@ def nearest_rotation(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
     return left @ np.diag([1, 1, np.linalg.det(left @ right)]) @ right
 
 
-def look_at(eye: ArrayLike, target: ArrayLike, down: ArrayLike = (0.0, 1.0, 0.0)) -> Pose:
-    """Pose `T_rs` of a camera at `eye` whose optical axis passes through `target`; image rows run along `down`."""
+def look_at(eye: ArrayLike, target: ArrayLike) -> Pose:
+    """Pose `T_rs` of a camera at `eye` whose optical axis passes through `target`; its rows run along y of the rig."""
     eye_r = np.asarray(eye, float)
     forward = np.asarray(target, float) - eye_r
     forward = forward / np.linalg.norm(forward)
-    right = np.cross(np.asarray(down, float), forward)
+    right = np.cross((0.0, 1.0, 0.0), forward)
     right = right / np.linalg.norm(right)
     T_rs = np.eye(4)
     T_rs[:3, :3] = np.stack([right, np.cross(forward, right), forward], axis=1)

@@ -79,7 +79,7 @@ def _nan_if(is_unknown: bool, covariance: NDArray[np.float64]) -> NDArray[np.flo
 
 
 def _read_only(array: NDArray[Any]) -> NDArray[Any]:
-    """A view that cannot be written to: the tracker goes on with the array."""
+    """A read-only view: the tracker keeps using the array."""
     view = array.view()
     view.setflags(write=False)
     return view

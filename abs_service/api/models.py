@@ -59,5 +59,5 @@ def Nurbs(
 
 
 def _is_table(weights: Any) -> bool:
-    """False for what has no rows."""
+    """True for a sequence of sequences."""
     return isinstance(weights, Sequence) and all(isinstance(row, Sequence) for row in weights)

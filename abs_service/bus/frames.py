@@ -126,9 +126,10 @@ class FrameSubscriber:
         self._queue: LatestQueue[tuple[Sample, int]] = LatestQueue(depth)
         self._clock = clock
         self._malformed: Counter[str] = Counter()
-        self._gaps = SequenceGaps()
+        self._gaps = SequenceGaps(clock)
         self.last_error = ""
         self._subscriptions = [bus.subscribe(keys.image(sensor, stream), self._receive) for sensor, stream in streams]
+        self._subscriptions.append(bus.subscribe(keys.health("capture"), self._gaps.add_health))
 
     @property
     def dropped(self) -> Mapping[str, int]:

@@ -64,13 +64,18 @@ class Health:
             return self._counters[name]
 
     def count_up_to(self, totals: Mapping[str, int], prefix: str = "") -> None:
-        """Sets counters to totals counted elsewhere, up to `MAX_COUNT`; smaller ones, of a new epoch, are ignored."""
+        """Sets counters to totals counted elsewhere, up to `MAX_COUNT`; smaller ones, of a new epoch, are ignored.
+
+        Names and numbers may be a driver's: one that receivers refuse would cost them the whole health.
+        """
         with self._lock:
             for name, total in totals.items():
-                self._counters[prefix + name] = min(max(self._counters[prefix + name], total), MAX_COUNT)
+                key = printable(prefix + name)
+                self._counters[key] = min(max(self._counters[key], int(total)), MAX_COUNT)
 
     def gauge(self, name: str, value: float) -> None:
         """Sets a current value, none if it is not finite; the name ends in its unit."""
+        name = printable(name)
         with self._lock:
             if math.isfinite(value):
                 self._gauges[name] = value

@@ -1,42 +1,77 @@
-"""Counts messages that were published and never came, from the gaps in their sequence numbers."""
+"""Counts messages that were published and never came, from the gaps in their sequence numbers.
 
-from collections import Counter
-from collections.abc import Mapping
+What follows the last message that came is known from the health of its publisher, which says how many there were.
+"""
+
+import threading
+import time
+from collections import Counter, deque
+from collections.abc import Callable, Mapping
 from contextlib import suppress
+from typing import NamedTuple
 
 from absmsg.v1.frame_info_pb2 import FrameInfo
+from absmsg.v1.health_pb2 import Health
 from google.protobuf.message import DecodeError
 
+from abs_service.bus import keys
 from abs_service.bus.contract import Sample
 from drivers.encoding.message_check import MAX_GAP
 
 #: Publishers of a topic that are followed: the most recent ones. Two hosts with cameras both publish `health/capture`.
 PUBLISHERS = 4
+#: A message that has not come so long after a health that counts it is lost [ns]: health may overtake images.
+LATE_NS = 1_000_000_000
+#: Totals that wait for that, at most; a rig of ten sensors and four trackers has about 30 a second.
+_WAITING = 1000
+#: Beginning of the counter of a topic in a health; the topic follows.
+_PUBLISHED = "published."
+
+
+class _Total(NamedTuple):
+    """Number of the last message that a publisher says it has published, and when it said so [ns]."""
+
+    topic: str
+    publisher: str
+    seq: int
+    t_ns: int
 
 
 class SequenceGaps:
-    """Losses by topic. Messages of one publisher come in order; another one, or a restarted one, counts anew."""
+    """Losses by topic. Messages of one publisher come in order; another one, or a restarted one, counts anew.
 
-    def __init__(self) -> None:
+    Thread-safe.
+
+    Args:
+        clock: monotonic time [ns].
+    """
+
+    def __init__(self, clock: Callable[[], int] = time.monotonic_ns) -> None:
+        self._clock = clock
         self._lost: Counter[str] = Counter()
-        self._latest: dict[str, dict[str, int]] = {}  # by topic and publisher, the one received last at the end
+        # By topic and publisher, the one received last at the end: its last number, and up to which all is counted.
+        self._latest: dict[str, dict[str, tuple[int, int]]] = {}
+        self._totals: deque[_Total] = deque(maxlen=_WAITING)
+        self._lock = threading.Lock()
 
     @property
     def lost(self) -> Mapping[str, int]:
-        """Messages that never came, by topic. Those after the last one that came are unknown."""
-        return dict(self._lost)
+        """Messages that never came, by topic; those after the last one that came, a second after a health has them."""
+        return self._lost_until(self._clock() - LATE_NS)
+
+    def settle(self) -> None:
+        """Counts what has not come yet: no message is on its way any more."""
+        self._lost_until(self._clock())
 
     def add(self, topic: str, publisher: str, seq: int) -> int:
         """Takes the number of a message in the order of arrival; returns how many were lost just before it."""
-        latest = self._latest.setdefault(topic, {})
-        gap = seq - latest.pop(publisher, seq) - 1
-        latest[publisher] = seq
-        if len(latest) > PUBLISHERS:
-            del latest[next(iter(latest))]
-        if not 0 < gap <= MAX_GAP:
-            return 0
-        self._lost[topic] += gap
-        return gap
+        with self._lock:
+            latest = self._latest.setdefault(topic, {})
+            last, counted = latest.pop(publisher, (seq, seq))
+            latest[publisher] = seq, counted if last < seq <= counted else seq
+            if len(latest) > PUBLISHERS:
+                del latest[next(iter(latest))]
+            return self._count(topic, seq - max(last, counted) - 1)
 
     def add_image(self, sample: Sample) -> None:
         """Counts an image like `add`; its number is in the attachment."""
@@ -44,6 +79,35 @@ class SequenceGaps:
             header = FrameInfo.FromString(sample.attachment).header
             self.add(sample.topic, header.boot_id, header.seq)
 
+    def add_health(self, sample: Sample) -> None:
+        """Takes from a health how many images or estimates its process has published."""
+        with suppress(DecodeError):
+            health, now_ns = Health.FromString(sample.payload), self._clock()
+            counters, tracker = health.counters, health.component.removeprefix("track/")
+            totals = {name.removeprefix(_PUBLISHED): name for name in counters if name.startswith(_PUBLISHED)}
+            totals |= dict.fromkeys((keys.state(tracker), keys.mesh(tracker), keys.theta(tracker)), "estimates")
+            for topic, name in totals.items():
+                self._totals.append(_Total(topic, health.header.boot_id, counters[name] - 1, now_ns))
+
     def forget(self) -> None:
         """Takes the next message of each topic as the first."""
-        self._latest.clear()
+        with self._lock:
+            self._latest.clear()
+
+    def _lost_until(self, t_ns: int) -> Mapping[str, int]:
+        """Losses by topic, with those that healths show which came until a time [ns]."""
+        with self._lock:
+            while self._totals and self._totals[0].t_ns <= t_ns:
+                topic, publisher, seq, _ = self._totals.popleft()
+                latest = self._latest.get(topic, {})
+                last, counted = latest.get(publisher, (seq, seq))
+                if self._count(topic, seq - max(last, counted)):
+                    latest[publisher] = last, seq
+            return dict(self._lost)
+
+    def _count(self, topic: str, gap: int) -> int:
+        """Counts a gap and returns it; 0 if it is none."""
+        if not 0 < gap <= MAX_GAP:
+            return 0
+        self._lost[topic] += gap
+        return gap

@@ -1,5 +1,6 @@
 """Conversion of monotonic to wall-clock time, and message headers."""
 
+import ctypes
 import time
 import uuid
 from collections.abc import Callable
@@ -10,6 +11,14 @@ from drivers.contract.host_clock import host_clock
 
 #: A larger change of the offset within a second is a step, not slewing [ns].
 STEP_NS = 50_000_000
+
+#: What adjtimex(2) says of a clock that follows no time server, and room for the `struct timex` that it fills [bytes].
+_TIME_ERROR, _TIMEX_BYTES = 5, 1024
+
+
+def is_synchronised() -> bool:
+    """True if the kernel says that the wall clock follows a time server, see adjtimex(2)."""
+    return 0 <= ctypes.CDLL(None).adjtimex(ctypes.create_string_buffer(_TIMEX_BYTES)) < _TIME_ERROR
 
 
 class WallClock:

@@ -10,6 +10,7 @@ from abs_service.capture.image_check import RepeatedImages, is_empty
 from drivers.contract.capabilities import StreamInfo
 from drivers.contract.device import DeviceState, Sink
 from drivers.contract.frame import Frame, Kind
+from drivers.encoding import codec
 
 #: A stream without a frame for so many periods, and at least so long [ns], is stalled.
 STALL_PERIODS, STALL_NS = 5, 1_000_000_000
@@ -52,7 +53,8 @@ class StallDetector:
         self._clock = clock
         self._first_epoch = first_epoch
         self._repeated_images = repeated_images
-        self._counters = Counter({"unwanted": 0, "repeated": 0, "empty": 0})
+        self._counters = Counter({"malformed": 0, "unwanted": 0, "repeated": 0, "empty": 0})
+        self._malformed = (0, "")  # time of the last one [ns], and what is wrong with it; "" if that was long ago
         self._repeating: set[tuple[str, str]] = set()
         self._empty_since_ns: dict[tuple[str, str], int] = {}
         self._latest_ns: dict[tuple[str, str], int] = {}
@@ -63,9 +65,16 @@ class StallDetector:
         self.state = (DeviceState.OPENING, "")
 
     def on_frame(self, frame: Frame) -> None:
-        """See `drivers.contract.device.Sink.on_frame`."""
-        sensor = self._heads.get(frame.sensor)
-        if sensor is None:
+        """See `drivers.contract.device.Sink.on_frame`; what is no valid frame is left out and counted."""
+        try:
+            name, epoch = self._heads.get(frame.sensor, frame.sensor), self._first_epoch + frame.epoch
+            codec.check_frame(named := replace(frame, sensor=name, epoch=epoch))
+        except Exception as error:  # whatever a driver hands over, its thread goes on
+            self._counters["malformed"] += 1
+            self._malformed = self._clock(), f"its driver delivers what is no frame: {error}"
+            self.on_warning("frames", self._malformed[1])
+            return
+        if frame.sensor not in self._heads:
             self._counters["unwanted"] += 1
             return
         if frame.key in self._streams:
@@ -80,7 +89,7 @@ class StallDetector:
         self._latest_ns[frame.key] = self._clock()
         self._awaited.discard(frame.key)
         self.delivered = True
-        self._sink.on_frame(replace(frame, sensor=sensor, epoch=self._first_epoch + frame.epoch))
+        self._sink.on_frame(named)
 
     def on_state(self, state: DeviceState, reason: str) -> None:
         """See `drivers.contract.device.Sink.on_state`."""
@@ -103,7 +112,10 @@ class StallDetector:
 
     @property
     def counters(self) -> Mapping[str, int]:
-        """`unwanted` frames of heads that the rig does not use, `repeated` images (left out), `empty` images."""
+        """`malformed` frames, `unwanted` ones of heads that the rig does not use, `repeated` and `empty` images.
+
+        Only the empty ones are delivered.
+        """
         return dict(self._counters)
 
     def take_warnings(self) -> Mapping[str, str]:
@@ -119,11 +131,15 @@ class StallDetector:
         now_ns = self._clock()
         for (sensor, name), slow in self._delivery_rate.check(now_ns):
             self.on_warning(f"{sensor}/{name} rate", slow and f"{sensor}/{name}: {slow}")
+        if self._malformed[1] and now_ns - self._malformed[0] > STALL_NS:
+            self._malformed = (0, "")
+            self.on_warning("frames", "")
         verdict = self.state
         for key, stream in self._streams.items():
             silent_ns = now_ns - self._latest_ns.get(key, now_ns)
             what = "delivers the same image" if key in self._repeating else "delivers nothing"
-            reason = f"{key[0]}/{key[1]} {what} for {silent_ns / 1e9:.0f} s"
+            silence = f"{key[0]}/{key[1]} {what} for {silent_ns / 1e9:.0f} s"
+            reason = "; ".join(filter(None, (silence, self._malformed[1])))
             if _too_long(silent_ns, stream, REOPEN_PERIODS, REOPEN_NS):
                 return DeviceState.FAILED, reason
             if _too_long(silent_ns, stream, STALL_PERIODS, STALL_NS):

@@ -17,7 +17,7 @@ from calib.camera import Camera
 from drivers import replay
 from drivers.contract.frame import Frame
 
-#: An image shows the moment of an estimate up to so much later: half a period at 30 Hz [s].
+#: Largest time by which an image may be later than the estimate drawn into it: half a period at 30 Hz [s].
 LATER_S = 0.0167
 
 #: Age from which an image is drawn as stale [s].

@@ -151,7 +151,7 @@ class RerunFile:
             self._plots.add(f"/{tracker}/{name}")
 
     def finish(self) -> None:
-        """Writes how it is shown, and what is left.
+        """Writes the layout of the views and the remaining data.
 
         Raises:
             OSError: the file cannot be written.

@@ -12,7 +12,7 @@ from drivers.contract.frame import Frame, FrameSet
 DEPTH = 32
 #: So many frames in a row with stamps in the future are no accident.
 FUTURE_IN_A_ROW = 15
-#: Of so many latest frames of a stream, so many that are stale are no accident.
+#: Latest frames of a stream that are judged, and number of stale ones among them that is reported.
 LATEST, MANY = 30, 15
 
 

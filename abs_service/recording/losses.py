@@ -1,6 +1,6 @@
 """Losses of a recorder, by cause: messages that never came, and those that its queue did not hold."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 
 from abs_service.bus import keys
@@ -17,11 +17,17 @@ CALM_REPORTS = 10
 
 
 class Losses:
-    """Counts and reports losses."""
+    """Counts and reports losses.
 
-    def __init__(self, health: Health) -> None:
+    Args:
+        health: of the recorder.
+        clock: monotonic time [ns].
+    """
+
+    def __init__(self, health: Health, clock: Callable[[], int]) -> None:
         self._health = health
-        self._gaps = SequenceGaps()
+        self._gaps = SequenceGaps(clock)
+        self.settle = self._gaps.settle
         self._lost = 0  # at the last report
         self._dropped = self._slow_drops = 0
         self._calm = CALM_REPORTS  # reports in a row without a drop
@@ -34,6 +40,8 @@ class Losses:
             with suppress(message_header.MessageHeaderError):  # counted when it is written
                 about = message_header.parse(sample)
                 self._gaps.add(sample.topic, about.publisher, about.seq)
+        if sample.message == message_header.HEALTH:
+            self._gaps.add_health(sample)
 
     def report(self, dropped: Mapping[str, int], failed: bool) -> None:
         """Reports what is new.

@@ -82,10 +82,9 @@ class Recorder:
             clock.monotonic,
             lambda sample: self._writer.latch([sample]),
         )
-        self._stopping = threading.Event()
-        self._failed = ""
+        self._stopping, self._failed = threading.Event(), ""
         self._readiness = Readiness(settings.directory, self._space, health, clock.monotonic)
-        self._losses = Losses(health)
+        self._losses = Losses(health, clock.monotonic)
         self.stall = DiskStall(health, clock.monotonic, lambda: self._queue.size)
         self._backoff = Backoff(settings.directory, retry_s, self._stopping.wait, self.stall.alive)
         self._finished, self.failures = (0, 0), 0
@@ -112,6 +111,7 @@ class Recorder:
     def stop(self, timeout_s: float) -> None:
         """Writes the queue and finishes the file; gives up after `timeout_s`, which leaves it to be recovered."""
         self._subscription.close()
+        self._losses.settle()
         self._queue.close()
         self._stopping.set()
         self._thread.join(timeout_s)

@@ -1,6 +1,7 @@
 """One recording on disk, from its first byte to its final name."""
 
 import contextlib
+import errno
 import fcntl
 import os
 from collections.abc import Callable, Mapping
@@ -30,6 +31,28 @@ def open_for_writing(path: Path) -> BinaryIO:
     Writes go to its end: after it was cut, others would leave a hole as long as what is missing.
     """
     return open(path, "xb", opener=lambda name, flags: private(name, flags | os.O_APPEND))
+
+
+def lock(stream: BinaryIO, path: Path) -> None:
+    """Locks an open file against other processes as long as it is open; `path` is where it is.
+
+    Raises:
+        BlockingIOError: another process has locked it.
+        OSError: its file system has no locks.
+    """
+    try:
+        try:
+            fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            if error.errno != errno.EBADF:
+                raise
+            fcntl.flock(stream, fcntl.LOCK_SH | fcntl.LOCK_NB)  # all that NFS allows who only reads, see flock(2)
+    except BlockingIOError:
+        raise
+    except OSError as error:
+        lacking = f"{path.parent} is on a file system without locks ({error.strerror})"
+        remedy = "mount it with them (NFS: `local_lock=flock`), or set record.directory to a folder on another one"
+        raise OSError(error.errno, f"{lacking}: {remedy}") from None
 
 
 class _Counted:
@@ -79,7 +102,7 @@ class RecordingFile:
         self._begun = 0  # size up to which writing to the disk has begun
         self._stream = _Counted(open_file(self._active))
         try:
-            fcntl.flock(self._stream.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
+            lock(cast(BinaryIO, self._stream), self._active)
             self._file = McapFile(cast(BinaryIO, self._stream), compression, chunk_size)
             for attachment, text in attachments.items():
                 self._file.attach(attachment, "text/toml", text.encode(), wall_ns)

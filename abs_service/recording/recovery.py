@@ -13,7 +13,7 @@ from mcap.writer import MCAP0_MAGIC
 
 from abs_service.recording.disk.file_bytes import FileBytes
 from abs_service.recording.mcap_scan import find_chunk
-from abs_service.recording.recording_file import ACTIVE, private
+from abs_service.recording.recording_file import ACTIVE, lock, private
 from abs_service.recording.salvage import Salvage
 from calib.files import limited
 
@@ -130,7 +130,7 @@ def remove_interrupted(directory: Path) -> None:
         for path in directory.glob(f"*{RECOVERING}"):
             # It may be somebody else's, or locked by a living one.
             with contextlib.suppress(OSError), limited.opened(path) as stream:
-                fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                lock(stream, path)
                 path.unlink()
 
 
@@ -165,7 +165,7 @@ def _locked(source: Path) -> Iterator[BinaryIO]:
         except OSError as error:
             raise RecoveryError(f"{source}: cannot be read: {error.strerror}") from None
         try:
-            fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            lock(stream, source)
         except BlockingIOError:
             raise InUseError(f"{source}: another process is writing or recovering it") from None
         yield stream

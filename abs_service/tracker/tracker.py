@@ -16,17 +16,18 @@ from abs_service.pairing.observation import Observation
 from abs_service.tracker.estimates import status
 from abs_service.tracker.estimates.estimate import Estimate, SearchReport, Status
 from abs_service.tracker.estimates.shape_quality import ShapeComparison
-from abs_service.tracker.optimizers.base import Budget, Optimizer, Outcome, RunningSearch, Search
+from abs_service.tracker.optimizers.base import Budget, Optimizer, Outcome, RunningSearch, Search, StartSearch
 from abs_service.tracker.posterior.frame_posterior import FramePosterior
 from abs_service.tracker.posterior.posterior import Posterior
 from abs_service.tracker.posterior.relocation import fit_to_points
-from abs_service.tracker.posterior.search_start import search_start
 from abs_service.tracker.posterior.uncertainty import Uncertainty
-from abs_service.tracker.terms.patches import patches_of
 
 #: Frames after a start that are searched from scratch: in the first, nothing is known, and in the second, not how fast
 #: the object moves.
 COLD_FRAMES = 2
+
+#: Searches of a frame after the first one: after a sudden motion, or where images show the surface elsewhere.
+MORE_SEARCHES = 2
 
 
 class Tracker:
@@ -56,7 +57,6 @@ class Tracker:
         self._evaluations = evaluations
         self._limits = limits.for_side(np.sqrt(model.mesh.area))
         self._uncertainty = Uncertainty(model, registration_m, centers)
-        self._patches = patches_of(model.mesh)
         self._shape = ShapeComparison(model.mesh)
         self._frames = 0  # since the start or a relocation
         self._last_tracked = model.rest
@@ -72,11 +72,12 @@ class Tracker:
         frame = self._posterior.observe(observation, prediction)  # observe: noise models rendered per pixel
         budget = Budget(self._evaluations, in_time if self._frames else _without_end)
         search = self._optimizer.follow if self._frames >= COLD_FRAMES else self._optimizer.explore
-        frame, theta = search_start(frame, self._patches)  # the prediction, or where images show the surface's print
-        outcome = self._minimize(frame, search(frame, theta, budget), budget)
-        if frame.motion.is_too_narrow(outcome.theta):  # a sudden motion
-            frame = frame.with_motion(frame.motion.widened(outcome.theta))
-            outcome = self._minimize(frame, self._optimizer.follow(frame, outcome.theta, budget), budget)
+        start = frame.search_start()  # the prediction, or where images show the surface's print
+        frame, outcome = self._search(frame, search, start, budget)
+        for _ in range(MORE_SEARCHES):
+            if not outcome.is_start and not frame.motion.is_too_narrow(outcome.theta):
+                break
+            frame, outcome = self._search(frame, self._optimizer.follow, outcome.theta, budget)
         self._frames += 1
         return self._estimate(observation, frame, outcome, budget)
 
@@ -86,6 +87,14 @@ class Tracker:
         motion.restart(fit_to_points(self.model, self._last_tracked, points))
         self._uncertainty.restart(motion.longest_covariance)
         self._frames = 0
+
+    def _search(
+        self, frame: FramePosterior, search: StartSearch, start: NDArray[np.float64], budget: Budget
+    ) -> tuple[FramePosterior, Outcome]:
+        """The outcome of a search from start (dim,), and the frame under a motion prior that allows for the start."""
+        if frame.motion.is_too_narrow(start):
+            frame = frame.allowing(start)
+        return frame, self._minimize(frame, search(frame, start, budget), budget)
 
     def _minimize(self, frame: FramePosterior, search: Search, budget: Budget) -> Outcome:
         """Analysis by synthesis: ask, deform, synthesise, score, tell, until budget or convergence ends the search."""

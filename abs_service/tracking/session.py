@@ -199,7 +199,7 @@ class TrackingSession:
             self._renew(mesh, observation)
 
     def _relocate(self, tracker: Tracker, lost: Mesh, observation: Observation) -> None:
-        """Lays the mesh of a lost object over what is found in its place."""
+        """Fits the mesh of a lost object to the surface that is detected."""
         detection = self._detection(observation, self._region)
         self._loss_monitor.check_likeness(with_appearance(grid_mesh(detection), observation.images, self._rig), lost)
         tracker.relocate(detection.points)

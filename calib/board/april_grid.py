@@ -66,11 +66,6 @@ class AprilGrid:
         return 2 * self.columns, 2 * self.rows
 
     @property
-    def spacing(self) -> float:
-        """Least distance of neighbouring points [m]."""
-        return self.gap
-
-    @property
     def margin(self) -> float:
         """Extent of the print beyond the outer points [m]."""
         return self.gap

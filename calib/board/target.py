@@ -49,11 +49,6 @@ class Chessboard:
         return self.columns, self.rows
 
     @property
-    def spacing(self) -> float:
-        """Distance of neighbouring points [m]."""
-        return self.square
-
-    @property
     def margin(self) -> float:
         """Extent of the print beyond the outer points [m]."""
         return self.square
@@ -108,11 +103,6 @@ class Charuco:
     def grid(self) -> tuple[int, int]:
         """Columns and rows of points."""
         return self.columns - 1, self.rows - 1
-
-    @property
-    def spacing(self) -> float:
-        """Distance of neighbouring points [m]."""
-        return self.square
 
     @property
     def margin(self) -> float:

@@ -70,8 +70,8 @@ def find(stored: Stored, corners: Sequence[CornerView]) -> list[Mistake]:
     given = _miss(stored, shots)
     there = {view.sensor for views in shots for view in views}
     names = [name for name in stored.sensors if name in there]
-    least = MIN_SHARE * max((stored.sensors[name].camera.width for name in names), default=0)
-    if given <= least:
+    minimum = MIN_SHARE * max((stored.sensors[name].camera.width for name in names), default=0)
+    if given <= minimum:
         return []
     if same := same_images(view for views in shots for view in views):
         return [Mistake(Kind.REPEATED, pair, given, float("nan")) for pair in same]
@@ -79,7 +79,7 @@ def find(stored: Stored, corners: Sequence[CornerView]) -> list[Mistake]:
     for key, undone in _undone(stored, shots, names):
         found[key] = min(_miss(stored, undone), found.get(key, np.inf))
     best = min(found.values(), default=np.inf)
-    likely = sorted(found, key=lambda key: found[key]) if best < min(least, given / BETTER) else []
+    likely = sorted(found, key=lambda key: found[key]) if best < min(minimum, given / BETTER) else []
     return [Mistake(*key, given, found[key]) for key in likely if found[key] < ALIKE * best]
 
 

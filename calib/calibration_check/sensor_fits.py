@@ -50,12 +50,10 @@ class DistanceBias:
     Attributes:
         mean: over the views [m].
         sigma: standard error of the mean, from the scatter of the views [m].
-        views: number of views.
     """
 
     mean: float
     sigma: float
-    views: int
 
 
 def distance_bias(stored: Stored, views: Views, sensor: str) -> DistanceBias | None:
@@ -70,9 +68,7 @@ def distance_bias(stored: Stored, views: Views, sensor: str) -> DistanceBias | N
             excesses.append(float(np.median(view.distances - state.predicted_distances(T_sb, view.pixels))))
     if len(excesses) < MIN_SHOTS:
         return None
-    return DistanceBias(
-        float(np.mean(excesses)), float(np.std(excesses, ddof=1) / np.sqrt(len(excesses))), len(excesses)
-    )
+    return DistanceBias(float(np.mean(excesses)), float(np.std(excesses, ddof=1) / np.sqrt(len(excesses))))
 
 
 def distance_error(stored: Stored, views: Views, sensor: str, needed_px: float) -> DistanceError | None:

@@ -31,8 +31,8 @@ def doubts(cameras: Mapping[str, Camera]) -> tuple[str, ...]:
         is_fisheye = isinstance(one.lens, KannalaBrandt)
         reach = np.array([one.width / one.fx, one.height / one.fy])
         fields = reach if is_fisheye else 2 * np.arctan(reach / 2)
-        least, most = FIELDS_OF_VIEW[0], 2 * np.pi if is_fisheye else FIELDS_OF_VIEW[1]
-        if not np.all((fields > least) & (fields < most)):
+        minimum, maximum = FIELDS_OF_VIEW[0], 2 * np.pi if is_fisheye else FIELDS_OF_VIEW[1]
+        if not np.all((fields > minimum) & (fields < maximum)):
             angles = " × ".join(f"{np.rad2deg(field):.3g}°" for field in fields)
             found.append(
                 f"{name}: its field of view is {angles}. Are fx = {one.fx:g} and fy = {one.fy:g} in pixels of images "

@@ -1,4 +1,4 @@
-"""Interface of noise models: density and samples of what they describe (eqs. 17–19)."""
+"""Interface of noise models: density of what they describe (eqs. 17–19)."""
 
 from typing import Protocol, runtime_checkable
 
@@ -76,14 +76,6 @@ def log_density(model: DepthNoise, measured: ArrayLike, x: ArrayLike, a: ArrayLi
     deviation = model.deviation(x, a, p)
     normalized = (np.asarray(measured) - x - model.mean(x, a, p)) / deviation
     return -0.5 * normalized**2 - np.log(deviation) - LOG_SQRT_2PI
-
-
-def sample(
-    model: DepthNoise, generator: np.random.Generator, x: ArrayLike, a: ArrayLike, p: Pixels
-) -> NDArray[np.float64]:
-    """Random measurement [m] for every true distance `x` [m] and amplitude `a` at the pixels `p`."""
-    x, a = np.asarray(x, np.float64), np.asarray(a, np.float64)
-    return x + model.mean(x, a, p) + model.deviation(x, a, p) * generator.standard_normal(x.shape)
 
 
 def subtract_mean_offset(

@@ -153,8 +153,8 @@ def fit_regions(
     places = int(labels.max()) + 1
     of = labels[samples.pixels]
     offsets, factors = shrinkage.shrink(residual, deviation, basis, of, places, repeats, samples.minimum_sigma)
-    least = fitting.minimum_sigma(factors[of] * deviation)
-    return PerPixel(model, np.moveaxis(offsets[labels], -1, 0), factors[labels], np.array(distances), least)
+    minimum = fitting.minimum_sigma(factors[of] * deviation)
+    return PerPixel(model, np.moveaxis(offsets[labels], -1, 0), factors[labels], np.array(distances), minimum)
 
 
 def _from(model: PerPixel, samples: Samples) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

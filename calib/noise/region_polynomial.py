@@ -86,8 +86,8 @@ class Settings:
                 f"labels in {str(self.file)!r} must be 0 to {sigma.shape[2] - 1}, the regions that sigma and mu have, "
                 f"not {labels.min()} to {labels.max()}"
             )
-        least = float(arrays["minimum_sigma"])
-        return RegionPolynomial(labels.astype(np.int64), sigma, mu, arrays["distances"], arrays["amplitudes"], least)
+        minimum = float(arrays["minimum_sigma"])
+        return RegionPolynomial(labels.astype(np.int64), sigma, mu, arrays["distances"], arrays["amplitudes"], minimum)
 
 
 def blocks(height: int, width: int, side: int) -> NDArray[np.int64]:

@@ -29,7 +29,6 @@ class StaticBoard:
         seen_by: sensor whose image determined the pose.
         corners: number of points.
         rms_px: root mean square reprojection error [px].
-        T_rb: pose of the board in the rig.
         plane: q (3,) [1/m] of its plane, q · X = 1 in the depth sensor's frame.
         inside: pixels (height, width) of the depth sensor well inside the hull of the points.
         uncertainty: deviation of the true distances of these pixels due to corner noise, root mean square [m]; excludes
@@ -39,7 +38,6 @@ class StaticBoard:
     seen_by: str
     corners: int
     rms_px: float
-    T_rb: Pose
     plane: NDArray[np.float64]
     inside: NDArray[np.bool_]
     uncertainty: float
@@ -70,7 +68,7 @@ def locate(view: CornerView, observer: Camera, depth: Camera) -> StaticBoard:
     variance = np.einsum("ni,ij,nj->n", distance_jacobian, covariance, distance_jacobian)
     rms_px = float(np.sqrt(2 * np.mean(np.square(misses))))
     uncertainty = float(np.sqrt(np.mean(variance)))
-    return StaticBoard(view.sensor, len(view.points_b), rms_px, T_rb, _plane(T_rb, depth), inside, uncertainty)
+    return StaticBoard(view.sensor, len(view.points_b), rms_px, _plane(T_rb, depth), inside, uncertainty)
 
 
 def _refined(T_rb: Pose, view: CornerView, camera: Camera) -> tuple[Pose, NDArray[np.float64], NDArray[np.float64]]:

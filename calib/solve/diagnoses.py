@@ -63,14 +63,14 @@ def require_views(task: Task) -> None:
         corners = [view.shot for view in task.corners if view.sensor == name]
         planes = [view.shot for view in task.planes if view.sensor == name]
         shots = planes if sensor.fixed_intrinsics and len(planes) > len(corners) else corners
-        least = task.min_views_fixed if sensor.fixed_intrinsics else MIN_VIEWS
+        minimum = task.min_views_fixed if sensor.fixed_intrinsics else MIN_VIEWS
         count = len({task.poses[shot] for shot in shots})
-        if count < least:
+        if count < minimum:
             why = "to be placed in the rig" if sensor.fixed_intrinsics else "to find its intrinsics"
             plural = "s" * (count != 1)
             raise ViewsError(
-                f"{name}: {len(shots)} views of {count} distinct pose{plural} of the board; at least {least} poses are "
-                f"needed {why}, better 30"
+                f"{name}: {len(shots)} views of {count} distinct pose{plural} of the board; at least {minimum} poses "
+                f"are needed {why}, better 30"
             )
 
 

@@ -24,7 +24,7 @@ _opening = threading.Lock()
 
 
 def discover(timeout_s: float) -> list[Found]:
-    """Attached cameras, as the kernel tells of them; never raises and opens none."""
+    """Attached cameras, as the kernel lists them; never raises and opens none."""
     try:
         library.load()
     except SdkMissingError as error:

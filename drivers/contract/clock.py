@@ -84,12 +84,10 @@ class DeviceClock:
 
     Args:
         clock: of the stream; its `tick_hz` must not be 0.
-        latency_ns: minimum delay between exposure and arrival, 0 if unknown [ns].
     """
 
-    def __init__(self, clock: ClockInfo, latency_ns: int = 0) -> None:
+    def __init__(self, clock: ClockInfo) -> None:
         self._clock = clock
-        self._latency_ns = latency_ns
         self._steps = 0
         self._last: tuple[int, int] | None = None  # unwrapped ticks and arrival of the latest frame
         self._begin(0, 0)
@@ -121,7 +119,7 @@ class DeviceClock:
         self._add(x, y)
         delay = max(y - self._line(x), 0.0)
         self._residual += (delay - self._residual) / min(self._count, 300)
-        t_host_ns = t_arrival_ns - round(y - self._line(x)) - self._latency_ns
+        t_host_ns = t_arrival_ns - round(y - self._line(x))
         return Stamp(t_host_ns, round(self._sigma), stepped)
 
     def _begin(self, ticks: int, t_arrival_ns: int) -> None:

@@ -13,7 +13,7 @@ from drivers.contract.clock import Stamp
 from drivers.contract.device import DeviceError, DeviceState, Sink, Truth
 from drivers.contract.frame import Frame
 
-#: Of so many latest frames of a stream, so many that do not fit are no accident.
+#: Latest frames of a stream that are judged, and number of unfit ones among them that is reported.
 LATEST, MANY = 30, 15
 
 
@@ -112,10 +112,6 @@ class FrameGate:
         with self._lock:
             if self._sink is not None:
                 self._sink.on_truth(truth)
-
-    def knows(self, frame: Frame) -> bool:
-        """True if the frame is of a declared stream."""
-        return frame.key in self._streams
 
     def deliver(self, frame: Frame) -> None:
         """Delivers a frame, or counts the drop: `after_stop`, `unknown_stream`, `wrong_size`, `wrong_encoding`."""

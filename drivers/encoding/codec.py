@@ -82,6 +82,17 @@ def encode_info(frame: Frame, header: Header) -> bytes:
     return info.SerializeToString()
 
 
+def check_frame(frame: Frame) -> None:
+    """Checks that a message can hold a frame, and that its receivers would take it.
+
+    Raises:
+        Exception: neither of them; protobuf raises others than `CodecError` for values of a wrong type.
+    """
+    parse_valid(FrameInfo, encode_info(frame, Header()))
+    if not frame.data.size:
+        raise CodecError(f"{frame.sensor}/{frame.stream}: an image of shape {frame.data.shape} has no pixels")
+
+
 def parse_image(payload: bytes) -> tuple[RawImage, memoryview]:
     """A serialized foxglove.RawImage without its pixels, and a view of these.
 

@@ -15,14 +15,12 @@ class Address:
     """A parsed address.
 
     Attributes:
-        uri: the address itself.
         host: IPv4 address of the processing unit, "" for ifm3d's default: the environment variable IFM3D_IP, or
             192.168.0.69, with which units leave the factory.
         port: TCP port of its configuration interface.
         head: serial number of the camera head, "" for the only one.
     """
 
-    uri: str
     host: str = ""
     port: int = XMLRPC_PORT
     head: str = ""
@@ -41,4 +39,4 @@ def parse(uri: str) -> Address:
             IPv4Address(host)  # ifm3d looks up no names
     except ValueError as error:
         raise AddressError(f"{uri}: {unit!r} must be an IPv4 address, such as 192.168.0.69") from error
-    return Address(uri, host, port, **values(uri, {"head": str}))
+    return Address(host, port, **values(uri, {"head": str}))

@@ -49,7 +49,6 @@ class Chunk:
         time_ns: time of the exposure on the camera's clock [ns].
         width, height: of the image [px].
         pixel_format: number of the format of its pixels.
-        text: JSON after the header, "" if there is none.
         content: payload, padding included.
     """
 
@@ -59,7 +58,6 @@ class Chunk:
     width: int
     height: int
     pixel_format: int
-    text: str
     content: memoryview
 
     def image(self) -> NDArray[np.generic]:
@@ -111,7 +109,6 @@ def _chunk(data: memoryview, position: int) -> tuple[Chunk, int]:
     if size > len(rest):
         raise ChunkError(f"byte {position}: a chunk of {size} bytes does not fit into the {len(rest)} that are left")
     seconds, nanoseconds = _HEADER_2.unpack_from(rest)[10:] if version >= 2 else (0, time_us * 1000)
-    text = bytes(rest[fixed:header]).rstrip(b"\0").decode("utf-8", "replace")
     time_ns = seconds * 1_000_000_000 + nanoseconds
-    chunk = Chunk(kind, frame, time_ns, width, height, pixel_format, text, rest[header:size])
+    chunk = Chunk(kind, frame, time_ns, width, height, pixel_format, rest[header:size])
     return chunk, position + size

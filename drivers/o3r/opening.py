@@ -27,7 +27,7 @@ def discover(timeout_s: float) -> list[Found]:
         return [Found(_UNKNOWN, Availability.SDK_MISSING, error.reason, error.remedy)]
     host = os.environ.get("IFM3D_IP", "")
     try:
-        return [found for _, found in _attached(_unit(ifm3d, Address("o3r://", host)), "o3r://")] if host else []
+        return [found for _, found in _attached(_unit(ifm3d, Address(host)), "o3r://")] if host else []
     except DeviceError as error:
         return [Found(_UNKNOWN, Availability.FAULTY, str(error), f"IFM3D_IP is {host}: is the unit there?")]
 

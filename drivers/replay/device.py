@@ -136,14 +136,14 @@ class ReplayDevice:
         """Frames and truths with new host times, each when it is due; some are read before that, in spare time."""
         timeline, malformed = _Timeline(self._clock(), self._speed), 0
         ahead: deque[tuple[int, Frame | Truth]] = deque()
-        most = len(self.capabilities.streams) + 1  # those of one moment, and its truth
+        maximum = len(self.capabilities.streams) + 1  # those of one moment, and its truth
         failure: Exception | None = None
         try:
             for item in self._recording.frames():
                 self._gate.drop("malformed", self._recording.malformed - malformed)
                 malformed = self._recording.malformed
                 ahead.append((timeline.time_ns(item), item))
-                while ahead and (len(ahead) > most or ahead[0][0] <= self._clock()):
+                while ahead and (len(ahead) > maximum or ahead[0][0] <= self._clock()):
                     if self._wait_for(ahead[0][0], stop):
                         return
                     yield ahead.popleft()

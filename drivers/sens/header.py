@@ -123,9 +123,9 @@ def read(stream: BinaryIO) -> Header:
         _exactly(stream, _REST.size)
     )
     color_K, color_T, depth_K, depth_T = np.reshape(np.array(numbers, np.float64), (4, 4, 4))
-    least, most = SHIFTS
-    if not least <= shift <= most:
-        raise SensError(f"depth_shift = {shift}: must be from {least:g} to {most:g} units per metre")
+    minimum, maximum = SHIFTS
+    if not minimum <= shift <= maximum:
+        raise SensError(f"depth_shift = {shift}: must be from {minimum:g} to {maximum:g} units per metre")
     if not 0 < count <= MAX_FRAMES:
         why = "" if count else "; a recorder that was interrupted leaves 0"
         raise SensError(f"num_frames = {count}: must be from 1 to {MAX_FRAMES}{why}")

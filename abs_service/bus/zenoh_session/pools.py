@@ -6,8 +6,9 @@ help, each restart of a process that publishes images would cost a rig that goes
 
 import mmap
 import os
-from collections.abc import Callable, Set
-from contextlib import suppress
+import threading
+from collections.abc import Callable, Iterator, Set
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 #: A pool's size is a multiple of this plus its owner's process number, which is less on Linux.
@@ -15,7 +16,14 @@ UNIT_BYTES = 1 << 22
 #: Time after the end of a process in which its last images are still read [ns].
 READ_NS = 10_000_000_000
 
+#: Time between two checks whether the pool of this process is still there [s].
+CHECK_S = 1.0
+
 FILES = Path("/proc/self/fd")
+
+
+class DeletedError(ConnectionError):
+    """Another program has deleted the pool of this process; a new process has a new one."""
 
 
 def own_size(size: int) -> int:
@@ -28,12 +36,46 @@ def free_pool(process: int) -> None:
 
     Whoever still read in it would read zeros.
     """
+    for file, about in _pools(process):
+        with suppress(OSError):  # closed in the meantime
+            _punch(file, about.st_size)
+
+
+@contextmanager
+def watched(end: Callable[[], None]) -> Iterator[None]:
+    """Calls `end`, from a thread, when another program has deleted the pool of this process.
+
+    Who has mapped it reads on. Who comes later cannot, and would miss all large messages without a word.
+
+    Raises:
+        DeletedError: when its body has ended, if that has happened.
+    """
+    is_over, deleted = threading.Event(), threading.Event()
+
+    def watch() -> None:
+        while not (deleted.is_set() or is_over.wait(CHECK_S)):
+            if any(about.st_nlink == 0 for _, about in _pools(os.getpid())):
+                deleted.set()
+                end()
+
+    threading.Thread(target=watch, name="shared memory", daemon=True).start()
+    try:
+        yield
+    finally:
+        is_over.set()
+    if deleted.is_set():
+        by = "systemd does so when its user logs out: `loginctl enable-linger` or RemoveIPC=no in logind.conf"
+        raise DeletedError(f"another program has deleted the shared memory of this process in /dev/shm; {by}")
+
+
+def _pools(process: int) -> Iterator[tuple[Path, os.stat_result]]:
+    """Open files of this process that are the pool of a process, and what the system knows of them."""
     for file in FILES.iterdir():
         with suppress(OSError):  # closed in the meantime
-            size = file.stat().st_size
-            is_pool = size > UNIT_BYTES and str(file.readlink()).startswith("/dev/shm/")
-            if is_pool and size % UNIT_BYTES == process:
-                _punch(file, size)
+            about = file.stat()
+            is_pool = about.st_size > UNIT_BYTES and str(file.readlink()).startswith("/dev/shm/")
+            if is_pool and about.st_size % UNIT_BYTES == process:
+                yield file, about
 
 
 def _punch(file: Path, size: int) -> None:

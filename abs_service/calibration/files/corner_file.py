@@ -74,7 +74,7 @@ def read(path: Path, target: Target) -> BoardObservations:
 
 
 def read_any(path: Path) -> BoardObservations:
-    """Reads detections of whatever board.
+    """Reads detections of any board.
 
     Raises:
         CornerFileError: no such file, or no file of detections.

@@ -85,8 +85,8 @@ def _measured(found: NoiseCalibration) -> list[Verdict]:
         steps = row.step / math.sqrt(12)
         measured = max(float(np.hypot(row.temporal, np.nan_to_num(row.fixed))), steps)
         # What pixels differ by for good is no scatter about a mean offset of each pixel.
-        least = max(row.temporal, steps) if found.chosen.candidate.level == "pixel" else measured
-        if not least / _MISS < sigma < measured * _MISS:
+        minimum = max(row.temporal, steps) if found.chosen.candidate.level == "pixel" else measured
+        if not minimum / _MISS < sigma < measured * _MISS:
             text = f"σ is {sigma * 1e3:.2g} mm at {row.distance:.2f} m, where {measured * 1e3:.2g} mm were measured."
             said.append(Verdict(Level.BAD, text, "Do not use the model there: look at its plot.", name))
     return said

@@ -38,7 +38,6 @@ class Sequence:
         radial: True if the lengths are radial.
         digit: resolution of the lengths [m]; 0 if they are not integers.
         exposure: setting, for display; "" if unknown.
-        filters: filters that the device applied.
         sensor_shots: mean images of this and other sensors, by sensor, for board detection.
         cameras: of all sensors, by name.
     """
@@ -52,7 +51,6 @@ class Sequence:
     radial: bool
     digit: float
     exposure: str
-    filters: tuple[str, ...]
     sensor_shots: Mapping[str, SensorShot]
     cameras: Mapping[str, Camera]
 
@@ -186,7 +184,6 @@ class _Gathered:
             first.geometry == Geometry.RADIAL,
             first.scale if first.data.dtype.kind in "ui" else 0.0,
             setting,
-            first.filters,
             {**others, **self.sensor_shots.sensor_shots()},
             cameras,
         )

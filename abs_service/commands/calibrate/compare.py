@@ -30,7 +30,7 @@ from calib.formats import opencv
 from calib.formats.content import Hints
 from calib.solve.validation.projection_difference import DifferenceError, DifferenceMap, chance, projection_difference
 
-#: Every so many rows and columns of the map are printed.
+#: Step between the printed rows and columns of the map.
 STEP = 2
 
 

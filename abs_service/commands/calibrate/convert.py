@@ -24,7 +24,7 @@ from pathlib import Path
 from abs_service.bus import keys
 from abs_service.calibration.files import exchange, rig_file
 from abs_service.commands.calibrate.inputs import camera_files
-from abs_service.commands.parts.options import OptionError, assignments, size
+from abs_service.commands.parts.options import OptionError, assignments, check_new, size
 from abs_service.config.problems import allowed_instead
 from abs_service.report import provenance
 from abs_service.supervision.exit_codes import Exit
@@ -55,8 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Converts, and reports losses."""
     out = arguments.out
-    if out.exists():
-        raise OptionError(f"{out}: exists already; choose another name or remove it")
+    check_new(out)
     hints = Hints(size=arguments.size, lens=arguments.lens or "")
     read = camera_files.read_all(arguments.inputs, hints, arguments.source, arguments.unit)
     content = _chosen(read, arguments)

@@ -21,6 +21,7 @@ options have to be changed first. What the verdicts mean: docs/how-to/calibratio
 
 import argparse
 from collections.abc import Iterable
+from dataclasses import replace
 
 from abs_service.calibration.files import target_file
 from abs_service.commands.calibrate import solving
@@ -60,7 +61,8 @@ def run(arguments: argparse.Namespace) -> int:
 def _solve(arguments: argparse.Namespace) -> int:
     """Solves the rig."""
     found = material.material(arguments)
-    there = [name for name in found.seen.sizes if any(view.sensor == name for view in _views(found))]
+    seen = {view.sensor for view in (*found.seen.corners, *found.seen.planes)}
+    there = [name for name in found.seen.sizes if name in seen]
     terms = assignments("--depth-terms NAME=TERMS", arguments.depth_terms)
     for option, names in (
         ("--keep", arguments.keep),
@@ -75,11 +77,8 @@ def _solve(arguments: argparse.Namespace) -> int:
             raise OptionError(f"--depth-terms {name}={term}: {allowed_instead(term, TERMS)}")
     with_corners = {view.sensor for view in found.seen.corners}
     sensors = {
-        name: solving.sensor_task(
-            name,
-            arguments,
-            found,
-            keeps=name in arguments.keep or name not in with_corners,
+        name: replace(
+            solving.sensor_task(name, arguments, found, keeps=name in arguments.keep or name not in with_corners),
             fixed_pose=name in arguments.fixed_pose,
             depth_terms=TERMS[terms[name]] if name in terms else (),
             free_running=name in arguments.free_running,
@@ -90,10 +89,6 @@ def _solve(arguments: argparse.Namespace) -> int:
     two_ways_up = has_two_ways_up(target_file.read(arguments.target))
     task = Task(sensors, found.seen.corners, found.seen.planes, reference, two_ways_up=two_ways_up)
     return solving.finish(f"Calibration of {', '.join(there)}", task, arguments, found)
-
-
-def _views(found: Material) -> list:
-    return [*found.seen.corners, *found.seen.planes]
 
 
 def _check_names(option: str, names: Iterable[str], there: list[str]) -> None:

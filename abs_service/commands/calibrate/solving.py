@@ -7,7 +7,6 @@ import math
 import re
 from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 
 from abs_service.calibration.cameras import report
@@ -32,7 +31,7 @@ from calib.solve.validation.verdict import assess
 
 @contextmanager
 def reported(title: str, arguments: argparse.Namespace) -> Iterator[None]:
-    """Reports what the images do not allow; the calibration is not written, and the error goes on."""
+    """Context that writes a report about images that cannot be used, without a calibration, and passes the error on."""
     try:
         yield
     except Exception as error:
@@ -116,14 +115,14 @@ def _lens(text: str) -> str:
     return text
 
 
-def sensor_task(name: str, arguments: argparse.Namespace, found: Material, keeps: bool, **terms: object) -> SensorTask:
+def sensor_task(name: str, arguments: argparse.Namespace, found: Material, keeps: bool) -> SensorTask:
     """Task of one sensor, from its image size, previous calibration and options.
 
     Raises:
         OptionError: fixed intrinsics that are unknown, or a lens of no sensor.
     """
     size = found.seen.sizes[name]
-    factory = (replace(found.known[name].camera),) if name in found.known else ()
+    factory = (found.known[name].camera,) if name in found.known else ()
     lenses = assignments("--lens NAME=KIND", arguments.lens)
     for other in lenses:
         if other not in found.seen.sizes:
@@ -135,7 +134,7 @@ def sensor_task(name: str, arguments: argparse.Namespace, found: Material, keeps
     if keeps and not factory:
         raise OptionError(f"{name}: nothing is known of its intrinsics, so they cannot be kept; see --start")
     fixed = _fixed(name, arguments.fix, KINDS[kind], found.seen.sizes)
-    return SensorTask(*size, KINDS[kind], factory, keeps, fixed=fixed, **terms)  # pyright: ignore[reportArgumentType]
+    return SensorTask(*size, KINDS[kind], factory, keeps, fixed=fixed)
 
 
 def _fixed(name: str, options: Iterable[str], kind: LensKind, sensors: Collection[str]) -> tuple[str, ...]:

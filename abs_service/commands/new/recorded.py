@@ -37,7 +37,7 @@ _PRIMESENSE = StructuredLight()
 #: A smaller excess is no evidence: images differ.
 _MORE = 1.2
 
-#: The scatter is the median of so many images.
+#: Number of images of whose scatter the median is taken.
 _IMAGES = 5
 
 #: Noise models of colours by their stream.

@@ -18,6 +18,7 @@ from abs_service.bus.contract import Subscription
 from abs_service.bus.frames import FramePublisher
 from abs_service.bus.health import Health, Level
 from abs_service.bus.stamps import HeaderFactory, WallClock
+from abs_service.bus.zenoh_session import pools
 from abs_service.capture import sensor_metadata
 from abs_service.capture.device_supervisor import DeviceSupervisor
 from abs_service.capture.metadata_publisher import MetadataPublisher
@@ -46,7 +47,7 @@ def run(arguments: argparse.Namespace) -> int:
     stop = rig_process.stop_on_signals()
     clock = WallClock()
     headers = HeaderFactory(rig.name, clock)
-    with rig_process.open_bus(rig, arguments, "capture") as bus:
+    with rig_process.open_bus(rig, arguments, "capture") as bus, pools.watched(stop.set):
         health = Health(bus, "capture", headers)
         bus.declare_liveliness("capture")
         bus.answer_queries(keys.SCHEMA, sensor_metadata.SCHEMA_MESSAGE, sensor_metadata.schema)

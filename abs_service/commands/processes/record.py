@@ -45,7 +45,7 @@ QUIET_S, LAST_S = 0.2, 1.0
 INTERRUPTED_S = 60.0
 #: Time between two checks whether something is to be recovered [s].
 RECOVERY_S = 10.0
-#: By so much a file system's clock may be behind: it has the time of the last tick of the system.
+#: Largest lag of a file system's clock, which has the time of the last tick of the system [s].
 TICK_S = 0.1
 #: Niceness: capture and tracking go first where cores are scarce; recording has a queue.
 NICE = 5

@@ -24,6 +24,7 @@ from abs_service.bus.contract import Bus
 from abs_service.bus.frames import FrameSubscriber
 from abs_service.bus.health import Health, Level
 from abs_service.bus.stamps import HeaderFactory, WallClock
+from abs_service.bus.zenoh_session import pools
 from abs_service.commands.parts import chosen_region, rig_process
 from abs_service.pairing.common_clock import CommonClock
 from abs_service.pairing.frame_set_queue import FrameSetQueue
@@ -64,7 +65,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise wiring.PlanError(f"{config.named(arguments.config)}: {problem}")
     stop = rig_process.stop_on_signals()
     while not stop.is_set():
-        with rig_process.open_bus(settings, arguments, "tracker") as bus:
+        with rig_process.open_bus(settings, arguments, "tracker") as bus, pools.watched(stop.set):
             track_until_recalibrated(bus, settings, name, plan, noises, stop)
     return Exit.OK
 

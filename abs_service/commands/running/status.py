@@ -104,7 +104,7 @@ def _absent(components: Mapping[str, Health | None]) -> list[dict[str, Any]]:
 
 
 def _level(condition: str) -> str:
-    """Level of a process of which nothing is received, by what `run` says of it."""
+    """Level of a process that sends no health, by its condition in the health of `run`."""
     if condition.startswith(ChildState.FAILED):
         return "error"
     # One that has just started cannot speak yet; of one that should, `run` adds a reason.

@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def check() -> None:
-    """Refuses to go on without viser.
+    """Checks that viser is installed.
 
     Raises:
         OptionError: it is not installed.

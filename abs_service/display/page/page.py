@@ -35,7 +35,7 @@ from drivers.contract.frame import Frame, Kind
 #: Periods of the page: mesh, points and images, words and plots [s]; without a browser [s].
 MESH_S, IMAGES_S, WORDS_S, IDLE_S = 1 / 30, 0.25, 1.0, 0.5
 
-#: A residual compares a mesh with images of its exposure: those at most so far from it [ns].
+#: Largest difference in time between a mesh and an image of the same exposure [ns].
 SAME_NS = 20_000_000
 
 #: Buttons that the recorder may have no use for.

@@ -7,7 +7,7 @@ import viser
 
 from abs_service.display.page.readouts.words import STALE_COLOR
 
-#: A status that is not renewed for so long [s] is grey, and a line above it says why: the browser does this by itself.
+#: Time without renewal after which a status turns grey, with the reason above it; the browser does so by itself [s].
 GONE_S = 5
 
 #: Width of a screen up to which viser's panel lies at its bottom [em], and the most that it then takes [%].

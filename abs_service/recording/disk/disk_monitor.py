@@ -7,6 +7,7 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
+from abs_service.bus import stamps
 from abs_service.bus.health import Health, Level
 from abs_service.bus.stamps import WallClock
 from abs_service.recording.disk import forecast
@@ -34,6 +35,7 @@ class DiskMonitor:
         health: of the recorder.
         clock: time.
         free_bytes: free space of the file system of a folder.
+        is_synchronised: whether the wall clock follows a time server.
     """
 
     def __init__(
@@ -44,6 +46,7 @@ class DiskMonitor:
         health: Health,
         clock: WallClock,
         free_bytes: Callable[[Path], int] = lambda folder: shutil.disk_usage(folder).free,
+        is_synchronised: Callable[[], bool] = stamps.is_synchronised,
     ) -> None:
         self._recordings = recordings
         self._estimates = estimates
@@ -52,7 +55,7 @@ class DiskMonitor:
         self._clock = clock
         self._free_bytes = free_bytes
         self._meters = forecast.RateMeter(), forecast.RateMeter()
-        self._ages = Ages(clock.wall(0)), Ages(clock.wall(0))
+        self._ages = [Ages(clock.wall, kept.retain_s, is_synchronised) for kept in (recordings, estimates)]
         self._next_ns = 0
 
     def start(self, written: Callable[[], tuple[int, int]], stop: threading.Event) -> None:
@@ -98,6 +101,8 @@ class DiskMonitor:
             for path in deleted:
                 self._health.count("deleted")
                 self._health.label("deleted", path.name)
+            if ages.doubt:
+                warning = f"{ages.doubt}, by a clock that follows no time server; what is older is kept for now"
             if failures:
                 warning = f"an old recording cannot be deleted: {failures[0]}"
         self._health.report("retention", Level.WARNING if warning else Level.OK, warning)

@@ -2,12 +2,12 @@
 
 import os
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from abs_service.recording.disk.forecast import Growth
+from abs_service.recording.disk.forecast import Growth, duration
 from abs_service.recording.recording_file import ACTIVE
 
 #: Beside a recording, `x.mcap.keep` for `x.mcap`: it is never deleted.
@@ -29,27 +29,52 @@ class Ages:
     It is asked for once, and tells how old those are that are there already. What comes later counts from the last time
     at which it was seen unfinished.
 
+    A clock that follows no time server may be wrong by years, as without a battery, and all that is older would be
+    deleted at once. Until it follows one, a time longer than `retain_s` in which nothing was recorded is no part of an
+    age. For the same reason, `restic forget --keep-within` counts from the latest snapshot.
+
     Args:
-        wall_ns: wall-clock time of the zero of the monotonic clock [ns].
+        wall: wall-clock time of a time of the monotonic clock [ns].
+        retain_s: age at which a recording is deleted [s].
+        is_synchronised: whether the wall clock follows a time server.
+
+    Attributes:
+        doubt: which time is no part of the ages, in words; "" if there is none.
     """
 
-    def __init__(self, wall_ns: int) -> None:
-        self._wall_ns = wall_ns
+    def __init__(self, wall: Callable[[int], int], retain_s: float, is_synchronised: Callable[[], bool]) -> None:
+        self._wall, self._retain_s, self._is_synchronised = wall, retain_s, is_synchronised
         self._changed_ns: dict[str, int] | None = None  # by name, CLOCK_MONOTONIC [ns]
+        self._doubted: frozenset[str] = frozenset()  # names
+        self.doubt = ""
 
-    def of(self, files: Iterable[RetainedFile], now_ns: int) -> dict[str, int]:
-        """Times since the last change of all files that there are, by name [ns]."""
-        before, self._changed_ns, ages = self._changed_ns, {}, {}
-        for file in files:
-            name = file.name.removesuffix(ACTIVE)
-            changed_ns = now_ns
-            if before is None:
-                changed_ns = min(file.mtime_ns - self._wall_ns, now_ns)
-            elif name == file.name:
-                changed_ns = before.get(name, now_ns)
-            self._changed_ns[name] = changed_ns
-            ages[file.name] = now_ns - changed_ns
-        return ages
+    def of(self, files: Sequence[RetainedFile], now_ns: int) -> dict[str, int]:
+        """Times since the last change of all files that there are, oldest first, by name [ns]."""
+        before, names = self._changed_ns, {file.name: file.name.removesuffix(ACTIVE) for file in files}
+        if before is None or (self.doubt and self._is_synchronised()):
+            self._changed_ns = self._by_wall_clock(files, now_ns)
+        else:
+            self._changed_ns = {
+                name: before.get(name, now_ns) if name == there else now_ns for there, name in names.items()
+            }
+        if self._doubted.isdisjoint(self._changed_ns):
+            self.doubt = ""
+        return {there: now_ns - self._changed_ns[name] for there, name in names.items()}
+
+    def _by_wall_clock(self, files: Sequence[RetainedFile], now_ns: int) -> dict[str, int]:
+        """Times of the last change by the wall clock, by name, CLOCK_MONOTONIC [ns]."""
+        changed_ns, doubted, is_trusted = {}, list[str](), self._is_synchronised()
+        left_out_ns, later_ns, wall_ns = 0, now_ns, self._wall(0)
+        for file in reversed(files):
+            t_ns = min(file.mtime_ns - wall_ns, now_ns)
+            if not is_trusted and later_ns - t_ns > self._retain_s * 1e9:
+                left_out_ns += later_ns - t_ns
+            later_ns, name = t_ns, file.name.removesuffix(ACTIVE)
+            changed_ns[name] = t_ns + left_out_ns
+            doubted += [name] if left_out_ns else []
+        self._doubted = frozenset(doubted)
+        self.doubt = f"nothing was recorded for {duration(left_out_ns * 1e-9)}" if doubted else ""
+        return changed_ns
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +125,7 @@ class Retention:
         one = min(self.rotate_bytes, self.rotate_s * rate)
         return Growth(rate, sum(file.size for file in self.files()), self.retain_s, self.retain_bytes, one)
 
-    def apply(self, ages: Callable[[Iterable[RetainedFile]], dict[str, int]]) -> tuple[list[Path], list[OSError]]:
+    def apply(self, ages: Callable[[Sequence[RetainedFile]], dict[str, int]]) -> tuple[list[Path], list[OSError]]:
         """Deletes the files beyond the limits, by their ages [ns]; returns them, and why others cannot be deleted."""
         deleted: list[Path] = []
         failures: list[OSError] = []

@@ -117,7 +117,11 @@ class ChildProcess:
             self._process = forked.CONTEXT.Process(
                 target=forked.begin, args=(stdin, output, program, list(arguments)), name=component, daemon=True
             )
-            self._process.start()
+            try:
+                self._process.start()
+            except (EOFError, ConnectionError) as error:  # another one is started the next time
+                killed = "somebody has killed it, or the system for want of memory"
+                raise OSError(f"the fork server has ended: {killed}") from error
         self._ended, self._code = _end_of(self._process), None  # exit code
         self._reader = threading.Thread(target=self._read, args=(component, on_line), name=component, daemon=True)
         self._reader.start()

@@ -16,6 +16,7 @@ from contextlib import suppress
 from importlib import import_module
 from multiprocessing import current_process, forkserver, resource_tracker, util
 from multiprocessing.connection import Connection
+from pathlib import Path
 from typing import Any
 
 from setproctitle import setproctitle
@@ -31,6 +32,11 @@ FILES = 65_536
 #: Longest temporary folder in which the path of the fork server's socket, 39 bytes longer, has the 107 that unix(7)
 #: permits [bytes].
 MAX_PARENT_LENGTH = 64
+
+#: For want of memory, the kernel ends first what has so much more of 1000 in its score: not `run`, which starts the
+#: others again, and is larger than they by shared memory that they had. As much as systemd gives a user's programs.
+OOM_SCORE = 200
+_OOM_SCORE_ADJ, _MAX_OOM_SCORE = Path("/proc/self/oom_score_adj"), 1000
 
 _PR_SET_CHILD_SUBREAPER = 36
 #: Environment variable with the folder of the fork server's socket.
@@ -71,6 +77,13 @@ def ensure_running() -> None:
         os.kill(server._forkserver_pid, signal.SIGCONT)  # noqa: SLF001
 
 
+def give_way() -> None:
+    """Lets the kernel end this process, and those that it will fork, before `run` for want of memory."""
+    with suppress(OSError):  # the kernel does not offer it
+        score = int(_OOM_SCORE_ADJ.read_text(encoding="ascii")) + OOM_SCORE
+        _OOM_SCORE_ADJ.write_text(str(min(score, _MAX_OOM_SCORE)), encoding="ascii")
+
+
 def detach() -> None:
     """Detaches the fork server from the terminal, which is left to `run`.
 
@@ -78,6 +91,7 @@ def detach() -> None:
     """
     for number in (signal.SIGHUP, signal.SIGUSR1, signal.SIGUSR2):  # also of what it forks: who sends them means `run`
         signal.signal(number, signal.SIG_IGN)
+    give_way()
     setproctitle("abs-service fork-server")
     atexit.register(shutil.rmtree, os.environ.pop(_FOLDER), ignore_errors=True)
     with open(os.devnull, "r+b", buffering=0) as null:

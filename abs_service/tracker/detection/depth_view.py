@@ -17,12 +17,12 @@ from calib.warp.pictures import PictureLookup
 #: Largest difference in distance between neighbouring pixels of one surface [m]; "auto": see `DepthView.step`.
 Step = Literal["auto"] | Annotated[float, Gt(0)]
 
-#: Smallest step between two surfaces where the noise does not matter [m]; steps up to so many standard deviations of
-#: the distances are noise. At 2.8 m, a structured light camera splits a person at 0.04 m, but not at 5 deviations.
+#: Smallest step between two surfaces where the noise does not matter [m], and largest step that is noise, in standard
+#: deviations of the distances. At 2.8 m, a structured light camera splits a person at 0.04 m, but not at 5 deviations.
 MIN_STEP_M, NOISE_STEPS = 0.04, 5.0
 
-#: Or up to so many widths of a pixel on the object: by so much does a surface that is slanted by 60° change across the
-#: three pixels that are compared. At 2 m, pixels of 22 mm split a person into pieces at 0.04 m.
+#: Largest step within one surface, in widths of a pixel on the object: that of a surface that is slanted by 60° across
+#: the three pixels that are compared. At 2 m, pixels of 22 mm split a person into pieces at 0.04 m.
 SLANT_STEPS = 3.5
 
 #: A colour image (height, width, 3), red, green, blue in 0…255, and the camera that took it.

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-#: Missing returns belong to an area if a square of so many pixels a side fits around them.
+#: Side of the smallest square of missing returns that is an area [px].
 AREA_PX = 3
 _AREA = np.ones((AREA_PX, AREA_PX))
 

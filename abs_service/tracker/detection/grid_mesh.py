@@ -20,8 +20,8 @@ MIN_COVER = 0.75
 #: Least radius around a grid point: within it are three pixels at least, wherever the point lies [px].
 MIN_RADIUS_PX = 1.5
 
-#: Distances around a grid point that deviate by more from their median belong to another surface [m]; or, where noise
-#: is more than this, by so many standard deviations of a distance.
+#: Largest deviation of a distance around a grid point from their median, beyond which it belongs to another surface:
+#: the larger of a length [m] and a number of standard deviations of a distance.
 MAX_RELIEF_M, NOISY_RELIEF = 0.03, 3.0
 
 #: Or by more from a plane through all of them, if that is too steep for it: it shows no jump that it does not.

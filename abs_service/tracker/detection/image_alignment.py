@@ -30,15 +30,16 @@ SCALES = 1.02 ** np.arange(-6.0, 7.0)
 #: light makes things two or three pixels wider, and calibrations that were fitted to one scene are off by as much.
 MIN_DISPLACEMENT_PX = 4.0
 
-#: It has to stand out from all others that are looked for by so many standard deviations, and those of this share of so
-#: many random halves of the cells have to be so near to it [px, root mean square]. Of 2033 depth images, each beside an
-#: image of another scene, 22 reach the first limit, three the second, and none both.
+#: Least number of standard deviations by which it stands out from all others that are looked for; least share of
+#: random halves of the cells that agree with it, number of such halves, and their largest distance from it [px, root
+#: mean square]. Of 2033 depth images, each beside an image of another scene, 22 reach the first limit, three the
+#: second, and none both.
 DEVIATIONS, SHARE, HALVES, AGREEMENT = 6.0, 0.9, 60, 3.0
 
 #: A jump is larger than this share of the distance, and than this [m]: steps and noise are not.
 JUMP, MIN_JUMP_M = 0.03, 0.02
 
-#: Jumps without others beside them, on most of a line of so many pixels, are wrong distances.
+#: Length of a line of pixels along a jump [px]; a jump that is not on most of it is a wrong distance.
 LINE = 7
 
 #: What is behind appears within this share of the image's width: at a jump, sensors have no returns, or mixed ones.
@@ -51,7 +52,7 @@ MAX_JUMPS, CELLS, MIN_CELLS = 800, 10, 8
 #: An edge counts by its strength over the typical one nearby, at most this, and weaker ones than a share of all less.
 MAX_STRENGTH, WEAK = 3.0, 0.2
 
-#: Other focal lengths displace the edges of the image by so much at most [px of the reduced image].
+#: Largest displacement of the image's edges by other focal lengths [px of the reduced image].
 _MARGIN = round(0.13 * WIDTH / 2)
 _SIDE = 2 * (REACH + _MARGIN) + 1
 

@@ -31,8 +31,8 @@ SCENE_OF_MEASURED, SCENE_OF_IMAGE = 1 / 2, 1 / 3
 #: sensors have no returns in the outer 7 % of an image that is registered to another camera.
 SCENE_MARGIN = 0.08
 
-#: A surface lines the image's border if it lies along it for so many times the root of its area: at most once, if one
-#: side of the image cuts off a thing as deep as wide; 1.25 to 4 times for the walls and floors of real scenes.
+#: Length along which a surface lines the image's border, in roots of its area: at most 1 if one side of the image cuts
+#: off a thing as deep as wide; 1.25 to 4 times for the walls and floors of real scenes.
 LINING = 1.2
 
 #: Depth below the border of all that is measured at which the length along it is counted [px]: surfaces end inside.

@@ -25,7 +25,7 @@ class Status(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class SearchReport:
-    """The search for theta, and what it took; by default there was none.
+    """Result and effort of the search for theta; the defaults are those without a search.
 
     Attributes:
         cost: negative logarithm of likelihood times priors at theta, up to constants.

@@ -116,7 +116,7 @@ def judge(
 
 
 def _seen(fits: Sequence[SensorFit], lost: bool, limits: Settings) -> Iterator[str]:
-    """Reasons by what the sensors show of the vertices."""
+    """Reasons from the agreement of the sensors with the vertices."""
     inliers, occluded = inlier_share(fits), occluded_share(fits)
     disagree, hidden = inliers < limits.degraded_below, occluded > limits.degraded_occluded
     advice = _FIND if lost else _FOLLOW
@@ -223,7 +223,7 @@ def _placed(fits: Sequence[SensorFit], shape: ShapeQuality, innovation: float, l
 
 
 def _shaped(shape: ShapeQuality, limits: Settings) -> Iterator[str]:
-    """Reasons by what the deformed mesh shows by itself."""
+    """Reasons from the deformed mesh alone."""
     if shape.folded_share > limits.degraded_folded:
         yield (
             f"{shape.folded_share:.0%} of the faces are folded: the model cannot follow the shape – "

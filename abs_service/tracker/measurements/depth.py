@@ -11,7 +11,6 @@ from abs_service.pairing.images import DepthImage, Parts, Window
 from abs_service.tracker.measurements.base import Comparison, Decoder
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.synthesis.base import Synthesizer
-from abs_service.tracker.terms.depth.continuation import CoarseContinuation
 from abs_service.tracker.terms.depth.depth import DepthTerm
 from abs_service.tracker.terms.depth.outline.base import NoOutline, Outline
 from abs_service.tracker.terms.depth.outline.rim import Rim
@@ -44,9 +43,7 @@ class Measurement:
 
     def term(self, sensor: Sensor, mesh: Mesh, synthesizer: Synthesizer, comparison: Comparison) -> DepthTerm:
         """Distances, the outline at the mesh's rim, and the surface beyond it."""
-        outline = _outline(mesh, comparison)
-        beyond = partial(CoarseContinuation, mesh=mesh)
-        return DepthTerm(sensor.name, synthesizer, len(mesh.vertices), self.noise, comparison.bounds, outline, beyond)
+        return DepthTerm(sensor.name, synthesizer, mesh, self.noise, comparison.bounds, _outline(mesh, comparison))
 
 
 def _auxiliary(noise: DepthNoise) -> tuple[Kind, ...]:

@@ -58,6 +58,10 @@ class ObservedObjective(Protocol):
         """Takes the estimate in, a population of one: later observations may be compared otherwise."""
         ...
 
+    def of_distances(self) -> "ObservedObjective":
+        """The same without the sensors that measure an appearance."""
+        ...
+
 
 class TermSum:
     """The sum of all sensors' terms (eq. 16); a sensor without a frame contributes zero."""
@@ -76,7 +80,8 @@ class TermSum:
             found = observed[term.sensor] = term.observe(observation.images[term.sensor], prediction)
             prediction = replace(prediction, occluders=np.concatenate([prediction.occluders, found.occluders]))
         self._frames = frame = self._frames + 1
-        return ObservedTerms([observed[term.sensor] for term in terms], lambda: self._frames == frame)
+        distances = [observed[term.sensor] for term in terms if term.finds_occluders]
+        return ObservedTerms([observed[term.sensor] for term in terms], distances, lambda: self._frames == frame)
 
 
 class ObservedTerms:
@@ -84,11 +89,13 @@ class ObservedTerms:
 
     Args:
         terms: one of every sensor.
+        distances: those among them of the sensors that measure distances.
         is_newest: False once a sensor's next image was observed, which uses the same memory.
     """
 
-    def __init__(self, terms: Sequence[ObservedTerm], is_newest: Callable[[], bool]):
+    def __init__(self, terms: Sequence[ObservedTerm], distances: Sequence[ObservedTerm], is_newest: Callable[[], bool]):
         self._observed = terms
+        self._distances = distances
         self._is_newest = is_newest
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
@@ -118,6 +125,10 @@ class ObservedTerms:
         """Passes the estimate to every term."""
         for term in self._terms:
             term.learn(surface)
+
+    def of_distances(self) -> "ObservedTerms":
+        """The sum of those of the sensors that measure distances."""
+        return ObservedTerms(self._distances, self._distances, self._is_newest)
 
     @property
     def _terms(self) -> Sequence[ObservedTerm]:

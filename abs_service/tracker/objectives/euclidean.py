@@ -134,6 +134,10 @@ class ObservedSquares:
         """See `ObservedObjective`."""
         return self.terms.misfit(surface)
 
+    def of_distances(self) -> "ObservedSquares":
+        """See `ObservedObjective`."""
+        return ObservedSquares(self.terms.of_distances())
+
     def learn(self, surface: Surface) -> None:
         """Learns nothing: weights are no noise model that measurements could contradict."""
 

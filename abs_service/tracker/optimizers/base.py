@@ -40,6 +40,10 @@ class FrameProblem(Protocol):
         """Agreement of every contributing sensor with theta (dim,)."""
         ...
 
+    def elsewhere(self, theta: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        """Parameters (dim,) where images show the surface if that is not at theta (dim,), the end of a search."""
+        ...
+
 
 class Stop(StrEnum):
     """Reason for the end of a search."""
@@ -90,6 +94,8 @@ class Outcome:
         linearized: the newest linearisation of the cost that the search made, from which the covariance of theta is
             made if it holds there; None if it made none.
         fits: agreement of the sensors with theta; empty if the search did not ask for it.
+        is_start: True if theta is no optimum, but where images show the surface: another search is to begin there. The
+            cost is higher than that of theta then.
     """
 
     theta: NDArray[np.float64]
@@ -99,6 +105,7 @@ class Outcome:
     deviation: float
     linearized: LinearizedCost | None = None
     fits: tuple[SensorFit, ...] = ()
+    is_start: bool = False
 
     def compared(self, problem: FrameProblem) -> "Outcome":
         """The same with the agreement of the sensors."""

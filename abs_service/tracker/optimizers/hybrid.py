@@ -20,10 +20,14 @@ from abs_service.tracker.optimizers.search.ask_and_tell import (
 )
 from abs_service.tracker.optimizers.search.levenberg_marquardt import descend
 from abs_service.tracker.posterior.curvature import search_metric
-from abs_service.tracker.terms.agreement import outlier_share
+from abs_service.tracker.terms.agreement import disagreeing_colors, outlier_share
+from abs_service.tracker.terms.patches import SIZE
 
 #: Minimum step size of CMA-ES at the start of a frame, as a share of the initial one.
 MIN_STEP = 0.5
+
+#: Vertices whose colours disagree: half a patch (`terms.patches`). So many may be beside their print.
+MANY = SIZE // 2
 
 #: Weight of a new frame in the running mean of the outlier share.
 MEMORY = 0.03
@@ -78,13 +82,16 @@ class Hybrid:
         self._pauses = Pauses(settings.fallback_above)
 
     def follow(self, problem: FrameProblem, start: NDArray[np.float64], budget: Budget) -> Search:
-        """Descends; with too many outliers, samples the priors and descends from the result."""
+        """Descends; with too many outliers, begins anew where images show the surface, or samples the priors."""
         found = (yield from self._descend(problem, start, budget)).compared(problem)
         limit = self._settings.fallback_until if self._in_fallback else self._settings.fallback_above
         share = outlier_share(found.fits)
         if share <= self._mean_outliers + limit:
             self._pauses = Pauses(self._settings.fallback_above)
         elif self._pauses.end_at(share):
+            beside = disagreeing_colors(found.fits) >= MANY and not budget.exhausted()
+            if beside and (place := problem.elsewhere(found.theta)) is not None:
+                return replace(found, theta=place, linearized=None, fits=(), is_start=True)
             tried = (yield from self._fall_back(problem, start, found, budget)).compared(problem)
             self._pauses.tried(tried.cost < found.cost, share)
             found = tried

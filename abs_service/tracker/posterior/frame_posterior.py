@@ -7,21 +7,31 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.models.base import DeformationModel, SparseJacobian, Surface
 from abs_service.tracker.objectives.base import ObservedObjective
-from abs_service.tracker.posterior.curvature import Quadratic, gauss_newton, posterior_covariance
+from abs_service.tracker.posterior.curvature import Quadratic, gauss_newton, posterior_covariance, solved
 from abs_service.tracker.posterior.linearized_cost import LinearizedCost
 from abs_service.tracker.posterior.optimum import Optimum
 from abs_service.tracker.posterior.priors.motion_prediction import MotionPrediction
 from abs_service.tracker.posterior.priors.shape_prior import ShapePrior
 from abs_service.tracker.posterior.priors.stretch_prior import StretchPrior
 from abs_service.tracker.posterior.surfaces import FrameSurfaces
-from abs_service.tracker.terms.linearization import PointLinearization
-from abs_service.tracker.terms.patches import Patches
+from abs_service.tracker.terms.patches import Patches, is_beside
+from abs_service.tracker.terms.photometric.matching import SIGNIFICANT
 from abs_service.tracker.terms.sensor_fit import SensorFit
+
+#: Gauss–Newton steps to the places of the appearance: under the motion prior, and under one that allows for the first.
+MATCHING_STEPS = 2
+
+#: Gauss–Newton steps by distances alone.
+DISTANCE_STEPS = 5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FramePosterior:
-    """The cost of theta for one observation; a function of theta alone, in whatever order it is asked."""
+    """The cost of theta for one observation; a function of theta alone, in whatever order it is asked.
+
+    Attributes:
+        patches: of the vertices, whose appearance is looked for.
+    """
 
     model: DeformationModel
     objective: ObservedObjective
@@ -29,11 +39,16 @@ class FramePosterior:
     shape: ShapePrior
     motion: MotionPrediction
     surfaces: FrameSurfaces
+    patches: Patches
 
     @property
     def dimension(self) -> int:
         """Number of parameters."""
         return len(self.motion.theta)
+
+    def allowing(self, theta: NDArray[np.float64]) -> "FramePosterior":
+        """The same measurements under a motion prior that allows for theta (dim,)."""
+        return self.with_motion(self.motion.widened(theta))
 
     def with_motion(self, motion: MotionPrediction) -> "FramePosterior":
         """The same measurements under another motion prior."""
@@ -78,9 +93,25 @@ class FramePosterior:
         """Agreement of every contributing sensor with theta (dim,)."""
         return tuple(self.objective.fits(self.surfaces.deform(theta[None])))
 
-    def match(self, theta: NDArray[np.float64], patches: Patches) -> list[PointLinearization]:
-        """Residuals of the places in the images where the mesh at theta (dim,) is found, see `ObservedTerm`."""
-        return self.objective.match(*self.surfaces.with_jacobian(theta), patches)
+    def search_start(self) -> NDArray[np.float64]:
+        """Start (dim,) of a search: the prediction, or where images show the appearance of the mesh beside it."""
+        predicted = self.motion.theta
+        matched = self._matched(predicted)
+        return predicted if matched is None or not self._is_better(matched, predicted) else matched
+
+    def elsewhere(self, theta: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        """Place (dim,) where images show the appearance of the mesh if not at theta (dim,), the end of a search.
+
+        Print is looked for within some pixels: of theta, and of where distances alone would lay the mesh. They bring it
+        nearer after a large motion, since colours beside their print agree by chance, and hold it there.
+        """
+        matched = self._matched(theta)
+        if matched is not None and self._is_better(matched, theta):
+            return matched
+        without = self._by_distances()
+        matched = self._matched(without)
+        place = without if matched is None else matched
+        return place if self._is_better(place, theta) else None
 
     def misfit(self, surface: Surface) -> NDArray[np.float64]:
         """Signed distance of each vertex from its measurements, and its deviation by noise (2, n) [m]."""
@@ -94,3 +125,39 @@ class FramePosterior:
         rows, precision = self.stretch.linearize(surface, sparse_jacobian), self.motion.precision
         motion = Quadratic(precision @ (theta - self.motion.theta), precision)
         return gauss_newton([*rows, self.shape.linearize(theta)], self.dimension) + motion
+
+    def _matched(self, theta: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        """Parameters (dim,) where images show the patches of a mesh at theta (dim,); None if they are at theta."""
+        places = self.objective.match(*self.surfaces.with_jacobian(theta), self.patches)
+        if not is_beside(places):
+            return None
+        matched, wider = theta, self
+        for _ in range(MATCHING_STEPS):
+            moved = [part.moved(matched - theta) for part in places]
+            quadratic = wider.linearize(matched).quadratic + gauss_newton(moved, self.dimension)
+            matched = matched - solved(quadratic.curvature, quadratic.gradient)
+            wider = self.allowing(matched)
+        return matched
+
+    def _by_distances(self) -> NDArray[np.float64]:
+        """Theta (dim,) by distances alone, from the prediction on."""
+        distances, theta = self._of_distances(), self.motion.theta
+        for _ in range(DISTANCE_STEPS):
+            quadratic = distances.linearize(theta).quadratic
+            theta = theta - solved(quadratic.curvature, quadratic.gradient)
+            distances = distances.allowing(theta)
+        return theta
+
+    def _of_distances(self) -> "FramePosterior":
+        """The same priors, without the sensors that measure an appearance."""
+        return replace(self, objective=self.objective.of_distances())
+
+    def _is_better(self, theta: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
+        """True if theta (dim,) is more likely than another under a motion prior that allows for it."""
+        wider = self.allowing(theta)
+        return _cost(wider, theta) < _cost(wider, other) - SIGNIFICANT
+
+
+def _cost(frame: FramePosterior, theta: NDArray[np.float64]) -> float:
+    """Cost of a single theta (dim,): a population would need the noise of all pixels around the prediction."""
+    return float(frame.cost(theta[None], frame.surfaces.deform(theta[None]))[0])

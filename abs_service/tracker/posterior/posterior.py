@@ -11,17 +11,23 @@ from abs_service.tracker.posterior.priors.motion_prior import MotionPrior
 from abs_service.tracker.posterior.priors.shape_prior import ShapePrior
 from abs_service.tracker.posterior.priors.stretch_prior import StretchPrior
 from abs_service.tracker.posterior.surfaces import FrameSurfaces
+from abs_service.tracker.terms.patches import Patches
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Posterior:
-    """Likelihood and priors of one object over time."""
+    """Likelihood and priors of one object over time.
+
+    Attributes:
+        patches: of the vertices, whose appearance is looked for.
+    """
 
     model: DeformationModel
     objective: Objective
     stretch: StretchPrior
     shape: ShapePrior
     motion: MotionPrior
+    patches: Patches
 
     @property
     def dimension(self) -> int:
@@ -41,4 +47,4 @@ class Posterior:
         self.stretch.rest_on(self.model.mesh.vertices)
         surfaces = FrameSurfaces(self.model)
         observed = self.objective.observe(observation, surfaces.deform(prediction.theta[None]), prediction.reach_m)
-        return FramePosterior(self.model, observed, self.stretch, self.shape, prediction, surfaces)
+        return FramePosterior(self.model, observed, self.stretch, self.shape, prediction, surfaces, self.patches)

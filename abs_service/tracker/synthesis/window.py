@@ -103,15 +103,6 @@ class Placed(Generic[Number]):
         self._image: NDArray[Number] = np.zeros((0, 0), dtype)
         self._window = WHOLE
 
-    @property
-    def inside(self) -> NDArray[Number]:
-        """A view of the image without its border (height, width)."""
-        return self._image[1:-1, 1:-1]
-
-    def at(self, pixel: NDArray[np.integer]) -> NDArray[Number]:
-        """Values (m,) at indices (m,) into the flattened image, see `Synthesis`."""
-        return self._image.ravel()[pixel]
-
     def put(self, window: Window, values: NDArray[Number], height: int, width: int) -> NDArray[Number]:
         """The image (height + 2, width + 2) with other values; valid until the next call."""
         if self._image.shape != (height + 2, width + 2):

@@ -88,10 +88,16 @@ def distances_share(fits: Sequence[SensorFit]) -> float:
 
 
 def image_agrees(fits: Sequence[SensorFit]) -> bool:
-    """True if nearly all that an image of the appearance shows of the surface agrees."""
+    """True if nearly all vertices that an image of the appearance shows agree with it."""
     distances = of_distances(fits)
     images = [fit for fit in fits if fit not in distances and _judged(fit) >= MIN_JUDGED]
     return any(fit.counts.agreeing > NEARLY_ALL * _judged(fit) for fit in images)
+
+
+def disagreeing_colors(fits: Sequence[SensorFit]) -> int:
+    """Number of vertices whose appearance is not that of an image; the largest of such sensors, 0 without."""
+    distances = of_distances(fits)
+    return max((fit.counts.disagreeing for fit in fits if fit not in distances), default=0)
 
 
 def contradicting(fits: Sequence[SensorFit]) -> list[tuple[str, str, float]]:
@@ -104,8 +110,8 @@ def contradicting(fits: Sequence[SensorFit]) -> list[tuple[str, str, float]]:
     moved = any(fit.counts.disagreeing > UNLIT_DISTANCES * _judged(fit) or not rims(fits) for fit in distances)
     result = []
     for fit in fits:
-        what, least = ("distances", 1 / 2) if fit in distances else ("colours", MIN_COLORS if moved else 0.0)
-        if _judged(fit) >= MIN_JUDGED and fit.counts.agreeing < least * _judged(fit):
+        what, minimum = ("distances", 1 / 2) if fit in distances else ("colours", MIN_COLORS if moved else 0.0)
+        if _judged(fit) >= MIN_JUDGED and fit.counts.agreeing < minimum * _judged(fit):
             result.append((fit.sensor, what, fit.counts.agreeing / _judged(fit)))
     return result
 

@@ -28,7 +28,7 @@ def as_measured(rows: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def of_anything(rows: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Zeros (m, 3): whatever part of the surface is there, the residuals are the same."""
+    """Zeros (m, 3): the residuals do not depend on which part of the surface is there."""
     return np.zeros_like(rows)
 
 

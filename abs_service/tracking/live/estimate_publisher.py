@@ -19,8 +19,8 @@ from abs_service.wire.estimate_messages import Effort, Identity, State
 from abs_service.wire.message_header import SCENE
 from abs_service.wire.viewer_messages import ViewRate, scene_update
 
-#: Offsets of vertices are published, for those who compute vertices, if they have changed by so much, root mean
-#: square [m], and this many times a second in any case, for those who come later [Hz].
+#: Change of the vertices' offsets that has them published for those who compute vertices, root mean square [m], and
+#: rate at which they are published in any case, for those who come later [Hz].
 OFFSETS_CHANGED_M, OFFSETS_HZ = 1e-4, 1.0
 
 _NO_OFFSETS = np.zeros(0, np.float32)
@@ -57,7 +57,8 @@ class EstimatePublisher:
         """Publishes an estimate, after the topology of its mesh if that is new.
 
         Args:
-            estimate, tracking, effort: to publish.
+            estimate, effort: to publish.
+            session: its tracker.
             host_clock: which clock the frames' times are of.
             offset: of that clock; stamps need it.
         """

@@ -8,7 +8,7 @@ import numpy as np
 from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection, UndecidedError
 from abs_service.tracker.detection.plausibility import at_border
 
-#: It has come when it has so many times as many pixels as so long before, at most [ns].
+#: Largest growth of an object's number of pixels within a time [ns], once all of it is in sight.
 GROWTH, SETTLED_NS = 1.05, 300_000_000
 
 #: What was found longer ago says nothing of how it comes into view now [ns].
@@ -16,7 +16,7 @@ KEPT_NS = 1_000_000_000
 
 
 class ArrivalMonitor:
-    """Numbers of pixels of what was found in the last images, 0 where nothing was.
+    """Delays the detection of an object that moves into the image, until all of it is in sight.
 
     A mesh of the first fingertips, or of the first corner of a sheet, would be of no use. The very first image is taken
     as it is: nothing tells whether what it cuts off comes or stays.

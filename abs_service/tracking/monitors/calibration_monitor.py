@@ -19,7 +19,7 @@ IN_A_ROW = 2
 
 
 class CalibrationMonitor:
-    """Compares what is published with the cameras that a tracker was begun with.
+    """Compares published calibrations with the cameras that a tracker was started with.
 
     Attributes:
         changed: set when a sensor has another camera.

@@ -4,7 +4,7 @@ from collections import deque
 from collections.abc import Callable
 from statistics import median
 
-#: A tracker without an estimate for so many of its periods, and at least so long [ns], is silent.
+#: Time without an estimate after which a tracker is silent: the longer of a number of its periods and a time [ns].
 PERIODS, SILENCE_NS = 15, 1_000_000_000
 #: Longest time until the first estimate, in which devices open [ns].
 FIRST_NS = 10_000_000_000

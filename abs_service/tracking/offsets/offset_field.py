@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from abs_service.tracker.mesh import Mesh
 from calib.jit import kernel
 
-#: Sweeps end when none moves an offset farther [m], or after so many; the next frame goes on where they ended.
+#: Largest change of an offset that ends the sweeps [m], and their largest number; the next frame continues from there.
 EXACT_M, SWEEPS = 1e-7, 50
 
 #: Least variance of the difference of two neighbours, as a share of the variance of an offset: the mesh is only just

@@ -51,12 +51,10 @@ class FittedNoise:
     Attributes:
         mean: coefficients (k,) of the mean offset.
         spread: coefficients (l,) of the deviation to the chosen power.
-        outlier_share: fraction of outliers, 0…0.5.
     """
 
     mean: NDArray[np.floating]
     spread: NDArray[np.floating]
-    outlier_share: float
 
 
 #: No regularisation.
@@ -107,11 +105,8 @@ def maximize_likelihood(
     bounds = [(None, None)] * (len(start) - 1) + [tuple(scipy.special.logit([1e-6, 0.5]))]
     options = {"maxiter": 500, "ftol": 1e-12, "gtol": 1e-8}
     best = scipy.optimize.minimize(cost, start, jac=True, method="L-BFGS-B", bounds=bounds, options=options).x
-    return FittedNoise(
-        np.linalg.solve(r_mean, best[:k]) * unit,
-        np.linalg.solve(r_spread, best[k:-1]) * unit**power,
-        float(scipy.special.expit(best[-1])),
-    )
+    mean, spread = np.linalg.solve(r_mean, best[:k]), np.linalg.solve(r_spread, best[k:-1])
+    return FittedNoise(mean * unit, spread * unit**power)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

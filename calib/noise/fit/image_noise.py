@@ -1,36 +1,10 @@
-"""Density, sampling and fitting of noise of colour, grey and intensity images."""
-
-from typing import Protocol
+"""Fitting of the noise of colour, grey and intensity images."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from calib.noise.base import LEVELS, LOG_SQRT_2PI, NoiseError
+from calib.noise.base import LEVELS, NoiseError
 from calib.noise.fit import fitting
-
-
-class ValueNoise(Protocol):
-    """Gaussian noise of the values of an image, independent of each other."""
-
-    def deviation(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Standard deviation of values, in their shape."""
-        ...
-
-
-def log_density(model: ValueNoise, measured: ArrayLike, real: ArrayLike) -> NDArray[np.float64]:
-    """Log-density of each measured value for the true value `real`.
-
-    The log-density of a colour is the sum over its channels.
-    """
-    real = np.asarray(real, np.float64)
-    deviation = _deviation(model, real)
-    return -0.5 * ((np.asarray(measured) - real) / deviation) ** 2 - np.log(deviation) - LOG_SQRT_2PI
-
-
-def sample(model: ValueNoise, generator: np.random.Generator, real: ArrayLike) -> NDArray[np.float64]:
-    """Random measurement of every value, neither rounded nor clipped."""
-    real = np.asarray(real, np.float64)
-    return real + _deviation(model, real) * generator.standard_normal(real.shape)
 
 
 def from_static_scene(
@@ -82,7 +56,3 @@ def fit_deviation(measured: ArrayLike, real: ArrayLike) -> float:
     residual, _ = residuals(measured, real)
     one = np.ones((len(residual), 1))
     return float(fitting.maximize_likelihood(residual, fitting.Design(one[:, :0], one), span=LEVELS).spread[0])
-
-
-def _deviation(model: ValueNoise, values: NDArray[np.float64]) -> NDArray[np.float64]:
-    return model.deviation(values.astype(np.float32)).astype(np.float64)

@@ -35,10 +35,10 @@ def minimum_sigma(file: Path, found: dict[str, NDArray[np.float64]]) -> float:
     Raises:
         NoiseError: it is not a number above 0.
     """
-    least = found.get("minimum_sigma", np.array(MIN_SIGMA))
-    if least.shape != () or not least > 0:
-        raise NoiseError(f"minimum_sigma in {str(file)!r} must be a number above 0, not {least.tolist()}")
-    return float(least)
+    minimum = found.get("minimum_sigma", np.array(MIN_SIGMA))
+    if minimum.shape != () or not minimum > 0:
+        raise NoiseError(f"minimum_sigma in {str(file)!r} must be a number above 0, not {minimum.tolist()}")
+    return float(minimum)
 
 
 def arrays(file: Path, required: set[str]) -> dict[str, NDArray[np.float64]]:

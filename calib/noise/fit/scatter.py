@@ -14,7 +14,7 @@ SMALL_PX, LARGE_PX = 9, 33
 #: or nine tenths.
 FLAT_PERCENT, SMOOTH_PERCENT = 25, 10
 
-#: The larger patches count up to so many times the small ones; more is relief. Ratio in real images: stereo 2.5,
+#: Largest ratio of the larger patches to the small ones that counts; more is relief. Ratio in real images: stereo 2.5,
 #: structured light 1.1 to 1.7, time of flight 1.2.
 MAX_SHARED = 3.0
 

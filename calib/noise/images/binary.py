@@ -45,12 +45,6 @@ class LightBarrier:
 Settings = LightBarrier
 
 
-def sample(model: LightBarrier, generator: np.random.Generator, crossing: ArrayLike) -> NDArray[np.bool_]:
-    """Random reading for every beam that the object crosses or leaves free; True if interrupted."""
-    crosses = np.asarray(crossing, np.bool_)
-    return crosses ^ (generator.random(crosses.shape) < np.where(crosses, model.miss, model.false_alarm))
-
-
 def fit(interrupted: ArrayLike, crossing: ArrayLike, length_m: float) -> LightBarrier:
     """Error rates from readings with known truth: posterior means under Jeffreys' prior.
 

@@ -74,6 +74,6 @@ def fit(measured: ArrayLike, real: ArrayLike, stream: Stream, full_scale: float 
         law = fitting.maximize_likelihood(
             residual, fitting.Design(none, spread[:, :1]), power=2, span=full_scale
         ).spread
-    least = 1e-6 * float(np.mean(brightness**2)) * float(law[1:].sum())  # variance is never 0, not even in the dark
-    sigma = np.sqrt(max(float(law[0]), least))
+    minimum = 1e-6 * float(np.mean(brightness**2)) * float(law[1:].sum())  # variance is never 0, not even in the dark
+    sigma = np.sqrt(max(float(law[0]), minimum))
     return GaussianIntensity(stream, float(sigma), float(np.sqrt(law[1:].sum())), full_scale=full_scale)

@@ -192,8 +192,8 @@ def _stage(equations: Equations) -> tuple[NDArray[np.float64], bool]:
         max_nfev=STEPS,
     )
     gained = _cost(residuals) - float(found.cost)
-    least = MIN_GAIN * max(1.0, 2 * float(found.cost) / len(residuals))
-    return metric @ found.x, found.status > 0 or gained < least
+    minimum = MIN_GAIN * max(1.0, 2 * float(found.cost) / len(residuals))
+    return metric @ found.x, found.status > 0 or gained < minimum
 
 
 def _cost(residuals: NDArray[np.float64]) -> float:

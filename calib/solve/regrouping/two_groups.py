@@ -123,8 +123,8 @@ def unexplained(task: Task, cameras: Mapping[str, Camera], odd: Collection[int])
             off = dict(zip(corners.shots, misses(corners, fitted(corners, rest)).tolist(), strict=True))
         except ValueError:  # nothing explains the rest
             return found
-        least = max(_FAR * float(np.median([off[shot] for shot in rest])), _FAR_PX)
-        before, found = far, {shot: miss for shot, miss in off.items() if miss > least}
+        minimum = max(_FAR * float(np.median([off[shot] for shot in rest])), _FAR_PX)
+        before, found = far, {shot: miss for shot, miss in off.items() if miss > minimum}
         far = {*found}
         if far == before:
             break

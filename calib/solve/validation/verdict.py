@@ -134,10 +134,10 @@ def _bias(of: str, moved: Sequence[Motion]) -> float:
 def _praise(
     agreements: Sequence[Agreement], images: Mapping[str, UncertaintyMap], known: Mapping[str, float], distance: float
 ) -> str:
-    most = max((each for each in known.values() if not np.isnan(each)), default=0)
+    maximum = max((each for each in known.values() if not np.isnan(each)), default=0)
     seen = min(field.inside.mean() for field in images.values())
     where = f" where boards were seen, in {seen:.0%} of the image" if seen < 1 else ""
-    text = f"Trust it: projections at {distance:.2g} m are known to {most:.2g} px (95 %){where}"
+    text = f"Trust it: projections at {distance:.2g} m are known to {maximum:.2g} px (95 %){where}"
     if agreements:
         worst = max(agreements, key=lambda each: each.ratio)
         text += (

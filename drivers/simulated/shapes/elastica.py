@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from calib.jit import kernel
 
-#: Steps of the integration; every so many of them make one chord of the profile.
+#: Steps of the integration, and number of them in one chord of the profile.
 _STEPS, _CHORD = 512, 4
 
 

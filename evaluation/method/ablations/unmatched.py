@@ -48,6 +48,7 @@ class ObservedUnmatched:
         self.fits = observed.fits
         self.misfit = observed.misfit
         self.learn = observed.learn
+        self.of_distances = observed.of_distances
 
     def match(self, surface: Surface, sparse_jacobian: SparseJacobian, patches: Patches) -> list[PointLinearization]:
         """No matches."""

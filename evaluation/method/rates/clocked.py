@@ -37,6 +37,10 @@ class Clocked:
         """See `FrameProblem`."""
         return self._clocked(lambda: self.problem.fits(theta))
 
+    def elsewhere(self, theta: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        """See `FrameProblem`."""
+        return self._clocked(lambda: self.problem.elsewhere(theta))
+
     def _clocked(self, ask: Callable[[], Answer]) -> Answer:
         begin = time.thread_time()
         answer = ask()

@@ -94,11 +94,7 @@ def _describe(path: str, place: str, content: str, vendor: str, product: str, se
 
 
 class Server:
-    """The process that emulates the cameras of the testbed in which this program runs.
-
-    Args:
-        arguments: of `evaluation.service.kinect1_emulation.server`.
-    """
+    """The process `evaluation.service.kinect1_emulation.server`: the cameras of the testbed in which this one runs."""
 
     def __init__(self, *arguments: str) -> None:
         self.root = Path(os.environ["UMOCKDEV_DIR"])

@@ -8,10 +8,12 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 from absmsg.v1 import frame_info_pb2
+from absmsg.v1.health_pb2 import Health
 
 from abs_service.bus import keys
-from abs_service.bus.contract import IMAGES
+from abs_service.bus.contract import EVENTS, IMAGES
 from abs_service.bus.frames import DEPTH, FramePublisher, FrameSubscriber
+from abs_service.bus.sequence_gaps import LATE_NS
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from drivers.contract.device import Truth
 from drivers.contract.frame import Frame, Geometry, Kind
@@ -168,6 +170,18 @@ def test_what_is_no_frame_of_its_topic_is_counted_and_explained(headers):
     assert subscriber.take(0) is None
     assert subscriber.malformed == {topic: 2}
     assert subscriber.last_error == "a frame of x/depth arrived on tof/depth/image"
+
+
+def test_images_that_nothing_follows_are_lost_when_capture_has_said_how_many_there_were(headers):
+    bus, now = LoopbackBus(), [0]
+    subscriber = FrameSubscriber(bus, [("tof", "depth")], lambda: now[0])
+    with publisher(bus, headers) as sink:
+        sink.on_frame(frame(5))
+    said = Health(header=headers.now(0), component="capture", counters={"published.tof/depth/image": 3})
+    bus.publisher("health/capture", Health.DESCRIPTOR.full_name, EVENTS).put(said.SerializeToString())
+    assert subscriber.lost == {}
+    now[0] = LATE_NS
+    assert subscriber.lost == {"tof/depth/image": 2}
 
 
 def test_closing_wakes_the_reader(headers):

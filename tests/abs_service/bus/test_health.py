@@ -1,8 +1,11 @@
+import numpy as np
+import pytest
 from absmsg.v1.health_pb2 import Health as Message
 
 from abs_service.bus.health import PERIOD_NS, Health, Level
 from abs_service.bus.stamps import HeaderFactory, WallClock
-from tests.abs_service.bus.loopback import LoopbackBus
+from drivers.encoding.message_check import parse_valid
+from tests.abs_service.bus.loopback import LoopbackBus, health_now
 
 
 class Rig:
@@ -75,3 +78,13 @@ def test_a_number_that_no_message_holds_does_not_end_the_health_of_whoever_count
     rig.health.count_up_to({"huge": 2**70, "negative": -1})
     rig.health.publish()
     assert rig.said[0].counters == {"huge": 2**64 - 1, "negative": 0}
+
+
+@pytest.mark.parametrize("number", [1.5, np.float32(1.5), np.int64(1)])
+def test_what_a_driver_counts_in_its_own_way_does_not_end_the_health_of_its_process(number):
+    bus = LoopbackBus()
+    health = Health(bus, "capture", HeaderFactory("demo", WallClock()))
+    health.count_up_to({"\x1b[2J": number}, "device.x.")
+    health.gauge("\x07_c", number)
+    said = parse_valid(Message, health_now(health, bus).SerializeToString())
+    assert (dict(said.counters), dict(said.gauges)) == ({"device.x.\\x1b[2J": 1}, {"\\x07_c": number})

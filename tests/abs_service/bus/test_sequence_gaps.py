@@ -1,10 +1,13 @@
 """Messages that never came are counted, and nothing else."""
 
 import pytest
+from absmsg.v1.common_pb2 import Header
+from absmsg.v1.health_pb2 import Health
 from hypothesis import given
 from hypothesis import strategies as st
 
-from abs_service.bus.sequence_gaps import SequenceGaps
+from abs_service.bus.contract import Sample
+from abs_service.bus.sequence_gaps import LATE_NS, SequenceGaps
 
 
 def lost(*numbers, gaps=None, boot_id="a"):
@@ -44,3 +47,59 @@ def test_a_flood_of_publishers_does_not_fill_the_memory():
 @pytest.mark.parametrize("numbers", [(5, 5, 5), (0, 2**64 - 1) * 10, (9, 3)])
 def test_numbers_that_are_none_are_no_loss(numbers):
     assert lost(*numbers) == 0
+
+
+def health(component="capture", boot_id="a", **counters):
+    message = Health(header=Header(boot_id=boot_id), component=component, counters=counters)
+    return Sample(f"health/{component}", Health.DESCRIPTOR.full_name, message.SerializeToString())
+
+
+class Tail:
+    """Messages 0 and 1 came, and a health says that there were six; `now_ns` is the time since it."""
+
+    def __init__(self, **said):
+        self.now_ns = 0
+        self.gaps = SequenceGaps(lambda: self.now_ns)
+        lost(0, 1, gaps=self.gaps)
+        self.gaps.add_health(health(**({"published.image": 6} | said)))
+
+    def after(self, t_ns):
+        self.now_ns = t_ns
+        return self.gaps.lost.get("image", 0)
+
+
+def test_what_follows_the_last_that_came_is_lost_a_second_after_its_publisher_has_said_how_many_there_were():
+    tail = Tail()
+    assert [tail.after(t_ns) for t_ns in (0, LATE_NS - 1, LATE_NS, 2 * LATE_NS)] == [0, 0, 4, 4]
+    assert tail.gaps.add("image", "a", 5) == 0, "it came later still"
+    assert [tail.gaps.add("image", "a", seq) for seq in (6, 8)] == [0, 1]
+    assert tail.after(3 * LATE_NS) == 5
+
+
+@given(st.lists(st.booleans(), max_size=20))
+def test_each_message_that_health_has_said_is_lost_or_came(came):
+    tail = Tail()
+    for number, arrived in enumerate(came, 2):
+        if arrived:
+            tail.gaps.add("image", "a", number)
+    tail.gaps.add_health(health(**{"published.image": 2 + len(came)}))
+    assert tail.after(LATE_NS) == max(4, len(came)) - sum(came)
+
+
+def test_at_the_end_it_is_counted_at_once():
+    tail = Tail()
+    tail.gaps.settle()
+    assert tail.after(0) == 4
+
+
+@pytest.mark.parametrize("said", [{"boot_id": "b"}, {"published.image": 2**64 - 1}, {"published.image": 0}])
+def test_what_another_process_or_none_of_ours_says_is_no_loss(said):
+    assert Tail(**said).after(LATE_NS) == 0
+
+
+def test_estimates_are_counted_by_the_health_of_their_tracker():
+    tail = Tail()
+    tail.gaps.add("sheet/state", "a", 0)
+    tail.gaps.add_health(health("track/sheet", estimates=3))
+    tail.after(LATE_NS)
+    assert tail.gaps.lost["sheet/state"] == 2

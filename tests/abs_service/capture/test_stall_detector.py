@@ -73,6 +73,63 @@ def test_a_silent_camera_is_told_from_a_frozen_one():
     assert camera.detector.check() == (DeviceState.STALLED, "head/depth delivers nothing for 2 s")
 
 
+#: What a driver may hand over by mistake; protobuf takes some of it, and receivers would refuse that.
+MISTAKES = (
+    {"t_sigma_ns": -1},
+    {"t_sigma_ns": float("nan")},
+    {"t_host_ns": None},
+    {"t_host_ns": 2**63 - 1},
+    {"t_arrival_ns": -(2**62) - 1},
+    {"seq": 2**63},
+    {"seq": 1.5},
+    {"epoch": None},
+    {"scale": 0.0},
+    {"scale": float("nan")},
+    {"tick_hz": -1.0},
+    {"exposure_s": "long"},
+    {"invalid": "x"},
+    {"unit": "\x1b[2J"},
+    {"kind": "depth"},
+    {"filters": ("\x07",)},
+    {"stream": "../x"},
+    {"data": np.zeros((0, 0), "<u2")},
+)
+
+
+@pytest.mark.parametrize("mistake", MISTAKES, ids=str)
+def test_what_is_no_frame_is_left_out_counted_and_said_as_long_as_it_comes(mistake):
+    camera = Camera()
+    camera.show(noisy(0))
+    camera.detector.on_frame(replace(image(noisy(1)), **mistake))
+    assert camera.detector.take_warnings()["frames"].startswith("its driver delivers what is no frame: ")
+    camera.show(noisy(2))
+    assert (len(camera.sink.frames), camera.detector.counters["malformed"]) == (2, 1)
+    camera.now_ns += STALL_NS
+    assert camera.detector.check()[0] is DeviceState.STREAMING
+    assert camera.detector.take_warnings() == {"frames": ""}
+
+
+@pytest.mark.parametrize("nothing", [None, {"sensor": "head"}])
+def test_a_driver_that_delivers_no_frames_at_all_is_silent_and_told_why(nothing):
+    camera = Camera()
+    camera.show(noisy(0))
+    camera.now_ns += 2 * STALL_NS
+    camera.detector.on_frame(nothing)
+    state, reason = camera.detector.check()
+    assert state is DeviceState.STALLED
+    assert reason.startswith("head/depth delivers nothing for 2 s; its driver delivers what is no frame: ")
+
+
+@pytest.mark.parametrize(
+    "data",
+    [noisy(0)[::-1, ::-1], np.asfortranarray(noisy(0)), np.ma.array(noisy(0)), np.broadcast_to(noisy(0)[:1], (48, 64))],
+)
+def test_any_memory_layout_is_delivered(data):
+    camera = Camera()
+    camera.show(data)
+    assert len(camera.sink.frames) == 1
+
+
 def test_images_without_noise_may_be_equal():
     camera = Camera(replace(STREAM, noisy=False))
     camera.show(noisy(0), periods=100)

@@ -11,14 +11,14 @@ from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.recording.losses import CALM_REPORTS, Losses
 from abs_service.wire import message_header
 from tests.abs_service.bus.loopback import LoopbackBus, health_now
-from tests.abs_service.recording.recorder_rig import Rig, read, recordings
+from tests.abs_service.recording.recorder_rig import DEPTH, Rig, depth, read, recordings
 from tests.waiting import eventually
 
 
 def test_a_disk_that_was_too_slow_once_is_well_again():
     bus = LoopbackBus()
     health = Health(bus, "record", HeaderFactory("demo", WallClock()))
-    losses = Losses(health)
+    losses = Losses(health, lambda: 0)
 
     def said(dropped, failed=False):
         losses.report({"tof/depth": dropped}, failed)
@@ -44,6 +44,18 @@ def test_estimates_that_never_came_are_said_as_images_are(tmp_path):
     rig.recorder.stop(5)
     assert rig.said.message == "4 messages were lost on their way to the recorder"
     assert rig.said.counters[f"lost.{keys.state('sheet')}"] == rig.said.counters[f"lost.{keys.mesh('sheet')}"] == 2
+
+
+def test_the_last_images_of_a_camera_that_never_came_are_counted_when_the_recorder_ends(tmp_path):
+    """Nothing followed them that would show the gap: `run` had 0 dropped."""
+    rig = Rig(tmp_path)
+    rig.recorder.start()
+    rig.publish_image(depth(0))
+    capture = Message(header=rig.headers.now(0), component="capture", counters={f"published.{DEPTH}": 4})
+    rig.bus.deliver(message("health/capture", capture))
+    rig.recorder.stop(5)
+    rig.recorder.report()
+    assert rig.said.message == "3 messages were lost on their way to the recorder"
 
 
 def test_a_topology_that_did_not_come_is_asked_for_and_recorded_once(tmp_path):

@@ -1,11 +1,15 @@
 """The file of a recording on disk."""
 
+import errno
+import fcntl
 import os
 
 import pytest
 
 from abs_service.recording.recording_file import RecordingFile
+from abs_service.recording.recovery import InUseError, recover
 from drivers.encoding.mcap_file import Compression
+from tests.abs_service.recording.test_recovery import FRAMES, write
 
 SCHEMA, SIZE = "absmsg.v1.Health", 1 << 20
 
@@ -43,3 +47,21 @@ def test_what_was_flushed_leaves_the_memory_to_others(folder):
     file.flush()
     assert not is_in_memory(active, SIZE)
     assert file.finish({}).stat().st_size > SIZE
+
+
+def test_on_nfs_a_file_that_is_only_read_can_be_locked_as_well(tmp_path, monkeypatch):
+    """An exclusive lock needs a file that is open for writing there: what a crash left was never recovered."""
+    real = fcntl.flock
+
+    def of_nfs(stream, operation):
+        if operation & fcntl.LOCK_EX and fcntl.fcntl(stream, fcntl.F_GETFL) & os.O_ACCMODE == os.O_RDONLY:
+            raise OSError(errno.EBADF, os.strerror(errno.EBADF))
+        real(stream, operation)
+
+    monkeypatch.setattr(fcntl, "flock", of_nfs)
+    source = write(tmp_path / "a.mcap.active", finish=False)
+    with source.open("ab") as writer:
+        fcntl.flock(writer, fcntl.LOCK_EX)
+        with pytest.raises(InUseError):
+            recover(source)
+    assert recover(source).messages == 2 * FRAMES

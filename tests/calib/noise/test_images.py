@@ -1,4 +1,4 @@
-"""Noise of pictures and light barriers: densities, samples that follow them, fits that find the simulator's laws."""
+"""Noise of pictures and light barriers: deviations, and fits that find the simulator's laws."""
 
 import numpy as np
 import pytest
@@ -39,28 +39,9 @@ def exposures(query: str, stream: str, number: int) -> np.ndarray:
 
 
 @given(MODELS, REAL)
-def test_the_density_integrates_to_one(model, real):
-    spread = float(reference.picture_deviation(model, real))
-    measured = real + spread * np.linspace(-8, 8, 2001)
-    total = np.trapezoid(np.exp(image_noise.log_density(model, measured, np.full(2001, real))), measured)
-    assert total == pytest.approx(1, abs=1e-6)
-
-
-@given(MODELS, REAL, st.floats(-3, 3))
-def test_the_density_is_the_normal_one(model, real, deviations):
-    spread = float(reference.picture_deviation(model, real))
-    density = np.exp(-0.5 * deviations**2) / (np.sqrt(2 * np.pi) * spread)
-    assert np.exp(image_noise.log_density(model, real + deviations * spread, real)) == pytest.approx(density, rel=1e-4)
-
-
-@settings(max_examples=15)
-@given(MODELS, REAL, SEEDS)
-def test_samples_have_the_model_s_mean_and_deviation(model, real, seed):
-    n, spread = 10_000, float(reference.picture_deviation(model, real))
-    drawn = image_noise.sample(model, np.random.default_rng(seed), np.full((n // 10, 10), real))
-    assert drawn.shape == (n // 10, 10)
-    assert drawn.mean() == pytest.approx(real, abs=5 * spread / np.sqrt(n))
-    assert drawn.std() == pytest.approx(spread, rel=5 / np.sqrt(2 * n))
+def test_the_deviation_is_that_of_the_formula(model, real):
+    values = np.full((2, 3), real, np.float32)
+    np.testing.assert_allclose(model.deviation(values), reference.picture_deviation(model, values), rtol=1e-5)
 
 
 @given(st.floats(0, 0.15), REAL)
@@ -78,7 +59,7 @@ def test_taking_the_deviation_at_the_measured_value_changes_the_sum_as_documente
 def test_one_deviation_is_found_again_whatever_outliers_there_are(name, sigma, seed):
     generator = np.random.default_rng(seed)
     real = generator.uniform(0, 255, (40, 50, 3))
-    measured = image_noise.sample(GaussianColor(sigma), generator, real)
+    measured = real + sigma * generator.standard_normal(real.shape)
     lost = generator.random(real.shape) < 0.05
     measured[lost] = generator.uniform(0, LEVELS, lost.sum())
     measured[0] = np.nan
@@ -119,12 +100,12 @@ def test_what_is_cut_off_at_black_or_white_does_not_count():
 def test_both_parts_of_an_intensity_s_deviation_are_found_again(sigma, relative, seed):
     generator = np.random.default_rng(seed)
     real = np.geomspace(10, 5000, 20_000)
-    law = GaussianIntensity("ir", sigma, relative)
-    measured = image_noise.sample(law, generator, real)
+    measured = real + np.hypot(sigma, relative * real) * generator.standard_normal(real.shape)
     lost = generator.random(real.shape) < 0.05
     measured[lost] = generator.uniform(0, 65535, lost.sum())
     found = intensity.fit(measured, real, "ir")
     assert found.relative == pytest.approx(relative, rel=0.1)
+    law = GaussianIntensity("ir", sigma, relative)
     spread, known = (reference.picture_deviation(model, np.array([30.0, 5000.0])) for model in (found, law))
     np.testing.assert_allclose(spread, known, rtol=0.1)
     assert found.uniform == law.uniform
@@ -197,16 +178,14 @@ def test_the_probabilities_of_a_barrier_are_those_of_its_errors(model, interrupt
 
 @settings(max_examples=15)
 @given(BARRIERS, SEEDS)
-def test_readings_of_a_barrier_err_as_often_as_it_says_and_tell_it_again(model, seed):
+def test_the_error_rates_of_a_barrier_are_found_again(model, seed):
     generator = np.random.default_rng(seed)
     crossing = generator.random(20_000) < 0.3
-    readings = binary.sample(model, generator, crossing)
+    readings = crossing ^ (generator.random(20_000) < np.where(crossing, model.miss, model.false_alarm))
     sizes = np.array([crossing.sum(), (~crossing).sum()])
     rates = np.array([model.miss, model.false_alarm])
     allowed = 5 * np.sqrt(rates * (1 - rates) / sizes) + 1 / sizes
-    estimated = np.array([1 - readings[crossing].mean(), readings[~crossing].mean()])
-    assert np.all(np.abs(estimated - rates) < allowed)
-    if estimated.max() < 0.49:
+    if rates.max() < 0.47:  # far enough from what `fit` refuses
         found = binary.fit(readings, crossing, 0.8)
         assert np.all(np.abs(np.array([found.miss, found.false_alarm]) - rates) < allowed)
         assert found.length_m == 0.8

@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from hypothesis import assume, example, given, settings
+from hypothesis import assume, example, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from numpy.polynomial.polynomial import polyval2d
 
-from calib.noise.base import log_density, sample
+from calib.noise.base import log_density
 from calib.noise.fit.polynomial import evaluate
 from calib.noise.texture import WINDOW_M
 from tests.calib.noise.models import AMPLITUDES, DISTANCES, HEIGHT, MODELS, WIDTH, any_model
@@ -30,17 +30,6 @@ def test_the_density_integrates_to_one(model, condition, pixel):
     spread = model.deviation(x, a, p)
     measured = x + model.mean(x, a, p) + spread * np.linspace(-8, 8, 2001)
     assert np.trapezoid(np.exp(log_density(model, measured, x, a, p)), measured) == pytest.approx(1, abs=1e-9)
-
-
-@settings(max_examples=30)
-@given(any_model(), INSIDE, PIXEL, st.integers(0, 2**32))
-def test_samples_have_the_model_s_mean_and_deviation(model, condition, pixel, seed):
-    n = 10_000
-    x, a, p = repeat(n, condition, pixel)
-    drawn = sample(model, np.random.default_rng(seed), x, a, p)
-    sigma, mean = model.deviation(x, a, p)[0], condition[0] + model.mean(x, a, p)[0]
-    assert drawn.mean() == pytest.approx(mean, abs=5 * sigma / np.sqrt(n))
-    assert drawn.std() == pytest.approx(sigma, rel=5 / np.sqrt(2 * n))
 
 
 @given(any_model(), ANYWHERE, PIXEL)

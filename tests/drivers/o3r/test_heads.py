@@ -23,8 +23,8 @@ PORT = {
 @pytest.mark.parametrize(
     ("uri", "address"),
     [
-        ("o3r://", Address("o3r://")),
-        ("o3r://192.168.0.70:81?head=281", Address("o3r://192.168.0.70:81?head=281", "192.168.0.70", 81, "281")),
+        ("o3r://", Address()),
+        ("o3r://192.168.0.70:81?head=281", Address("192.168.0.70", 81, "281")),
     ],
 )
 def test_an_address_names_unit_and_head(uri: str, address: Address) -> None:

@@ -104,9 +104,13 @@ def end_with(error: Exception, arguments: argparse.Namespace) -> int:
 def _handler(file: Path | None) -> logging.Handler:
     if file is None:
         return logging.StreamHandler(sys.stderr)
-    from abs_service.commands.parts.log.log_file import InBackground, LogFile  # noqa: PLC0415 - needed for a file only
+    from multiprocessing import parent_process  # noqa: PLC0415 - these are needed for a file only
 
+    from abs_service.commands.parts.log.log_file import InBackground, LogFile  # noqa: PLC0415
+
+    # `run` has opened it: what has become of it since keeps none of its processes from starting again.
+    is_of_run = parent_process() is not None
     try:
-        return InBackground(LogFile(file, encoding="utf-8"))
+        return InBackground(LogFile(file, encoding="utf-8", delay=is_of_run))
     except OSError as error:
         raise LogFileError(f"--log-file {file}: cannot be written: {error.strerror}") from None

@@ -14,7 +14,7 @@ from abs_service.wire.commands import Choice, Pixel
 from calib.camera import Camera
 from drivers.encoding.message_content import MAX_CORNERS, MIN_CORNERS
 
-#: A click means the first point that is so near to its ray, in distances between neighbouring points.
+#: Largest distance of a chosen point from the ray of the click, in distances between neighbouring points.
 REACH = 1.5
 
 #: Pixels over which the pixels inside a lasso are joined, and the smallest patch of them that counts.

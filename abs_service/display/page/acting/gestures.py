@@ -9,7 +9,7 @@ import viser
 from numpy.typing import NDArray
 from viser import transforms
 
-#: A lasso is closed by a click so near to its first corner, in heights of the scene.
+#: Largest distance of the click that closes a lasso from its first corner, in heights of the scene.
 CLOSE = 0.03
 
 #: Colour of a lasso while it is drawn, and its distance from the eye [m].

@@ -13,7 +13,7 @@ from abs_service.tracker.detection.segments.depth_segments import large_surfaces
 from abs_service.tracker.detection.segments.surface_settings import SurfaceSettings
 from abs_service.tracker.detection.segments.within import Restricted, restricted
 
-#: A piece of the scene is torn off where returns are missing: within so many pixels, the scene goes on.
+#: Largest width of a gap of missing returns that tears a piece off the scene [px].
 TORN_PX = 5
 
 

@@ -28,7 +28,7 @@ RIM_PX = 5
 #: Pixels of alike colours are connected over gaps of fewer pixels than this, as a print has them.
 PRINT_PX = 5
 
-#: What moved is nearer than before by so many standard deviations of the distances: far walls change by noise alone.
+#: Least approach of what moved, in standard deviations of the distances: far walls change by noise alone.
 MOVING = 4.0
 
 
@@ -47,7 +47,7 @@ class Seeded:
 
 @dataclass(frozen=True, slots=True)
 class SurfaceLimits:
-    """Limits of what is one surface, and of what counts as one: see `large_surfaces`."""
+    """Largest step within a surface, and smallest size of one: see `large_surfaces`."""
 
     maximum_step_m: Step
     minimum_pixels: int
@@ -117,8 +117,8 @@ class MotionSeed:
             )
         before = np.sort([np.nan_to_num(distance, nan=-np.inf) for _, distance in self._before], axis=0)
         with np.errstate(invalid="ignore"):
-            least = np.fmax(self._minimum_m, MOVING * view.deviation)
-            nearer = before[-min(BEHIND, len(before))] - view.distance > least
+            minimum = np.fmax(self._minimum_m, MOVING * view.deviation)
+            nearer = before[-min(BEHIND, len(before))] - view.distance > minimum
         inner = np.asarray(cv2.erode(nearer.view(np.uint8), np.ones((RIM_PX, RIM_PX)))).view(np.bool_)
         by = f"{self._minimum_m:g} m towards the camera, or in front of something, in {self._seconds:g} s"
         what = f"nothing moved by {by}"
@@ -167,9 +167,9 @@ def _largest_patch(view: DepthView, limits: SurfaceLimits, pixels: NDArray[np.bo
     there = (pixels & np.isin(labels, large)).view(np.uint8)
     patches = np.asarray(cv2.connectedComponents(cv2.morphologyEx(there, cv2.MORPH_OPEN, np.ones((3, 3))))[1])
     sizes = np.bincount(patches.ravel())[1:]
-    most = int(sizes.max(initial=0))
-    if most < limits.minimum_pixels:
-        raise DetectionError(f"{what}: the largest has {most} pixels, minimum_pixels = {limits.minimum_pixels}")
+    maximum = int(sizes.max(initial=0))
+    if maximum < limits.minimum_pixels:
+        raise DetectionError(f"{what}: the largest has {maximum} pixels, minimum_pixels = {limits.minimum_pixels}")
     patch = patches == 1 + np.argmax(sizes)
     surface = labels == np.argmax(np.bincount(labels[patch]))
     return Seeded(patch & surface, surface)

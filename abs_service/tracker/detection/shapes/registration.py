@@ -32,16 +32,16 @@ SAME_TURN = np.deg2rad(5.0)
 #: Starts whose costs differ by less are alike, as those of a symmetric object: the most upright one is taken.
 ALIKE = 1.03
 
-#: A point lies beside the surface if its nearest sample is farther away along it than so many spacings of the samples.
+#: Distance along the surface from the nearest sample, in spacings of the samples, beyond which a point lies beside it.
 REACH = 1.1
 
-#: A sample lies before the background if that is farther away by more than this, or by so many σ if that is more [m].
+#: Least distance of a sample from the background behind it: the larger of a length [m] and a number of σ.
 MIN_GAP_M, GAP_DEVIATIONS = 0.01, 3.0
 
-#: A segmented object lacks so many pixels at its rim.
+#: Width of the rim that a segmented object lacks [px].
 RIM_PX = 2
 
-#: The fit is bad if its error (root mean square of the best 90 %) exceeds this, or so many σ if that is more [m].
+#: Largest error (root mean square of the best 90 %) of a good fit: the larger of a length [m] and a number of σ.
 MIN_ERROR_M, ERROR_DEVIATIONS = 0.004, 2.0
 #: … or if a larger share of the object lies beside the template, or of the template before the background.
 MAX_SHARE = 0.1

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from abs_service.tracker.detection.shapes.samples import farthest_first
 from abs_service.tracker.mesh import Mesh, edge_lengths
 
-#: Vertices are chosen among so many; more are slower and no better.
+#: Number of candidates among which vertices are chosen; more are slower and no better.
 MAX_CANDIDATES = 12_000
 
 #: Turned away from each other, two points count as this many spacings apart, so that both sides of a thin body have

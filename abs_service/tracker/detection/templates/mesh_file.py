@@ -25,10 +25,10 @@ FORMATS = (".obj", ".ply", ".stl")
 #: Number of sample points for the registration; more are slower and not more accurate. And of points with colours.
 SAMPLES, PAINTED = 1500, 10_000
 
-#: The vertices of the file are kept if there are so many times as many as asked for.
+#: Ratios of the file's number of vertices to the requested one between which the file's are kept.
 MIN_RATIO, MAX_RATIO = 0.5, 2.0
 
-#: Faces are divided until no edge is longer than this share of the distance between vertices, or there are so many.
+#: Longest edge of divided faces, as a share of the distance between vertices, and largest number of vertices for that.
 FINENESS, MAX_VERTICES = 0.7, 50_000
 
 #: Vertices this near to each other, as a share of the object's size, are one: of another face, or with another texture.

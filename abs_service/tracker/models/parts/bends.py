@@ -53,10 +53,11 @@ def fit(reach: float, minimum_radius: float) -> Series:
     turns = reach / minimum_radius / (2 * np.pi)
     limit = next((limit for limit in DEGREES if turns <= limit), None)
     if limit is None:
-        most = max(DEGREES)
+        maximum = max(DEGREES)
         raise ModelError(
             f"minimum_radius_m = {minimum_radius:g} would roll up a sheet that reaches {reach:.3g} m from its centre "
-            f"by {turns:.1f} turns; {most:g} are allowed, so minimum_radius_m must be at least {_above(reach, most):g}"
+            f"by {turns:.1f} turns; {maximum:g} are allowed, so minimum_radius_m must be at least "
+            f"{_above(reach, maximum):g}"
         )
     largest = 2 * np.pi * limit
     powers = [

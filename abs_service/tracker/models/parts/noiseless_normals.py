@@ -17,7 +17,7 @@ from abs_service.tracker.mesh import Mesh, mean_around, unit
 ROUNDS = 30
 #: Draws of the noise, from which its share in the relief is known to a few per cent …
 DRAWS = 8
-#: … and so much more than it is taken away.
+#: … and factor on it that is taken away.
 EXCESS = 1.15
 
 

@@ -43,8 +43,8 @@ def descend(
         if better:
             theta, cost, damping, steps = theta + step, cost_after, damping / GROWTH, steps + 1
             budget.generations += 1
-        least = tolerance if better else REFUSED * tolerance
-        ends = decrease < least or (better and decrease**2 < tolerance * before)
+        minimum = tolerance if better else REFUSED * tolerance
+        ends = decrease < minimum or (better and decrease**2 < tolerance * before)
         stop = Stop.CONVERGED if ends else budget.exhausted()
         before = decrease if better and not damping else 0.0
         if not better:

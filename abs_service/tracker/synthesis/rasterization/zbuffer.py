@@ -64,12 +64,12 @@ def render(seen: Projected, faces: NDArray[np.int32], ray_length: NDArray[np.flo
     nearest = Nearest(np.empty((population, *size), np.float32), np.empty((population, *size), np.int32))
     count = np.zeros(population, np.int64)
     _rasterize(seen, faces, grid, nearest, count)
-    most = int(count.max(initial=0))
+    maximum = int(count.max(initial=0))
     samples = Samples(
-        np.full((population, most), -1, np.int32),
-        np.ones((population, most), np.float32),
-        np.zeros((population, most), np.int32),
-        np.zeros((population, most, 3), np.float32),
+        np.full((population, maximum), -1, np.int32),
+        np.ones((population, maximum), np.float32),
+        np.zeros((population, maximum), np.int32),
+        np.zeros((population, maximum, 3), np.float32),
         count,
     )
     _collect(seen, faces, grid, nearest, ray_length, samples)

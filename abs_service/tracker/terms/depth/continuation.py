@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import Protocol
 
 import cv2
 import numpy as np
@@ -25,29 +24,8 @@ COLUMNS = 80
 MAX_REACH = 0.25
 
 
-class Continuation(Protocol):
-    """The measured surface that is continuous with the object in one camera's images."""
-
-    def observe(self, shown: NDArray[np.bool_], window: Window = WHOLE) -> Callable[[Surface], Remainder]:
-        """Surface in one image that a population of one leaves unexplained.
-
-        Args:
-            shown: pixels (rows, columns) in the window that show the object.
-            window: of the image.
-        """
-        ...
-
-
-class NoContinuation:
-    """Null object: the share is unknown."""
-
-    def observe(self, shown: NDArray[np.bool_], window: Window = WHOLE) -> Callable[[Surface], Remainder]:
-        """Unknown for every surface."""
-        return lambda surface: Remainder()
-
-
-class CoarseContinuation:
-    """Pixels of the object beside the mesh, of every few in a row.
+class Continuation:
+    """The measured surface that is continuous with the object in one camera's images, by every few pixels in a row.
 
     A mesh made from an image ends up to one cell inside the object, so pixels as near as that do not count.
     """
@@ -63,7 +41,12 @@ class CoarseContinuation:
         self._at_first = float("nan")
 
     def observe(self, shown: NDArray[np.bool_], window: Window = WHOLE) -> Callable[[Surface], Remainder]:
-        """See `Continuation`; of every few pixels."""
+        """Surface in one image that a population of one leaves unexplained.
+
+        Args:
+            shown: pixels (rows, columns) in the window that show the object.
+            window: of the image.
+        """
         rows, columns = self._shape
         top, _, left, _ = limits(window, (rows * self._step, columns * self._step))
         few = shown[-top % self._step :: self._step, -left % self._step :: self._step]

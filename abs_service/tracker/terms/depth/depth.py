@@ -6,12 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.pairing.images import DepthImage, Image, Window
+from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.synthesis.window import corner
 from abs_service.tracker.terms.base import NO_OCCLUDERS, Bounds, Prediction
 from abs_service.tracker.terms.depth.classification.classifier import Classifier
-from abs_service.tracker.terms.depth.continuation import Continuation, NoContinuation
+from abs_service.tracker.terms.depth.continuation import Continuation
 from abs_service.tracker.terms.depth.depth_cost import missing_cost
 from abs_service.tracker.terms.depth.fluctuation import Fluctuation
 from abs_service.tracker.terms.depth.observed_depth import ObservedDepth
@@ -35,18 +36,17 @@ class DepthTerm:
         self,
         sensor: str,
         synthesizer: Synthesizer,
-        vertices: int,
+        mesh: Mesh,
         noise: DepthNoise,
         bounds: Bounds,
         outline: Callable[[Camera], Outline] = lambda camera: NoOutline(),
-        continuation: Callable[[Camera], Continuation] = lambda camera: NoContinuation(),
     ):
         self.sensor = sensor
         self._bounds = bounds
         self._synthesizer = synthesizer
-        self._view = synthesizer.view(sensor, np.zeros((vertices, 0), np.float32))
+        self._view = synthesizer.view(sensor, np.zeros((len(mesh.vertices), 0), np.float32))
         self._outline = outline(self._view.camera)
-        self._continuation = continuation(self._view.camera)
+        self._continuation = Continuation(self._view.camera, mesh)
         self._classifier = Classifier(self._view.camera)
         self._fluctuation = Fluctuation()
         self._texels = texels(sensor, synthesizer, noise, bounds)
@@ -94,8 +94,8 @@ class DepthTerm:
         if not unusable.shown.any():
             return np.zeros((1, predicted.vertices.shape[2]), np.float32)
         agreeing = self._texels.explain(unusable)
-        most = self._bounds.outlier - self._bounds.inlier - agreeing
-        return missing_cost(self._bounds.no_return, predicted, self._view.camera.center, most)
+        maximum = self._bounds.outlier - self._bounds.inlier - agreeing
+        return missing_cost(self._bounds.no_return, predicted, self._view.camera.center, maximum)
 
 
 def _points(

@@ -11,11 +11,11 @@ from calib.jit import kernel, prange
 from calib.no_return import NoReturn
 from calib.noise.texture import WINDOW_M
 
-#: A vertex in free space costs one unit of log-likelihood more for every so many metres from the object: the outline
-#: errs by a Laplace distribution of this scale.
+#: Distance from the object that costs a vertex in free space one unit of log-likelihood: the outline errs by a Laplace
+#: distribution of this scale [m].
 FREE_SCALE_M = 0.01
 
-#: Texels are gathered so many at a time, and then compared all at once.
+#: Number of texels that are gathered first, and then compared at once.
 _TILE = 64
 
 

@@ -15,7 +15,7 @@ from abs_service.tracker.terms.median import median
 #: `MIN_FRAMES` say nothing.
 NEW, MIN_FRAMES = 0.1, 5
 
-#: The noise model is contradicted by so many of its deviations, as in the first image (`TOO_MUCH_SCATTER`). With a
+#: Fluctuation that contradicts the noise model, in its deviations, as in the first image (`TOO_MUCH_SCATTER`). With a
 #: right one, wrinkles that wander through a curtain of 2 mm of noise make 1.3 of them at most, and real structured
 #: light 0.1 to 0.8, as it repeats its steps.
 TOO_MUCH = 1.5

@@ -26,7 +26,7 @@ from calib.noise.base import DepthNoise
 from calib.noise.scaled import Scaled
 from calib.noise.texture import corrected_distances, normalizers, write_pixels, write_texture
 
-#: The cost of an inlier is the median of about so many pixels on the object.
+#: Approximate number of pixels on the object whose median is the cost of an inlier.
 SAMPLED = 500
 
 

@@ -118,7 +118,7 @@ class ObservedColor:
         pixels: the same with a border of one pixel, as samples read them.
         inverse: inverse deviations (n or 1, 3) of the samples' colours.
         normalizer: cost (n or 1,) of a colour that agrees exactly.
-        shone: syntheses of populations of one, see `once`.
+        illuminated: syntheses of populations of one, see `once`.
     """
 
     sensor: str
@@ -130,7 +130,7 @@ class ObservedColor:
     pixels: CopiedPixels
     inverse: NDArray[np.float32]
     normalizer: NDArray[np.float32]
-    shone: Memo[Surface, Synthesis] = field(init=False, default_factory=Memo[Surface, Synthesis])
+    illuminated: Memo[Surface, Synthesis] = field(init=False, default_factory=Memo[Surface, Synthesis])
 
     @property
     def occluders(self) -> NDArray[np.float64]:
@@ -143,7 +143,7 @@ class ObservedColor:
 
     def _synthesize(self, surface: Surface) -> Synthesis:
         """The colours of a population as this frame's exposure shows them."""
-        return once(self.shone, surface, lambda one: self.illumination.shine(self.view.synthesize(one), one))
+        return once(self.illuminated, surface, lambda one: self.illumination.illuminate(self.view.synthesize(one), one))
 
     def _cost_of(self, seen: Synthesis) -> NDArray[np.float64]:
         """Cost (population,) of what is synthesised."""

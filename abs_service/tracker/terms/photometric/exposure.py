@@ -15,7 +15,7 @@ MIN_SAMPLES = 50
 #: Gains beyond these are no exposure: the image shows something else.
 MIN_GAIN, MAX_GAIN = 0.25, 4.0
 
-#: Nor are gains of which one is so many times another a white balance: from daylight to incandescent light, red changes
+#: Largest ratio of two gains of a white balance: from daylight to incandescent light, red changes
 #: three times as much as blue, 1.7 times in values with a gamma of 2.2. Things of one colour would look alike.
 MAX_TINT = 2.0
 

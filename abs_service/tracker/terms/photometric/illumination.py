@@ -22,7 +22,7 @@ class Illumination(Protocol):
         """The illumination with the exposure of an image; see `gains` for what is measured and expected."""
         ...
 
-    def shine(self, seen: Synthesis, surface: Surface) -> Synthesis:
+    def illuminate(self, seen: Synthesis, surface: Surface) -> Synthesis:
         """The synthesis of a population with its attributes as they look in this light."""
         ...
 
@@ -34,7 +34,7 @@ class Passive:
         """Itself."""
         return self
 
-    def shine(self, seen: Synthesis, surface: Surface) -> Synthesis:
+    def illuminate(self, seen: Synthesis, surface: Surface) -> Synthesis:
         """The synthesis itself."""
         return seen
 
@@ -53,7 +53,7 @@ class Exposed:
         """The light with the gains of an image."""
         return Exposed(gains(measured, expected))
 
-    def shine(self, seen: Synthesis, surface: Surface) -> Synthesis:
+    def illuminate(self, seen: Synthesis, surface: Surface) -> Synthesis:
         """The synthesis with its attributes as the image is exposed."""
         return replace(seen, attributes=seen.attributes * self._gains[:, None])
 
@@ -72,7 +72,7 @@ class Active:
         """Itself: the lamp and the sensor's exposure are one, and known."""
         return self
 
-    def shine(self, seen: Synthesis, surface: Surface) -> Synthesis:
+    def illuminate(self, seen: Synthesis, surface: Surface) -> Synthesis:
         """The synthesis with reflectivities as bright as they look on each member of the population."""
         shade = lambert(surface, self._center)
         return replace(seen, attributes=seen.attributes * seen.interpolation.carry(shade)[:, None])

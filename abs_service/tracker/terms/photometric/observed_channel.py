@@ -73,7 +73,7 @@ class ObservedChannel:
 
     def _synthesize(self, surface: Surface) -> Synthesis:
         """The values of a population as they look in this light."""
-        return self.illumination.shine(self.view.synthesize(surface), surface)
+        return self.illumination.illuminate(self.view.synthesize(surface), surface)
 
     @property
     def _measured(self) -> Measured:
@@ -154,8 +154,8 @@ class ObservedChannel:
         """
         channel = self.texture[seen.pixel[0], CHANNEL].astype(int)
         own = replace(seen, attributes=self.view.attribute_gradients(seen).T)  # along both axes, as two members
-        shining = self.illumination.shine(own, surface).attributes
-        gradients = shining[:, channel, np.arange(len(channel))].T.astype(np.float64)
+        illuminated = self.illumination.illuminate(own, surface).attributes
+        gradients = illuminated[:, channel, np.arange(len(channel))].T.astype(np.float64)
         unknown = np.isnan(gradients).any(axis=1)
         samples = seen.interpolation.spread(surface.vertices[0].T.astype(np.float64))[unknown]
         image = self.image[..., VALUE], self.image[..., CHANNEL]
@@ -166,13 +166,13 @@ class ObservedChannel:
         self, seen: Synthesis, surface: Surface
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Normalised residual, infinite without a measurement, inverse deviation, log of the normaliser, each (n,)."""
-        shining = self.illumination.shine(seen, surface)
+        illuminated = self.illumination.illuminate(seen, surface)
         texels = self.texture[seen.pixel[0]].astype(np.float64)
         each, channel = np.arange(len(texels)), texels[:, CHANNEL].astype(int)
         widening = self.widening
         # One widening may stand for all samples, or for all channels.
         of = each % len(widening.factor), channel % widening.factor.shape[1]
         inverse = texels[:, INVERSE] / widening.factor[of]
-        residual = (texels[:, VALUE] - shining.attributes[0][channel, each]) * inverse
+        residual = (texels[:, VALUE] - illuminated.attributes[0][channel, each]) * inverse
         measured = (seen.pixel[0] > 0) & np.isfinite(residual)
         return np.where(measured, residual, np.inf), inverse, texels[:, NORMALIZER] + widening.log[of]

@@ -40,7 +40,7 @@ class ForeignDistances:
 
     @property
     def is_far(self) -> bool:
-        """True if no factor explains what they miss by."""
+        """True if no factor explains the differences."""
         return self.miss > _FAR * self.own
 
     @property

@@ -1,10 +1,13 @@
 """Memory of the pools of ended processes."""
 
 import os
+import threading
+from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
 
+from abs_service.bus.zenoh_session import pools
 from abs_service.bus.zenoh_session.pools import READ_NS, UNIT_BYTES, EndedPools, free_pool, own_size
 
 
@@ -30,7 +33,7 @@ def held():
     yield make
     for path, file in files:
         file.close()
-        path.unlink()
+        path.unlink(missing_ok=True)
 
 
 @pytest.mark.skipif(not os.access("/dev/shm", os.W_OK), reason="there is no shared memory")
@@ -66,3 +69,15 @@ def test_a_process_that_got_the_number_of_an_ended_one_keeps_its_pool():
     now_ns[0] = 3 * READ_NS
     pools.update({1})
     assert freed == []
+
+
+@pytest.mark.skipif(not os.access("/dev/shm", os.W_OK), reason="there is no shared memory")
+@pytest.mark.parametrize("whose", [0, 1])
+def test_a_pool_that_another_program_deletes_ends_its_process_and_no_other(held, monkeypatch, whose):
+    monkeypatch.setattr(pools, "CHECK_S", 0.01)
+    path, end = held(UNIT_BYTES + os.getpid() + whose, "a"), threading.Event()
+    expected = nullcontext() if whose else pytest.raises(pools.DeletedError, match="RemoveIPC")
+    with expected, pools.watched(end.set):
+        assert not end.wait(0.1)
+        path.unlink()
+        assert end.wait(0.2 if whose else 10) is not bool(whose)

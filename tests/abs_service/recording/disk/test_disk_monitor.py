@@ -94,13 +94,14 @@ class Bench:
     """A disk monitor with a clock and a disk of its own, which sees 10 MB/s written."""
 
     def __init__(self, folder, free, retain_s=math.inf, retain_bytes=math.inf):
-        self.now_ns, self.jump_ns = 0, 0
+        self.now_ns, self.jump_ns, self.is_synchronised = 0, 0, True
         clock = WallClock(lambda: self.now_ns, lambda: NOW_NS + self.now_ns + self.jump_ns)
         self.clock, self.bus = clock, LoopbackBus()
         self.health = Health(self.bus, "record", HeaderFactory("demo", clock))
         recordings = Retention(folder, "demo", "", retain_s, retain_bytes)
         estimates = Retention(folder, "demo", ESTIMATES, math.inf, math.inf)
-        self.monitor = DiskMonitor(recordings, estimates, 0, self.health, clock, lambda folder: free)
+        follows = lambda: self.is_synchronised  # noqa: E731
+        self.monitor = DiskMonitor(recordings, estimates, 0, self.health, clock, lambda folder: free, follows)
 
     def pass_seconds(self, seconds):
         for _ in range(seconds):
@@ -158,6 +159,23 @@ def test_what_is_recorded_after_a_step_of_the_wall_clock_is_the_newest(tmp_path,
         active.rename(tmp_path / take(day))
     bench.pass_seconds(10)
     assert sorted(path.name for path in tmp_path.iterdir()) == [take(day) for day in (2, 3, 4, 5)]
+
+
+def test_a_clock_of_2099_deletes_nothing_until_it_follows_a_time_server(tmp_path):
+    for day in range(1, 8):
+        put(tmp_path, take(day), 8 - day)
+    bench = Bench(tmp_path, 10**15, retain_s=4.5 * 86_400)
+    bench.is_synchronised, bench.jump_ns = False, 26_663 * DAY_NS
+    said = bench.pass_seconds(30)
+    assert (said.counters["deleted"], said.level) == (2, HealthMessage.LEVEL_WARNING)
+    assert said.message.startswith("nothing was recorded for 26664.0 days, by a clock that follows no time server")
+    put(tmp_path, take(8), -26_663)  # of this recorder, and now another one is started
+    again = Bench(tmp_path, 10**15, retain_s=4.5 * 86_400)
+    again.is_synchronised, again.jump_ns = False, 26_663 * DAY_NS
+    assert again.pass_seconds(30).counters["deleted"] == 0
+    again.is_synchronised, again.jump_ns = True, 0
+    said = again.pass_seconds(30)
+    assert (said.counters["deleted"], said.level) == (1, HealthMessage.LEVEL_OK)
 
 
 def test_a_recording_is_as_old_as_its_end(tmp_path):

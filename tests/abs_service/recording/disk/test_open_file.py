@@ -1,5 +1,7 @@
 """The recorder and what others do to the file that it writes."""
 
+import errno
+import fcntl
 import os
 
 import pytest
@@ -56,3 +58,22 @@ def test_a_file_that_another_program_changes_is_noticed_and_does_not_look_comple
     rig.recorder.stop(5)
     assert active.exists()
     assert sequences(tmp_path)[-1:] == [21]
+
+
+@pytest.mark.parametrize("code", [errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS])
+def test_a_file_system_without_locks_is_said_with_the_remedy(tmp_path, monkeypatch, code):
+    """NFS without its lock service, network drives, Lustre: "[Errno 37] No locks available" told nobody what to do."""
+
+    def refuse(stream, operation):
+        raise OSError(code, os.strerror(code))
+
+    rig = Rig(tmp_path)
+    with monkeypatch.context() as patch:
+        patch.setattr(fcntl, "flock", refuse)
+        rig.recorder.start()
+        rig.publish_image(depth(0))
+        assert eventually(lambda: rig.recorder.failed)
+        assert f"{tmp_path} is on a file system without locks ({os.strerror(code)}): mount it" in rig.said.message
+    assert eventually(lambda: not rig.recorder.failed)
+    rig.recorder.stop(5)
+    assert sequences(tmp_path) == [0]

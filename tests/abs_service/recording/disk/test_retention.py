@@ -28,7 +28,8 @@ def take(day):
 
 def apply(retention):
     """The files that it deletes in a process that has just started."""
-    deleted, failures = retention.apply(partial(Ages(NOW_NS).of, now_ns=0))
+    ages = Ages(lambda t_ns: NOW_NS + t_ns, retention.retain_s, lambda: True)
+    deleted, failures = retention.apply(partial(ages.of, now_ns=0))
     assert failures == []
     return deleted
 

@@ -11,6 +11,7 @@ from abs_service.tracker.optimizers.base import Budget, Outcome, RunningSearch, 
 from abs_service.tracker.posterior.curvature import Quadratic
 from abs_service.tracker.posterior.linearized_cost import LinearizedCost
 from abs_service.tracker.terms.sensor_fit import SensorFit
+from abs_service.tracker.terms.vertex_counts import VertexCounts
 
 #: Step of the central differences.
 STEP = 1e-5
@@ -28,12 +29,14 @@ class Known:
         residuals: (population, m) of parameters (population, dim); the cost is half their squares' sum.
         outlier_share_at: share of outliers at parameters (dim,).
         deviation: of the prior, which `residuals` contains already.
+        shown: where images show the surface (dim,), if anywhere.
     """
 
     dimension: int
     residuals: Callable[[NDArray[np.float64]], NDArray[np.float64]]
     outlier_share_at: Callable[[NDArray[np.float64]], float]
     deviation: float = 1.0
+    shown: NDArray[np.float64] | None = None
 
     def cost(self, thetas: NDArray[np.float64]) -> NDArray[np.float64]:
         """See `Problem`."""
@@ -51,10 +54,15 @@ class Known:
         """See `Problem`."""
         return Quadratic(theta / self.deviation**2, np.eye(self.dimension) / self.deviation**2)
 
+    def elsewhere(self, theta: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        """See `Problem`."""
+        return self.shown
+
     def fits(self, theta: NDArray[np.float64]) -> tuple[SensorFit, ...]:
         """See `Problem`."""
         inliers = round(MEASUREMENTS * (1 - self.outlier_share_at(theta)))
-        return (SensorFit("", MEASUREMENTS, 0, MEASUREMENTS, inliers, 0.0, 1.0),)
+        counts = VertexCounts(facing=MEASUREMENTS, agreeing=inliers, disagreeing=MEASUREMENTS - inliers)
+        return (SensorFit("", MEASUREMENTS, 0, MEASUREMENTS, inliers, 0.0, 1.0, counts=counts),)
 
 
 def minimize(problem: Known, search: Search, budget: Budget) -> Outcome:

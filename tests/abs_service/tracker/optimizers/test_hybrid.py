@@ -1,5 +1,7 @@
 """Hybrid search: descent while it explains the measurements, CMA-ES otherwise."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -56,6 +58,23 @@ def test_cma_es_takes_over_when_the_descent_explains_less_than_lately():
     assert budget.evaluations > 20
     again, _ = follow(optimizer, NEAR)
     assert again.searcher == "levenberg_marquardt"
+
+
+def test_where_images_show_the_surface_another_search_begins_before_cma_es():
+    optimizer = search()
+    explore(optimizer, NEAR)
+    found, budget = follow(optimizer, replace(two_wells(FAR), shown=FAR))
+    assert found.is_start
+    assert found.theta is FAR
+    assert budget.evaluations < 20
+    assert not found.fits  # those of the end of the descent
+
+
+def test_nothing_is_looked_for_when_the_time_is_up():
+    optimizer = search()
+    explore(optimizer, NEAR)
+    problem, late = replace(two_wells(FAR), shown=FAR), Budget(10**6, lambda: False)
+    assert not minimize(problem, optimizer.follow(problem, np.zeros(4), late), late).is_start
 
 
 def test_what_cma_es_finds_is_not_taken_if_it_is_no_better():

@@ -70,7 +70,7 @@ def slope(term, model: Rigid, theta: np.ndarray, parameter: int, step: float) ->
 def test_the_depth_gradient_is_that_of_the_cost(kind):
     mesh = sheet(21, 31, flat, size=(0.2, 0.14))
     synthesizer, surface = built(kind, mesh), as_surface((mesh.vertices, mesh.normals))
-    term = DepthTerm("tof", synthesizer, len(mesh.vertices), GaussianPolynomial(((SIGMA,),)), BOUNDS)
+    term = DepthTerm("tof", synthesizer, mesh, GaussianPolynomial(((SIGMA,),)), BOUNDS)
     term = term.observe(depth_image(plane_distance(TOF, WALL, 1.0)), predicted(synthesizer, surface))
     for theta in ([0, 0, 0, 0, 0, 0.006], [0.02, -0.02, 0, 0, 0, -0.004]):
         numerical, linear = slope(term, Rigid(mesh), np.array(theta), 5, 5e-4)
@@ -143,7 +143,7 @@ def test_a_lamp_of_its_own_lights_the_samples(kind):
 def test_what_leaves_the_image_neither_gains_nor_gets_lost(kind):
     """Outside, it has the cost of a mesh without any measurement."""
     synthesizer = built(kind)
-    term = DepthTerm("tof", synthesizer, len(MESH.vertices), GaussianPolynomial(((SIGMA,),)), BOUNDS)
+    term = DepthTerm("tof", synthesizer, MESH, GaussianPolynomial(((SIGMA,),)), BOUNDS)
     surface = as_surface((MESH.vertices, MESH.normals))
     term = term.observe(depth_image(plane_distance(TOF, WALL, 1.0)), predicted(synthesizer, surface))
     there, away, behind = term.cost(

@@ -97,7 +97,7 @@ def test_a_plane_is_found_where_it_is(kind, turn, shift):
     A pixel is 3.3 mm wide and four levels of the texture in one channel; half of that is the rounding error.
     """
     scene = Scene(kind, np.array(turn + shift))
-    depth = DepthTerm("tof", scene.synthesizer, len(MESH.vertices), DEPTH, BOUNDS)
+    depth = DepthTerm("tof", scene.synthesizer, MESH, DEPTH, BOUNDS)
     depth = depth.observe(scene.depth, scene.predicted)
     residual, fit = residuals(depth, scene), depth.fit(scene.surface)
     assert len(residual) > 0.9 * fit.visible > 100

@@ -65,7 +65,7 @@ def scene(x: float = 0.0) -> np.ndarray:
 
 
 def depth_term(outline: bool = False) -> DepthTerm:
-    term = partial(DepthTerm, "tof", sparse(WIDE, MESH), len(MESH.vertices), NOISE, BOUNDS)
+    term = partial(DepthTerm, "tof", sparse(WIDE, MESH), MESH, NOISE, BOUNDS)
     return term(outline=lambda camera: RimOutline(camera, Rim.of(MESH), 0.5)) if outline else term()
 
 

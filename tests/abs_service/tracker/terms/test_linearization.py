@@ -43,7 +43,7 @@ BOUNDS = Bounds(0.05, 1.6, 4.6)
 
 
 def depth_term() -> ObservedDepth:
-    term = DepthTerm("tof", sparse(FINE, MESH), len(MESH.vertices), GaussianPolynomial(((SIGMA,),)), BOUNDS)
+    term = DepthTerm("tof", sparse(FINE, MESH), MESH, GaussianPolynomial(((SIGMA,),)), BOUNDS)
     return term.observe(
         depth_image(plane_distance(FINE, NORMAL, 1.0)), Prediction(as_surface((MESH.vertices, MESH.normals)))
     )
@@ -169,7 +169,7 @@ def test_only_inliers_and_what_is_in_free_space_are_linearized():
     around = cv2.dilate(np.isfinite(view.render(surface)).astype(np.uint8), np.ones((5, 5))) > 0
     distance[around & (np.arange(640) < 320)] = np.nan  # a hole in the object, not a background without return
     distance[:240] += 1
-    term = DepthTerm("tof", sparse(FINE, mesh), len(mesh.vertices), GaussianPolynomial(((SIGMA,),)), BOUNDS)
+    term = DepthTerm("tof", sparse(FINE, mesh), mesh, GaussianPolynomial(((SIGMA,),)), BOUNDS)
     term = term.observe(depth_image(distance), Prediction(surface))
     linear = stack(term.linearize(surface, SparseJacobian.from_dense(np.zeros((len(mesh.vertices), 3, 2)))), 2)
     pixels = FINE.project(mesh.vertices) + 0.5

@@ -12,7 +12,7 @@ from abs_service.pairing.images import ColorImage
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.terms.base import Bounds, Prediction
-from abs_service.tracker.terms.depth.continuation import CoarseContinuation
+from abs_service.tracker.terms.depth.continuation import Continuation
 from abs_service.tracker.terms.depth.depth import DepthTerm
 from abs_service.tracker.terms.photometric.color import ColorTerm
 from abs_service.tracker.terms.sensor_fit import Remainder, SensorFit
@@ -42,7 +42,7 @@ def moved(x: float = 0.0, mesh: Mesh = MESH) -> Surface:
 
 
 def fit(distance: np.ndarray, surface: Surface, mesh: Mesh = MESH, camera: Camera = CAMERA) -> SensorFit:
-    term = DepthTerm("tof", sparse(camera, mesh), len(mesh.vertices), Constant(SIGMA), Bounds(0.05, 1.6, 4.6))
+    term = DepthTerm("tof", sparse(camera, mesh), mesh, Constant(SIGMA), Bounds(0.05, 1.6, 4.6))
     term = term.observe(depth_image(distance), Prediction(surface))
     return term.fit(surface)
 
@@ -155,7 +155,7 @@ def test_shares_are_of_the_vertices_that_face_the_sensor(name: str):
 
 def remainder(size: tuple[float, float]) -> Callable[[Surface], Remainder]:
     """Remainder of a sheet of a size in its first image."""
-    return CoarseContinuation(CAMERA, MESH).observe(picture(size) < 1.3)
+    return Continuation(CAMERA, MESH).observe(picture(size) < 1.3)
 
 
 def test_nothing_is_left_of_a_sheet_that_the_mesh_covers():
@@ -184,7 +184,7 @@ def test_a_mesh_that_slides_leaves_surface_behind():
 
 
 def test_what_is_left_in_a_frame_does_not_change_with_the_next():
-    lasting = CoarseContinuation(CAMERA, MESH)
+    lasting = Continuation(CAMERA, MESH)
     first = lasting.observe(picture((0.36, 0.2)) < 1.3)
     share = first(moved()).share
     assert lasting.observe(picture((0.4, 0.2)) < 1.3)(moved()).share > share
@@ -192,7 +192,7 @@ def test_what_is_left_in_a_frame_does_not_change_with_the_next():
 
 
 def test_only_the_window_is_looked_at():
-    whole, part = CoarseContinuation(CAMERA, MESH), CoarseContinuation(CAMERA, MESH)
+    whole, part = Continuation(CAMERA, MESH), Continuation(CAMERA, MESH)
     shown = picture((0.4, 0.2)) < 1.3
     window = (slice(21, 101), slice(3, 157))
     left, left_in_part = whole.observe(shown), part.observe(shown[window], window)
@@ -201,6 +201,6 @@ def test_only_the_window_is_looked_at():
 
 def test_without_the_object_the_remainder_is_unknown():
     nothing = np.zeros((CAMERA.height, CAMERA.width), bool)
-    found = CoarseContinuation(CAMERA, MESH).observe(nothing)(moved())
+    found = Continuation(CAMERA, MESH).observe(nothing)(moved())
     assert np.isnan(found.share)
     assert found.gained == 0.0

@@ -14,18 +14,18 @@ from abs_service.pairing.images import Window
 from abs_service.tracker.detection.segments.neighbourhood import grown
 from calib.jit import kernel
 
-#: A connected area of missing returns is background if it shares so many pixels with that of the first image. The
-#: sensor has lost it if as many of its pixels had a return of the background then.
+#: Least number of pixels that a connected area of missing returns shares with the background of the first image to be
+#: background; the sensor has lost it if as many of its pixels had a return of the background then.
 MIN_PIXELS = 10
 
 #: Missing returns deeper inside the expected outline are a hole all the same: the object does not move as far between
 #: two frames [m].
 MAX_DEPTH_M = 0.03
 
-#: Returns are missing beside the object's edge in any case; so many pixels around it are no background.
+#: Width of the zone around the object in which returns are missing in any case, and show no background [px].
 MARGIN_PX = 3
 
-#: Returns within so many pixels of the mesh may be the object's: a mesh ends up to a cell inside it.
+#: Largest distance from the mesh of returns that may be the object's: a mesh ends up to a cell inside it [px].
 OWN_PX = 16
 
 

@@ -20,20 +20,21 @@ NEAR_PX = 16
 #: A view ends within this share of the image's width or height from its sides. The corners that the hexagon of an Azure
 #: Kinect leaves out are 0.24 wide; a part of a long edge farther inside may be fixed for another reason.
 MARGIN = 0.15
-#: A place of the outline is fixed if it is the same in an image and so many later ones.
+#: Number of later images in which a fixed place of the outline is the same.
 LATER_IMAGES = 4
-#: An edge is fixed where so large a share of the outline in a cell of the image is [px], for so many pixels in a row.
+#: Side of a cell of the image [px], and least share of the outline in it that is fixed; least length of such an edge,
+#: and largest gap in it [px].
 #: Dropouts of 2 % change a tenth of a fixed one. Of a sheet that hands bend before a real Kinect v1, far from the sides
 #: of its image, an edge was so in 5 of 116 such series of images.
 CELL_PX, MIN_SHARE, MIN_LENGTH, MAX_GAP = 16, 0.8, 24, 8
 #: If no more than this share of the rest of the outline changes, all of it stands still, and nothing is known.
 MIN_ELSEWHERE = 0.25
-#: So many returns farther than this beyond an edge, in all images so far, show that the sensor sees there [px].
+#: Number of returns in all images so far, and their least distance beyond an edge [px], that show that it is none.
 MIN_RETURNS, BEYOND_PX = 10, 2.0
-#: A place is unsettled if the same share of those that face the same side is fixed within so many pixels along that
-#: side and across it; in the image, all is unsettled so near to it [px].
+#: A place is unsettled if the same share of those that face the same side is fixed around it: up to these distances
+#: along that side and across it. The last is the distance up to which the image around it is unsettled [px].
 ALONG_PX, ACROSS_PX, AROUND_PX = 8, 2, 6
-#: The first pixels beyond an edge lie so near to the line through them, or beyond it.
+#: Largest distance of the first pixels beyond an edge from the line through them, to its inner side [px].
 HALF_PX = 0.75
 Coordinates = NDArray[np.intp]
 

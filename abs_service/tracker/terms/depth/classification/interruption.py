@@ -16,7 +16,7 @@ from calib.jit import kernel
 #: They are no wider than this share of the mesh's side, if it were square: beyond more of them may be anything.
 MAX_WIDTH = 0.5
 
-#: Labelled surfaces end up to so many pixels inside their outlines, and so do the interruptions between them.
+#: Largest distance from a labelled surface to its outline; interruptions end as far inside theirs [px].
 EDGE_PX = 2
 _AROUND = np.ones((2 * EDGE_PX + 1, 2 * EDGE_PX + 1))
 

@@ -17,11 +17,11 @@ from calib.camera import Camera
 MAX_M = 0.62
 #: Depths of one line differ by at most this share: noise and steps of a near surface.
 TOLERANCE = 0.01
-#: It has so many pixels, and that share of all that are at the edge of the object and nearly as near, by `NEARLY`.
+#: Least number of its pixels, and share in those at the object's edge that are farther by the share `NEARLY` at most.
 MIN_PIXELS, MIN_SHARE, NEARLY = 20, 0.7, 0.04
 #: So many pixels from the line the surface is farther by `RISE` or more; that of a sheet across the view is not.
 INSIDE_PX, RISE = 8, 0.015
-#: Returns so much nearer, of as many pixels as a line has, show that the range goes on.
+#: Share by which returns, of as many pixels as a line has, are nearer if the range does not end there.
 NEARER = 0.02
 
 

@@ -11,11 +11,11 @@ from abs_service.tracker.terms.depth.classification.visibility import MAX_STEP_M
 #: Finer steps that are tried [m], down to 3.5 mm. Where noise or a grazing view tears surfaces at them, none will do.
 FINER_STEPS_M = tuple(MAX_STEP_M * 2 ** (-k / 2) for k in range(1, 8))
 
-#: A step separates the object if one connected surface has such a share of the mesh's pixels, and no more than so many
-#: times their number: a mesh ends up to a cell inside the object.
+#: A step separates the object if one connected surface has at least this share of the mesh's pixels, and at most this
+#: multiple of their number: a mesh ends up to a cell inside the object.
 MIN_SHARE, MAX_RATIO = 0.95, 2.0
 
-#: What is connected is counted up to so many times the mesh's side beside it, if it were square.
+#: Distance beside the mesh up to which connected pixels are counted, in sides of a square of its area.
 REACH = 0.5
 
 

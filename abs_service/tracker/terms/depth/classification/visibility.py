@@ -25,7 +25,7 @@ MAX_STEP_M = 0.04
 
 #: A connected surface is the object if at least this share of what it has on the expected place agrees …
 MIN_SHARE = 0.3
-#: … and so many pixels do.
+#: … and at least this number of pixels does.
 MIN_PIXELS = 10
 
 #: Missing returns deeper inside the expected outline are holes in the measurement, with what is missing around them up

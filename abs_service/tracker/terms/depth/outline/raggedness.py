@@ -16,7 +16,7 @@ from abs_service.tracker.terms.median import median
 #: Weight of a new frame in the running mean square.
 NEW = 0.1
 
-#: Edges are compared within so many pixels of the outline; farther ones are off it for other reasons.
+#: Largest distance from the outline of edges that are compared; farther ones are off it for other reasons.
 LIMIT_PX = 8.0
 
 #: So ragged are outlines of sensors that resolve edges: real ones of structured light 1.0 to 1.4 px about a predicted
@@ -28,7 +28,7 @@ TYPICAL_PX = 1.5
 #: in single frames of fast motion (docs/explanation/visibility.md).
 SHARE = 1 / 3
 
-#: An edge is off the outline if it is farther from it than so many times what is typical of this outline.
+#: Distance from the outline beyond which an edge is off it, as a multiple of the outline's raggedness.
 OFF = 2.0
 
 

@@ -15,16 +15,16 @@ from abs_service.tracker.terms.sensor_fit import MIN_RIM
 from calib.camera import Camera
 from calib.jit import kernel
 
-#: The object continues beyond the outermost vertices by no more than so many times their distance from the next ones.
+#: Largest gap from the outermost vertices to the end of the object, in their distances from the next ones (steps).
 MAX_GAP_STEPS = 2.0
 
-#: The end of the object is known if the outline is so near to where it is extrapolated [px].
+#: Largest distance of the outline from the extrapolated end of the object, if that is to be known [px].
 MAX_MISS_PX = 4.0
 
-#: Something hides an edge if it is in front of a point so many steps beyond it.
+#: Points beyond an edge, in steps; what is in front of one of them hides the edge.
 _HIDING_STEPS = (0.5, 1.0, 1.5, MAX_GAP_STEPS)
 
-#: What is in front of the object may cast a shadow on it, without return as far as so many steps beyond the outline.
+#: Reach beyond the outline of a shadow without return, cast by something in front of the object, in steps.
 _SHADOW_STEPS = 0.5
 
 #: A surface that is seen at a smaller cosine at its rim turns away from the sensor: the outline is a silhouette, which
@@ -35,8 +35,8 @@ MIN_COSINE = 0.25
 #: sides. A sheet bends to two sides only. A direction has at least so great a share of the leaning.
 _LEANING, _MIN_SHARE, _MIN_DIRECTION = 0.6, 0.75, 0.25
 
-#: The surface ends before the outline if, most of the way to it, the measurement is so far off the extrapolated mesh at
-#: most of so many neighbouring edges: at the edge of a table top, its side goes on [m].
+#: Distance of the measurement from the extrapolated mesh, most of the way to the outline, beyond which the surface ends
+#: before it [m]; number of neighbouring edges at most of which it is so. At the edge of a table top, its side follows.
 LEAVES_M = 0.015
 _NEIGHBOURS = 7
 _ALMOST = 0.75
@@ -44,7 +44,7 @@ _ALMOST = 0.75
 #: A body with a smaller share of free edges in its outline is round for the most part; those few belong to it as well.
 MIN_FREE = 0.25
 
-#: Vertices within so many pixels of the image's border may continue beyond it.
+#: Distance from the image's border within which the object may continue beyond it [px].
 BORDER_PX = 2.0
 
 

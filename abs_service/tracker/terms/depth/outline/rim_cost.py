@@ -15,7 +15,7 @@ from calib.lenses.lens import LensModel
 #: Bound of the normalised distance from the outline: beyond it, the outline may belong to something else.
 MAX_DEVIATIONS = 8.0
 
-#: Rim vertices are gathered so many at a time, and then compared all at once.
+#: Number of rim vertices that are gathered first, and then compared at once.
 _TILE = 64
 
 

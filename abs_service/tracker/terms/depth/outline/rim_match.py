@@ -17,16 +17,16 @@ from abs_service.tracker.terms.patches import NEAR_PX
 #: Number of steps of the registration.
 STEPS = 12
 
-#: The outline is looked for up to so many pixels from an edge.
+#: Largest distance from an edge at which the outline is looked for [px].
 REACH_PX = 50.0
 
 #: An edge belongs to a part of the outline that faces as it does: smallest cosine between the two.
 _FACING = 0.5
 
-#: At the end, so large a share of the edges is near the outline, and half of them within so many pixels of it.
+#: Least share of the edges near the outline at the end, and their largest median distance from it [px].
 _KNOWN, _ON_PX = 0.7, 1.5
 
-#: Residuals of the registration beyond so many pixels count less and less [px].
+#: Residual of the registration from which on its weight falls [px].
 _ROBUST_PX = 2.0
 
 

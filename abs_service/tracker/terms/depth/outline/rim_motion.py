@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from abs_service.tracker.terms.median import median
 from calib.jit import kernel
 
-#: Edges that face one side of the image are judged together if there are so many of them.
+#: Least number of edges that face one side of the image and are judged together.
 MIN_OF_A_SIDE = 8
 
 #: The ends of a strip have fewer; if all of one end inside the object, and all of the other beside it, it has slid.
@@ -16,7 +16,7 @@ MIN_OF_AN_END = 2
 #: Share of the squared distances from the outline that a motion of the mesh explains at least, if it has moved.
 MIN_EXPLAINED = 0.7
 
-#: It is longer than so many pixels: mixed pixels along an outline let all edges of a side err alike.
+#: Its least length: mixed pixels along an outline let all edges of a side err alike [px].
 MIN_PX = 2.0
 
 #: Share of its length by which a motion displaces edges across the outline, root mean square, if they can show it: an

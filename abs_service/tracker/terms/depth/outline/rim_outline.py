@@ -30,16 +30,16 @@ from abs_service.tracker.terms.depth.outline.rim_normal import rim_directions
 from abs_service.tracker.terms.depth.outline.round_outline import is_round
 from calib.camera import Camera
 
-#: Beside the object, pixels nearer to it than so many deviations are not held against a vertex: the rim is there.
+#: Distance beside the object, in deviations, within which pixels are not held against a vertex: the rim is there.
 UNJUDGED_DEVIATIONS = 3.0
 
-#: A free edge is off the outline if it is farther from it than so many pixels, and than the bound of its cost.
+#: Distance beyond which a free edge is off the outline, unless the bound of its cost is farther [px].
 OFF_PX = 3.0
 
-#: A vertex of the rim is hidden if the mesh's own surface lies so far in front of it [m].
+#: Least distance of the mesh's own surface in front of a vertex of the rim that it hides [m].
 HIDDEN_BEHIND_M = 0.01
 
-#: Where the field of view turns out to end so many pixels beside a free edge, it cuts the object there [px].
+#: Largest distance from a free edge of an end of the field of view that cuts the object there [px].
 BESIDE_PX = 2.0
 
 #: Steps (column, row) towards the right, lower, left and upper side of the image.

@@ -1,7 +1,9 @@
 """The log of a command, as a process of its own writes it."""
 
+import argparse
 import json
 import logging
+import multiprocessing
 import os
 import subprocess
 import sys
@@ -13,6 +15,7 @@ from abs_service.commands.parts.log import logs
 from abs_service.commands.parts.log.log_file import LogFile
 from abs_service.display.terminal import output
 from abs_service.supervision.exit_codes import Exit
+from tests.waiting import eventually
 
 #: A command that logs, and then does what its argument says.
 PROGRAM = """
@@ -107,6 +110,19 @@ def test_a_file_that_cannot_be_written_is_refused(tmp_path):
 def log_file(tmp_path):
     handler = LogFile(tmp_path / "logs" / "file", delay=True)
     yield handler
+    handler.close()
+
+
+def test_a_log_file_that_is_gone_keeps_no_process_of_run_from_starting_again(tmp_path, monkeypatch, capsys):
+    file, kept = tmp_path / "gone" / "log", []
+    monkeypatch.setattr(multiprocessing, "parent_process", object)
+    monkeypatch.setattr(logging, "basicConfig", lambda level, handlers: kept.extend(handlers))
+    arguments = argparse.Namespace(log_file=file, log_format="text", log_level="info")
+    logs.set_up(arguments, "track", [])
+    (handler,) = kept
+    record = logging.LogRecord("x", logging.WARNING, "", 0, "one", None, None)
+    handler.emit(record)
+    assert eventually(lambda: "cannot be written: No such file or directory" in capsys.readouterr().err)
     handler.close()
 
 

@@ -51,7 +51,7 @@ def test_the_depth_cost_is_the_likelihood(seed):
             image[pixel] = reference.distance_at_center(CAMERA, vertex, normal) + generator.normal(0, 6e-3)
     image[generator.uniform(size=image.shape) < 0.1] = np.nan
     amplitude = generator.uniform(500, 9000, image.shape).astype(np.float32)
-    term = DepthTerm("tof", sparse(CAMERA), len(vertices), NOISE, bounds())
+    term = DepthTerm("tof", sparse(CAMERA), sheet(), NOISE, bounds())
     term = term.observe(type(depth_image(image))(image, amplitude), Prediction(in_sight(CAMERA, len(vertices))))
     expected = reference.depth_cost(
         CAMERA, NOISE, image, amplitude, vertices.astype(float), normals.astype(float), SHARE, RANGE_M
@@ -66,7 +66,7 @@ def test_the_depth_cost_is_the_likelihood(seed):
 def test_what_one_measurement_costs(distance, expected):
     sigma = 2e-3
     camera = Camera(8, 6, 10.0, 10.0, 4.0, 3.0)  # the vertex is where a pixel's centre looks
-    term = DepthTerm("tof", sparse(camera), 1, GaussianPolynomial(((sigma,),)), bounds())
+    term = DepthTerm("tof", sparse(camera), sheet(), GaussianPolynomial(((sigma,),)), bounds())
     term = term.observe(depth_image(np.full((6, 8), distance)), Prediction(in_sight(camera, 1)))
     cost = term.cost(as_surface((np.array([[0, 0, 1.0]]), np.array([[0, 0, -1.0]]))))[0]
     density = {
@@ -204,7 +204,7 @@ def test_a_missing_sensor_costs_nothing():
 def test_costs_do_not_depend_on_the_rest_of_the_population():
     mesh = sheet()
     predicted = as_surface((mesh.vertices, mesh.normals))
-    term = DepthTerm("tof", sparse(CAMERA, mesh), len(mesh.vertices), NOISE, bounds())
+    term = DepthTerm("tof", sparse(CAMERA, mesh), mesh, NOISE, bounds())
     term = term.observe(depth_image(np.full((CAMERA.height, CAMERA.width), 1.0)), Prediction(predicted))
     color = ColorTerm("color", sparse(CAMERA, mesh), mesh.colors, GaussianColor(), bounds())
     color = color.observe(ColorImage(np.full((CAMERA.height, CAMERA.width, 3), 90, np.uint8)), Prediction(predicted))

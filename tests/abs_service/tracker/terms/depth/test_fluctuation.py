@@ -22,7 +22,7 @@ from abs_service.tracker.terms.depth.pixel_classes import (
 )
 from calib.camera import Camera
 from calib.noise.constant import Constant
-from tests.abs_service.tracker.scenes import as_surface, depth_image, sparse
+from tests.abs_service.tracker.scenes import as_surface, depth_image, sheet, sparse
 
 DEVIATION = 1e-3
 
@@ -79,7 +79,7 @@ def test_what_is_learnt_of_a_frame_counts_from_the_next_one_on():
     columns, rows = np.meshgrid(np.arange(30.0, 130.0, 8), np.arange(20.0, 100.0, 8))
     vertices = camera.unproject(np.ones((120, 160)))[rows.astype(int), columns.astype(int)].reshape(-1, 3)
     surface = as_surface((vertices, np.tile([0.0, 0.0, -1.0], (len(vertices), 1))))
-    term, scales = DepthTerm("tof", sparse(camera), len(vertices), Constant(DEVIATION), Bounds(0.05, 1.6, 4.6)), []
+    term, scales = DepthTerm("tof", sparse(camera), sheet(10, 13), Constant(DEVIATION), Bounds(0.05, 1.6, 4.6)), []
     for _ in range(MIN_FRAMES + 2):
         frame = term.observe(depth_image(1 + generator.normal(0, 4 * DEVIATION, (120, 160))), Prediction(surface))
         before = frame.fit(surface).normalized_residual

@@ -35,7 +35,7 @@ def turned() -> np.ndarray:
 
 def term(law: NoReturn) -> DepthTerm:
     bounds = Bounds(INLIER, UNIFORM, OUTLIER, law)
-    return DepthTerm("tof", sparse(CAMERA, MESH), len(MESH.vertices), Constant(SIGMA), bounds)
+    return DepthTerm("tof", sparse(CAMERA, MESH), MESH, Constant(SIGMA), bounds)
 
 
 def cost_without(law: NoReturn, vertex: int) -> float:
@@ -82,7 +82,7 @@ def test_dense_synthesis_weighs_missing_returns_too():
     costs, synthesizer = [], dense.Settings().build(rig, MESH)
     for law in (NoReturn(0.02), NoReturn(0.2)):
         bounds = Bounds(INLIER, UNIFORM, OUTLIER, law)
-        seen = DepthTerm("tof", synthesizer, len(MESH.vertices), Constant(SIGMA), bounds)
+        seen = DepthTerm("tof", synthesizer, MESH, Constant(SIGMA), bounds)
         costs.append(seen.observe(depth_image(lost), Prediction(SURFACE)).cost(SURFACE)[0])
     expected = synthesizer.view("tof", np.zeros((len(MESH.vertices), 0), np.float32)).render(SURFACE)
     inside = np.isfinite(expected) & np.isnan(lost)

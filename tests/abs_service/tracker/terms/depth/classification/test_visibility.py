@@ -129,7 +129,7 @@ def test_a_surface_that_moved_as_a_whole_is_still_the_object():
 
 def term_before(distance: np.ndarray) -> ObservedDepth:
     noise = GaussianPolynomial(((3e-3,),))
-    term = DepthTerm("tof", sparse(STRAIGHT, MESH), len(MESH.vertices), noise, Bounds(0.05, 1.6, 4.6))
+    term = DepthTerm("tof", sparse(STRAIGHT, MESH), MESH, noise, Bounds(0.05, 1.6, 4.6))
     return term.observe(depth_image(distance), Prediction(as_surface((MESH.vertices, MESH.normals))))
 
 
