@@ -23,8 +23,9 @@ from abs_service.tracker.posterior.curvature import Quadratic, gauss_newton, pos
 from abs_service.tracker.posterior.frame_posterior import FramePosterior
 from abs_service.tracker.posterior.optimum import Optimum
 
-#: The prior as it is set holds while E is within so many deviations of what it is by chance, χ² of γ directions.
-CERTAIN = 3.0
+#: The prior as it is set holds while E is within this number of deviations of what it is by chance, χ² of γ
+#: directions. Three more than chance takes: a few control points have to stretch to bend.
+CERTAIN = 6.0
 
 #: Deviation of an edge's relative change of length that is not exceeded: rubber's.
 MAX_DEVIATION = 0.2
