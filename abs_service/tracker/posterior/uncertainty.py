@@ -63,7 +63,7 @@ class Uncertainty:
             frame: the frame's posterior.
             recent: motion of theta up to this frame.
         """
-        theta = self._theta.update(optimum, frame.motion, recent)
+        theta = self._theta.update(optimum, frame, recent)
         vertices = self._vertices.update(optimum, frame, theta)
         slides = self._slides.of(optimum)
         return EstimateCovariance(

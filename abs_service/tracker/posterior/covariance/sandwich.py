@@ -6,7 +6,7 @@ read at the nearest pixel, which adds about (slope · pixel)² / 12 (uniform qua
 and on smooth print a cautious model overestimates σ. The sandwich Σ B Σ with B = Jᵀ diag(r² / (1 − h)) J + P uses the
 squared residuals instead (White, Econometrica 50, 1982). The leverage h = diag(J Σ Jᵀ) is the share of its own noise
 that each residual loses to the fit (HC2 of MacKinnon and White, J. Econometrics 29, 1985): if the noise models are
-exact, r² / (1 − h) is 1 on average and the sandwich equals Σ.
+exact, r² / (1 − h) is 1 on average and the sandwich equals Σ. What the priors err by beyond P is in `stretch_evidence`.
 """
 
 from collections.abc import Sequence

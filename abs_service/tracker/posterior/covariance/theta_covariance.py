@@ -20,9 +20,10 @@ from abs_service.tracker.posterior.covariance.sandwich import (
     shared_covariance,
     variances,
 )
+from abs_service.tracker.posterior.frame_posterior import FramePosterior
 from abs_service.tracker.posterior.optimum import Optimum
-from abs_service.tracker.posterior.priors.motion_prediction import MotionPrediction
 from abs_service.tracker.posterior.priors.motion_prior import RecentMotion
+from abs_service.tracker.posterior.stretch_evidence import StretchEvidence
 
 
 class ThetaCovariance:
@@ -34,17 +35,19 @@ class ThetaCovariance:
     """
 
     def __init__(self, model: DeformationModel, registration_m: float):
-        self._effects, self._lasting = DesignEffects(model.mesh), LastingShares()
+        self._effects, self._lasting, self._stretch = DesignEffects(model.mesh), LastingShares(), StretchEvidence()
         self._errors = ErrorPropagation(registration_covariance(model, registration_m))
 
     def restart(self, covariance: NDArray[np.float64]) -> None:
         """Restarts with errors of a covariance (dim, dim), after a relocation."""
         self._errors.restart(covariance)
 
-    def update(self, optimum: Optimum, prediction: MotionPrediction, recent: RecentMotion) -> NDArray[np.float64]:
+    def update(self, optimum: Optimum, frame: FramePosterior, recent: RecentMotion) -> NDArray[np.float64]:
         """Covariance (dim, dim) of the estimate of a frame."""
+        prediction = frame.motion
         inverse, sensed, precision = optimum.inverse_curvature, optimum.sensed, prediction.precision
-        leverage, priors = leverages(inverse, sensed), optimum.linearized.priors - precision
+        leverage = leverages(inverse, sensed)
+        priors = optimum.linearized.priors - precision + self._stretch.excess(optimum, frame)
         variance = variances(sensed, leverage, self._effects.update(inverse, sensed, leverage))
         lasting = self._lasting.update(sensed)
         errors = FrameErrors(

@@ -68,6 +68,10 @@ class MotionPrediction:
         """
         return 2 * self.settings.memory_s * self.settings.speed**2 * self.elapsed_s
 
+    def unseen_precision(self, time_s: float) -> NDArray[np.float64]:
+        """Inverse covariance (dim, dim) of an object that has moved unseen for a time [s], see `wandered_m2`."""
+        return self.metric.matrix * (self.elapsed_s / (time_s * self.wandered_m2))
+
     @property
     def _deviation_m(self) -> float:
         return self.speed * self.elapsed_s

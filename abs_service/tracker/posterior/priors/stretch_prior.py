@@ -24,7 +24,7 @@ class StretchPrior:
         self._rest = mesh.vertices
         self._inverse_lengths = self._inverse_lengths_of(mesh.vertices)
         self._runs = EdgeRuns(self._edges, self._inverse_lengths, len(mesh.vertices))
-        self._inverse_deviation = 1 / deviation
+        self.deviation, self._inverse_deviation = deviation, 1 / deviation
 
     def rest_on(self, vertices: NDArray[np.float64]) -> None:
         """Takes the edges' lengths at rest from vertices (n, 3) [m]; the same array again changes nothing."""
