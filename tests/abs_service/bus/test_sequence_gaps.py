@@ -49,7 +49,7 @@ def test_numbers_that_are_none_are_no_loss(numbers):
     assert lost(*numbers) == 0
 
 
-def health(component="capture", boot_id="a", **counters):
+def health(counters: dict[str, int], component: str = "capture", boot_id: str = "a") -> Sample:
     message = Health(header=Header(boot_id=boot_id), component=component, counters=counters)
     return Sample(f"health/{component}", Health.DESCRIPTOR.full_name, message.SerializeToString())
 
@@ -57,11 +57,11 @@ def health(component="capture", boot_id="a", **counters):
 class Tail:
     """Messages 0 and 1 came, and a health says that there were six; `now_ns` is the time since it."""
 
-    def __init__(self, **said):
+    def __init__(self, said: Sample = health({"published.image": 6})) -> None:  # noqa: B008 - a constant
         self.now_ns = 0
         self.gaps = SequenceGaps(lambda: self.now_ns)
         lost(0, 1, gaps=self.gaps)
-        self.gaps.add_health(health(**({"published.image": 6} | said)))
+        self.gaps.add_health(said)
 
     def after(self, t_ns):
         self.now_ns = t_ns
@@ -82,7 +82,7 @@ def test_each_message_that_health_has_said_is_lost_or_came(came):
     for number, arrived in enumerate(came, 2):
         if arrived:
             tail.gaps.add("image", "a", number)
-    tail.gaps.add_health(health(**{"published.image": 2 + len(came)}))
+    tail.gaps.add_health(health({"published.image": 2 + len(came)}))
     assert tail.after(LATE_NS) == max(4, len(came)) - sum(came)
 
 
@@ -92,14 +92,16 @@ def test_at_the_end_it_is_counted_at_once():
     assert tail.after(0) == 4
 
 
-@pytest.mark.parametrize("said", [{"boot_id": "b"}, {"published.image": 2**64 - 1}, {"published.image": 0}])
+@pytest.mark.parametrize(
+    "said", [health({"published.image": 6}, boot_id="b"), *(health({"published.image": n}) for n in (2**64 - 1, 0))]
+)
 def test_what_another_process_or_none_of_ours_says_is_no_loss(said):
-    assert Tail(**said).after(LATE_NS) == 0
+    assert Tail(said).after(LATE_NS) == 0
 
 
 def test_estimates_are_counted_by_the_health_of_their_tracker():
     tail = Tail()
     tail.gaps.add("sheet/state", "a", 0)
-    tail.gaps.add_health(health("track/sheet", estimates=3))
+    tail.gaps.add_health(health({"estimates": 3}, "track/sheet"))
     tail.after(LATE_NS)
     assert tail.gaps.lost["sheet/state"] == 2
