@@ -16,6 +16,13 @@ from drivers.contract.text import printable
 PERIOD_NS = 1_000_000_000
 #: The largest number that a counter holds; drivers count in ways of their own.
 MAX_COUNT = 2**64 - 1
+#: Beginning of the counter of the images that were published on a topic; the topic follows.
+PUBLISHED = "published."
+
+
+def published(counters: Mapping[str, int]) -> dict[str, int]:
+    """Number of published images by topic, of the counters of a health."""
+    return {name.removeprefix(PUBLISHED): number for name, number in counters.items() if name.startswith(PUBLISHED)}
 
 
 class Level(IntEnum):

@@ -16,6 +16,7 @@ from google.protobuf.message import DecodeError
 
 from abs_service.bus import keys
 from abs_service.bus.contract import Sample
+from abs_service.bus.health import published
 from drivers.encoding.message_check import MAX_GAP
 
 #: Publishers of a topic that are followed: the most recent ones. Two hosts with cameras both publish `health/capture`.
@@ -24,8 +25,6 @@ PUBLISHERS = 4
 LATE_NS = 1_000_000_000
 #: Totals that wait for that, at most; a rig of ten sensors and four trackers has about 30 a second.
 _WAITING = 1000
-#: Beginning of the counter of a topic in a health; the topic follows.
-_PUBLISHED = "published."
 
 
 class _Total(NamedTuple):
@@ -83,11 +82,11 @@ class SequenceGaps:
         """Takes from a health how many images or estimates its process has published."""
         with suppress(DecodeError):
             health, now_ns = Health.FromString(sample.payload), self._clock()
-            counters, tracker = health.counters, health.component.removeprefix("track/")
-            totals = {name.removeprefix(_PUBLISHED): name for name in counters if name.startswith(_PUBLISHED)}
-            totals |= dict.fromkeys((keys.state(tracker), keys.mesh(tracker), keys.theta(tracker)), "estimates")
-            for topic, name in totals.items():
-                self._totals.append(_Total(topic, health.header.boot_id, counters[name] - 1, now_ns))
+            tracker, estimates = health.component.removeprefix("track/"), health.counters["estimates"]
+            totals = published(health.counters)
+            totals |= dict.fromkeys((keys.state(tracker), keys.mesh(tracker), keys.theta(tracker)), estimates)
+            for topic, number in totals.items():
+                self._totals.append(_Total(topic, health.header.boot_id, number - 1, now_ns))
 
     def forget(self) -> None:
         """Takes the next message of each topic as the first."""

@@ -27,7 +27,6 @@ class Losses:
     def __init__(self, health: Health, clock: Callable[[], int]) -> None:
         self._health = health
         self._gaps = SequenceGaps(clock)
-        self.settle = self._gaps.settle
         self._lost = 0  # at the last report
         self._dropped = self._slow_drops = 0
         self._calm = CALM_REPORTS  # reports in a row without a drop
@@ -42,6 +41,10 @@ class Losses:
                 self._gaps.add(sample.topic, about.publisher, about.seq)
         if sample.message == message_header.HEALTH:
             self._gaps.add_health(sample)
+
+    def settle(self) -> None:
+        """Counts what has not come yet: no message is on its way any more."""
+        self._gaps.settle()
 
     def report(self, dropped: Mapping[str, int], failed: bool) -> None:
         """Reports what is new.

@@ -12,7 +12,7 @@ Statistic and goals, those of the unchanged sheet (`recordings`): over all of th
 15 mm, 85 to 99 % of the points in their 95 % region, no frame TRACKING and wrong. At most two meshes: one that began
 cut by the image's border may be made anew when more of the sheet is seen. Points are bound to that one, too, since the
 evening of 2026-11-28; before, all frames after it counted as outside their regions.
-Seeds: the context's, of noise and dropouts.
+Seeds: the context's, of noise, dropouts and images left out.
 """
 
 from collections.abc import Callable, Collection, Iterator

@@ -16,7 +16,7 @@ from abs_service import config
 from abs_service.bus import clock_offsets, keys
 from abs_service.bus.contract import Subscription
 from abs_service.bus.frames import FramePublisher
-from abs_service.bus.health import Health, Level
+from abs_service.bus.health import PUBLISHED, Health, Level
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.bus.zenoh_session import pools
 from abs_service.capture import sensor_metadata
@@ -172,6 +172,6 @@ def _count(publishers: Mapping[str, FramePublisher], points: Mapping[str, PointC
         trouble = publisher.take_trouble()
         health.report(f"frames of {name}", Level.ERROR if trouble else Level.OK, trouble)
         health.count_up_to(publisher.dropped, "dropped.")
-        health.count_up_to(publisher.published, "published.")
+        health.count_up_to(publisher.published, PUBLISHED)
         for topic, number in publisher.published.items():
             health.rate(f"rate_hz.{topic}", number)

@@ -7,6 +7,7 @@ from pathlib import Path
 from absmsg.v1.health_pb2 import Health
 
 from abs_service.bus import keys
+from abs_service.bus.health import published
 from abs_service.supervision.children.child import Child, ChildState
 from abs_service.supervision.health.rig_state import Received, RigState
 
@@ -89,16 +90,15 @@ class RigView:
         """All streams of images, by name."""
         counters, ages = self.live.counters("capture"), self._ages_ms()
         gauges = self.gauges("capture")
-        topics = [key.removeprefix("published.") for key in counters if key.startswith("published.")]
         return [
             Stream(
                 name=topic.removesuffix("/image"),
                 rate_hz=gauges.get(f"rate_hz.{topic}", 0.0),
                 age_ms=ages.get(topic.partition("/")[0]),
-                published=counters[f"published.{topic}"],
+                published=number,
                 dropped=counters[f"dropped.{topic}"],
             )
-            for topic in sorted(topics)
+            for topic, number in sorted(published(counters).items())
             if keys.is_image(topic)
         ]
 

@@ -94,8 +94,8 @@ class Outcome:
         linearized: the newest linearisation of the cost that the search made, from which the covariance of theta is
             made if it holds there; None if it made none.
         fits: agreement of the sensors with theta; empty if the search did not ask for it.
-        is_start: True if theta is no optimum, but where images show the surface: another search is to begin there. The
-            cost is higher than that of theta then.
+        is_start: True if theta is no optimum, but where images show the surface: another search is to begin there.
+            The cost is that of the search's end then, above that of theta.
     """
 
     theta: NDArray[np.float64]

@@ -89,15 +89,13 @@ def distances_share(fits: Sequence[SensorFit]) -> float:
 
 def image_agrees(fits: Sequence[SensorFit]) -> bool:
     """True if nearly all vertices that an image of the appearance shows agree with it."""
-    distances = of_distances(fits)
-    images = [fit for fit in fits if fit not in distances and _judged(fit) >= MIN_JUDGED]
+    images = [fit for fit in _of_appearance(fits) if _judged(fit) >= MIN_JUDGED]
     return any(fit.counts.agreeing > NEARLY_ALL * _judged(fit) for fit in images)
 
 
 def disagreeing_colors(fits: Sequence[SensorFit]) -> int:
     """Number of vertices whose appearance is not that of an image; the largest of such sensors, 0 without."""
-    distances = of_distances(fits)
-    return max((fit.counts.disagreeing for fit in fits if fit not in distances), default=0)
+    return max((fit.counts.disagreeing for fit in _of_appearance(fits)), default=0)
 
 
 def contradicting(fits: Sequence[SensorFit]) -> list[tuple[str, str, float]]:
@@ -124,6 +122,12 @@ def _judged(fit: SensorFit) -> int:
 def of_distances(fits: Sequence[SensorFit]) -> list[SensorFit]:
     """The sensors of distances among them."""
     return [fit for fit in fits if fit.is_surprised or math.isfinite(fit.remainder.at_first)]
+
+
+def _of_appearance(fits: Sequence[SensorFit]) -> list[SensorFit]:
+    """The other sensors among them."""
+    distances = of_distances(fits)
+    return [fit for fit in fits if fit not in distances]
 
 
 def unexplained_share(fits: Sequence[SensorFit]) -> float:
