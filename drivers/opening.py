@@ -10,9 +10,9 @@ from pathlib import Path
 from threading import Thread
 from types import ModuleType
 from typing import Any
-from urllib.parse import urlsplit
 
 import drivers
+from drivers.contract.address import split
 from drivers.contract.device import AddressError, Device, DeviceInfo
 from drivers.contract.discovery import Availability, Found
 from drivers.encoding.foreign_recording import ForeignRecording
@@ -29,7 +29,7 @@ def open_device(uri: str, clock: Callable[[], int]) -> Device:
         clock: CLOCK_MONOTONIC [ns].
 
     Raises:
-        AddressError: no such driver, or an invalid address.
+        AddressError: no such driver, one that cannot be imported, or an invalid address.
         DeviceError: the driver cannot open the device now.
     """
     return _driver_of(uri).open_device(uri, clock)
@@ -54,8 +54,13 @@ def open_recording(program: str, path: Path) -> ForeignRecording:
 
 
 def available() -> list[str]:
-    """Schemes of all drivers; imports every module of this package, which by contract imports no device SDK."""
-    return [scheme for scheme in _modules() if _driver(scheme)]
+    """Schemes of all drivers; imports every module of this package, which by contract imports no device SDK.
+
+    Those of other distributions are not imported: one that is broken is named as one that works.
+    """
+    installed = {point.name for point in entry_points(drivers.__name__)}
+    modules = _modules().items()
+    return [one for one, module in modules if one in installed or _opens_devices(importlib.import_module(module))]
 
 
 def discover(timeout_s: float, grace_s: float = GRACE_S) -> list[Found]:
@@ -113,13 +118,16 @@ def _modules() -> dict[str, str]:
 
 
 def _driver_of(uri: str) -> ModuleType:
-    scheme = urlsplit(uri).scheme
-    driver = _driver(scheme) if scheme in _modules() else None
-    if driver is None:
+    scheme = split(uri).scheme
+    module = _modules().get(scheme, __name__)
+    try:
+        driver = importlib.import_module(module)
+    except Exception as error:  # whatever the code of another distribution raises
+        raise AddressError(f"{uri}: its driver {module} cannot be imported: {error!r}") from error
+    if not _opens_devices(driver):
         raise AddressError(f"{uri!r}: scheme {scheme!r} is none of {available()}")
     return driver
 
 
-def _driver(scheme: str) -> ModuleType | None:
-    module = importlib.import_module(_modules()[scheme])
-    return module if hasattr(module, "open_device") and module.__name__ != __name__ else None
+def _opens_devices(module: ModuleType) -> bool:
+    return hasattr(module, "open_device") and module.__name__ != __name__

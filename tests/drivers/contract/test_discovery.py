@@ -8,7 +8,7 @@ from types import ModuleType
 import pytest
 
 from drivers import opening
-from drivers.contract.device import DeviceError, DeviceInfo
+from drivers.contract.device import AddressError, DeviceError, DeviceInfo
 from drivers.contract.discovery import Availability, Found, choose
 
 ONE, OTHER = (Found(DeviceInfo(f"oak://{serial}", "OAK-D", serial)) for serial in ("111", "222"))
@@ -65,3 +65,19 @@ def test_a_failing_or_hanging_driver_does_not_hide_the_others(monkeypatch: pytes
 def test_every_driver_has_a_discovery() -> None:
     assert all(callable(sys.modules[f"drivers.{scheme}"].discover) for scheme in opening.available())
     assert all(callable(sys.modules[f"drivers.{scheme}"].check_address) for scheme in opening.available())
+
+
+def test_a_driver_that_cannot_be_imported_is_named_and_hides_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(opening, "entry_points", lambda group: [EntryPoint("absent", "no_such_driver", "drivers")])
+    (broken,) = [found for found in opening.discover(5.0) if found.info.model == "absent"]
+    assert broken.availability is Availability.FAULTY
+    assert "No module named 'no_such_driver'" in broken.reason
+    with pytest.raises(AddressError, match=r"^absent://1: its driver no_such_driver cannot be imported"):
+        opening.check_address("absent://1")
+    with pytest.raises(AddressError, match=r"scheme 'nonsense' is none of .*'absent'"):
+        opening.check_address("nonsense://1")
+
+
+def test_an_address_that_is_none_is_refused_before_its_driver_is_asked() -> None:
+    with pytest.raises(AddressError, match=r"^oak://\[: Invalid IPv6 URL$"):
+        opening.check_address("oak://[")
