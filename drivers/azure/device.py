@@ -131,7 +131,7 @@ class AzureDevice:
             self._gate.report_state(DeviceState.STREAMING, "images follow")
             self._run = run
             run.threads = tuple(
-                threading.Thread(target=work, args=(run,), name="azure", daemon=True)
+                threading.Thread(target=self._gate.guard, args=(work, run), name="azure", daemon=True)
                 for work in (self._take, self._decode)
             )
             for thread in run.threads:

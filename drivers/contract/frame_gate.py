@@ -5,8 +5,9 @@ Every driver has one; it implements the contract's guarantees about counters, st
 
 import threading
 from collections import Counter, deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
+from typing import Any
 
 from drivers.contract.capabilities import StreamInfo
 from drivers.contract.clock import Stamp
@@ -70,6 +71,7 @@ class FrameGate:
                 return None
             self._sink = sink
             self._epoch += 1
+            self._ended.set()  # one thread of the last run may have failed, and others not
             self._ended = ended = threading.Event()
             self.report_state(DeviceState.OPENING, reason)
             return ended
@@ -100,6 +102,16 @@ class FrameGate:
             if self._sink is not None:
                 self._state = state
                 self._sink.on_state(state, reason)
+
+    def guard(self, work: Callable[..., None], *arguments: Any) -> None:
+        """Does the work of a driver's thread, and reports FAILED if it raises: with the reason of a `DeviceError`."""
+        try:
+            work(*arguments)
+        except DeviceError as error:
+            self.report_state(DeviceState.FAILED, str(error))
+        except Exception as error:
+            self.report_state(DeviceState.FAILED, f"the driver failed: {error!r}")
+            raise
 
     def warn(self, condition: str, message: str) -> None:
         """See `drivers.contract.device.Sink.on_warning`."""

@@ -90,7 +90,9 @@ class GenicamDevice:
                 raise
             self._mapping = DeviceClock(self._ticks) if self._ticks.tick_hz else None
             self._gate.report_state(DeviceState.STREAMING, "images follow")
-            self._thread = threading.Thread(target=self._pump, args=(stop,), name="genicam", daemon=True)
+            self._thread = threading.Thread(
+                target=self._gate.guard, args=(self._pump, stop), name="genicam", daemon=True
+            )
             self._thread.start()
 
     def stop(self) -> None:
@@ -115,8 +117,6 @@ class GenicamDevice:
                     stop.wait(_POLL_S)
                 else:
                     self._deliver(run, shot, self._clock())
-        except DeviceError as error:
-            self._gate.report_state(DeviceState.FAILED, str(error))
         finally:
             self._link.stop()
 

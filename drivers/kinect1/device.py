@@ -85,8 +85,8 @@ class Kinect1Device:
             DeviceError: the device was closed.
         """
         if stop := self._gate.begin(sink, "beginning the camera's streams"):
-            arguments = (stop, self._thread)
-            self._thread = threading.Thread(target=self._run, args=arguments, name="kinect1", daemon=True)
+            arguments = self._run, stop, self._thread
+            self._thread = threading.Thread(target=self._gate.guard, args=arguments, name="kinect1", daemon=True)
             self._thread.start()
 
     def stop(self) -> None:
@@ -104,13 +104,7 @@ class Kinect1Device:
     def _run(self, stop: threading.Event, before: threading.Thread) -> None:
         if before.is_alive():
             before.join()  # stopped in its own sink
-        try:
-            self._stream(stop)
-        except DeviceError as error:
-            self._gate.report_state(DeviceState.FAILED, str(error))
-        except Exception as error:
-            self._gate.report_state(DeviceState.FAILED, f"the driver failed: {error!r}")
-            raise
+        self._stream(stop)
 
     def _stream(self, stop: threading.Event) -> None:
         exposures = {Stream.COLOR: self._colors.exposure_s}

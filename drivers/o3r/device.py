@@ -84,7 +84,8 @@ class O3rDevice:
             except DeviceError as error:
                 self._gate.report_state(DeviceState.FAILED, str(error))
                 raise
-            self._thread = threading.Thread(target=self._pump, args=(stop, grabber, queue), name="o3r", daemon=True)
+            arguments = self._pump, stop, grabber, queue
+            self._thread = threading.Thread(target=self._gate.guard, args=arguments, name="o3r", daemon=True)
             self._gate.report_state(DeviceState.STREAMING, "images follow")
             self._thread.start()
 
@@ -103,19 +104,20 @@ class O3rDevice:
 
     def _pump(self, stop: threading.Event, grabber: Any, queue: FrameQueue[tuple[Any, int]]) -> None:
         latest = None
-        while not stop.is_set():
-            item = queue.take(_POLL_S)
-            overrun = queue.dropped()
-            self._gate.drop("overrun", overrun * len(self.capabilities.streams))
-            if item is not None:
-                number = item[0].frame_count()
-                self._count_missing(number if latest is None else latest + overrun + 1, number)
-                latest = number
-                self._deliver(*item)
-            elif queue.ended():
-                self._gate.report_state(DeviceState.FAILED, queue.ended())
-                break
-        end(grabber)
+        try:
+            while not stop.is_set():
+                item = queue.take(_POLL_S)
+                overrun = queue.dropped()
+                self._gate.drop("overrun", overrun * len(self.capabilities.streams))
+                if item is not None:
+                    number = item[0].frame_count()
+                    self._count_missing(number if latest is None else latest + overrun + 1, number)
+                    latest = number
+                    self._deliver(*item)
+                elif queue.ended():
+                    raise DeviceError(queue.ended())
+        finally:
+            end(grabber)
 
     def _count_missing(self, expected: int, number: int) -> None:
         if number < expected:  # the head was configured anew and counts from the beginning

@@ -82,7 +82,10 @@ class OakDevice:
         before = self._threads
         self._threads = [
             threading.Thread(
-                target=self._pump, args=(role, stop, before), name=f"oak {role.sensor}/{role.stream}", daemon=True
+                target=self._gate.guard,
+                args=(self._pump, role, stop, before),
+                name=f"oak {role.sensor}/{role.stream}",
+                daemon=True,
             )
             for role in self._connection.queues
         ]
@@ -137,9 +140,6 @@ class OakDevice:
                 over = self._connection.ended
                 state = DeviceState.CLOSED if over else DeviceState.FAILED
                 self._gate.report_state(state, over or f"the device is gone: {error}")
-        except Exception as error:
-            self._gate.report_state(DeviceState.FAILED, f"{role.sensor}/{role.stream} broke: {error!r}")
-            raise
 
     def _deliver(self, role: Role, picture: Picture) -> None:
         t_arrival_ns = self._clock()

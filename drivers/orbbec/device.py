@@ -127,8 +127,8 @@ class OrbbecDevice:
                 self._gate.report_state(DeviceState.FAILED, str(error))
                 raise
             self._gate.report_state(DeviceState.STREAMING, "images follow")
-            arguments = origin, stop, queue
-            self._thread = threading.Thread(target=self._pump, args=arguments, name="orbbec", daemon=True)
+            arguments = self._pump, origin, stop, queue
+            self._thread = threading.Thread(target=self._gate.guard, args=arguments, name="orbbec", daemon=True)
             self._thread.start()
 
     def stop(self) -> None:

@@ -122,7 +122,8 @@ class RealsenseDevice:
                 self._halt()
                 self._gate.report_state(DeviceState.FAILED, str(error))
                 raise
-            self._thread = threading.Thread(target=self._pump, args=(stop, self._queue), name="realsense", daemon=True)
+            arguments = self._pump, stop, self._queue
+            self._thread = threading.Thread(target=self._gate.guard, args=arguments, name="realsense", daemon=True)
             self._gate.report_state(DeviceState.STREAMING, "images follow")
             self._thread.start()
 

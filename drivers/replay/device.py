@@ -89,7 +89,7 @@ class ReplayDevice:
             DeviceError: the device was closed.
         """
         if stop := self._gate.begin(sink, f"begins {self._delay_s:g} s after it was started"):
-            self._thread = threading.Thread(target=self._run, args=(stop,), name="replay", daemon=True)
+            self._thread = threading.Thread(target=self._gate.guard, args=(self._run, stop), name="replay", daemon=True)
             self._thread.start()
 
     def stop(self) -> None:

@@ -86,7 +86,9 @@ class SimulatedDevice:
             DeviceError: the device was closed.
         """
         if stop := self._gate.begin(sink, "preparing the simulation"):
-            self._thread = threading.Thread(target=self._run, args=(stop,), name="simulated", daemon=True)
+            self._thread = threading.Thread(
+                target=self._gate.guard, args=(self._run, stop), name="simulated", daemon=True
+            )
             self._thread.start()
 
     def stop(self) -> None:
@@ -110,13 +112,9 @@ class SimulatedDevice:
             yield Control(EXPOSURE, lambda: self._color_s, write)
 
     def _run(self, stop: threading.Event) -> None:
-        try:
-            self._simulation.frames(0)  # compiles the kernels, which would delay the first exposures
-            self._gate.report_state(DeviceState.STREAMING, "simulated exposures follow")
-            self._stream(stop, self._gate.epoch)
-        except Exception as error:
-            self._gate.report_state(DeviceState.FAILED, f"the simulation failed: {error!r}")
-            raise
+        self._simulation.frames(0)  # compiles the kernels, which would delay the first exposures
+        self._gate.report_state(DeviceState.STREAMING, "simulated exposures follow")
+        self._stream(stop, self._gate.epoch)
 
     def _stream(self, stop: threading.Event, epoch: int) -> None:
         first_ns = self._clock()

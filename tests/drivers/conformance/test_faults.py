@@ -1,10 +1,13 @@
 """Each driver tells what goes wrong with its device, and goes on; see `bench.py`."""
 
 import numpy as np
+import pytest
 
 from drivers.contract.device import DeviceState
-from drivers.contract.frame import Kind
+from drivers.contract.frame import Frame, Kind
+from drivers.contract.frame_gate import FrameGate
 from tests.drivers.conformance.bench import Bench, Fault, dropped, streaming
+from tests.drivers.recording_sink import RecordingSink
 from tests.waiting import eventually
 
 
@@ -62,3 +65,18 @@ def test_an_image_without_any_measurement_is_an_image(bench: Bench) -> None:
 
         assert eventually(seen)
         assert sink.receives(2)
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+def test_a_driver_that_breaks_down_says_so(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    def breaks_down(gate: FrameGate, frame: Frame) -> None:
+        raise ZeroDivisionError("a mistake of the driver")
+
+    monkeypatch.setattr(FrameGate, "deliver", breaks_down)
+    device, sink = bench.open(), RecordingSink()
+    try:
+        device.start(sink)
+        assert sink.reaches(DeviceState.FAILED)
+        assert any("a mistake of the driver" in reason for state, reason in sink.states if state == DeviceState.FAILED)
+    finally:
+        device.close()
