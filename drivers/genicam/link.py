@@ -27,13 +27,15 @@ class Part:
     Attributes:
         pixel_format: its GenICam name.
         width, height: its size [px].
-        data: rows of pixels, with padding behind each row.
+        data: rows of pixels; behind the last one there may be chunks.
+        padding: behind each row [bytes].
     """
 
     pixel_format: str
     width: int
     height: int
     data: memoryview
+    padding: int = 0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -108,7 +110,7 @@ class CameraLink:
             if buffer is None:
                 return None
             try:
-                return Shot(int(buffer.frame_id), _time_ns(buffer), tuple(self._parts(buffer)))
+                return Shot(int(buffer.frame_id), _told(buffer, "timestamp_ns"), tuple(self._parts(buffer)))
             finally:
                 buffer.parent.queue_buffer(buffer)
 
@@ -133,14 +135,15 @@ class CameraLink:
             for part in buffer.parts:
                 name = self._names.get(part.data_format, f"{part.data_format:#x}")
                 data = content[part.data_offset : part.data_offset + part.data_size]
-                yield Part(name, part.width, part.height, data)
+                yield Part(name, part.width, part.height, data, _told(part, "x_padding") or 0)
         else:  # the feature tells formats of manufacturers, too
-            height = int(buffer.height)
-            yield Part(self.nodes.PixelFormat.value, int(buffer.width), height, content[: int(buffer.size_filled)])
+            size, data = (int(buffer.width), int(buffer.height)), content[: int(buffer.size_filled)]
+            yield Part(self.nodes.PixelFormat.value, *size, data, _told(buffer, "padding_x") or 0)
 
 
-def _time_ns(buffer: Any) -> int | None:
+def _told(buffer: Any, name: str) -> int | None:
+    """A number of a buffer, or of a part of one; None if the producer does not tell it."""
     try:
-        return int(buffer.timestamp_ns)
-    except Exception:  # the producer's, if it has none
+        return int(getattr(buffer, name))
+    except Exception:  # the producer's own
         return None

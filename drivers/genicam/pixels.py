@@ -88,9 +88,9 @@ def _rows(part: Part, dtype: np.dtype, channels: int, planes: int) -> NDArray[An
     """Values (planes, height, width, channels) without the padding of rows."""
     rows = planes * part.height
     used = part.width * channels * dtype.itemsize
-    if rows == 0 or len(part.data) // rows < used:
+    stride = used + part.padding
+    if rows == 0 or len(part.data) < rows * stride:
         raise PixelError(f"{part.pixel_format}: {len(part.data)} bytes are too few for {part.width} × {part.height}")
-    stride = len(part.data) // rows
     content = np.frombuffer(part.data, np.uint8, rows * stride).reshape(rows, stride)[:, :used]
     return np.ascontiguousarray(content).view(dtype).reshape(planes, part.height, part.width, channels)
 

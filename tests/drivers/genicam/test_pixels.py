@@ -18,7 +18,7 @@ METRES = np.array([[1.0, np.nan, 1.5], [2.0, 2.5, 3.0]])
 
 def part(name: str, values: NDArray[np.generic], padding: int = 0) -> Part:
     rows = np.ascontiguousarray(values).view(np.uint8).reshape(2, -1)
-    return Part(name, 3, 2, memoryview(np.pad(rows, ((0, 0), (0, padding))).tobytes()))
+    return Part(name, 3, 2, memoryview(np.pad(rows, ((0, 0), (0, padding))).tobytes()), padding)
 
 
 def made(*parts: Part, distances: Distances = MILLIMETRES, time_ns: int | None = None):
@@ -35,6 +35,12 @@ def test_distances_come_out_of_every_layout(name: str, index: int) -> None:
     assert (Kind.INTENSITY in images) == ("Y" in name)
     if "Y" in name:
         assert np.all(images[Kind.INTENSITY].data == 77)
+
+
+def test_what_follows_the_last_row_is_no_padding() -> None:
+    chunks = b"\xff" * 20
+    images = made(Part("Coord3D_C16", 3, 2, memoryview(DEPTH.tobytes() + chunks)))
+    np.testing.assert_allclose(images[Kind.DEPTH].si(), METRES, rtol=1e-6)
 
 
 def test_distances_in_planes_or_with_an_offset_are_the_same() -> None:
