@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
-from urllib.parse import urlsplit
 
 from drivers.azure import calibration, library
 from drivers.azure.address import Address, parse
@@ -14,6 +13,7 @@ from drivers.azure.attached import MODEL, attached
 from drivers.azure.calibration import CalibrationError
 from drivers.azure.device import AzureDevice
 from drivers.azure.kinect import Kinect
+from drivers.contract.address import with_name
 from drivers.contract.device import DeviceError, DeviceInfo, SdkMissingError
 from drivers.contract.discovery import Availability, Found, choose
 
@@ -52,8 +52,7 @@ def open_device(uri: str, clock: Callable[[], int]) -> AzureDevice:
 
 
 def _device(kinect: Kinect, address: Address, found: DeviceInfo, clock: Callable[[], int]) -> AzureDevice:
-    uri = urlsplit(address.uri)._replace(netloc=found.serial).geturl()
-    info = replace(found, uri=uri, firmware=kinect.firmware())
+    info = replace(found, uri=with_name(address.uri, found.serial), firmware=kinect.firmware())
     modes = {head: mode for head, mode in (("depth", address.depth), ("color", address.color)) if mode}
     try:
         cameras = calibration.cameras(kinect.calibration(), modes)

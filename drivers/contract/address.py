@@ -31,6 +31,12 @@ def name(uri: str, what: str = "a serial number") -> str:
     return parts.netloc
 
 
+def with_name(uri: str, device: str) -> str:
+    """An address with this name before the '?': what opens the same device again, on any port."""
+    parts = split(uri)
+    return f"{parts.scheme}://{device}" + (f"?{parts.query}" if parts.query else "")
+
+
 def values(uri: str, parsers: Mapping[str, Callable[[str], Any]]) -> dict[str, Any]:
     """Values of the keys behind the '?' of an address.
 

@@ -3,8 +3,8 @@
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from urllib.parse import urlsplit
 
+from drivers.contract.address import with_name
 from drivers.contract.device import DeviceError, DeviceInfo, SdkMissingError
 from drivers.contract.discovery import Availability, Found
 from drivers.contract.errors import translated_sdk_errors
@@ -77,8 +77,7 @@ def of_link(link: CameraLink, info: DeviceInfo, address: Address, clock: Callabl
         camera = features.camera(nodes, depth.width, depth.height, address)
         rate_hz = features.value(nodes, "AcquisitionFrameRate") or _RATE_HZ
         firmware = features.value(nodes, "DeviceFirmwareVersion", "DeviceVersion") or ""
-    query = urlsplit(address.uri).query
-    known = replace(info, uri=f"{info.uri}?{query}" if query else info.uri, firmware=str(firmware))
+    known = replace(info, uri=with_name(address.uri, info.serial), firmware=str(firmware))
     try:
         return GenicamDevice(link, known, First(shot, distances, camera, float(rate_hz)), clock)
     except PixelError as error:

@@ -2,8 +2,8 @@
 
 from collections.abc import Callable
 from typing import Any
-from urllib.parse import urlsplit
 
+from drivers.contract.address import with_name
 from drivers.contract.device import AddressError, DeviceInfo, DeviceState, SdkMissingError
 from drivers.contract.discovery import UDEV_REMEDY, Availability, Found, choose
 from drivers.orbbec import library
@@ -88,8 +88,7 @@ def _on_usb(ob: Any, context: Any, address: Address) -> Origin:
     serial = choose(discover(1.0), "orbbec", address.serial).info.serial
     with library.translated_errors(address.uri):
         camera = context.query_devices().get_device_by_serial_number(serial)
-        query = urlsplit(address.uri).query
-        info = device_info(camera, f"orbbec://{serial}?{query}" if query else f"orbbec://{serial}")
+        info = device_info(camera, with_name(address.uri, serial))
 
     def ended() -> tuple[DeviceState, str] | None:
         try:

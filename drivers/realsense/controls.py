@@ -1,6 +1,6 @@
 """Controls of a RealSense, from librealsense's options."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from drivers.contract.controls import Control, ControlInfo, ControlKind, Controls, Value
@@ -11,18 +11,18 @@ from drivers.realsense.streams import Role
 _SYNC: Mapping[str, int] = {"free": 0, "master": 1, "slave": 2}
 
 
-def make(rs: Any, uri: str, sensors: Mapping[int, tuple[Any, Role]]) -> Controls:
+def make(rs: Any, uri: str, sensors: Sequence[tuple[Any, Role]]) -> Controls:
     """Controls of the used sensors; those of the colour sensor have the prefix `color.`."""
     controls: list[Control] = []
-    for sensor, role in sensors.values():
+    for sensor, role in sensors:
         prefix = "color." if role.sensor == "color" else ""
         controls += _of_sensor(rs, uri, sensor, prefix, role.exposure_unit_s)
     return Controls(controls)
 
 
-def can_sync(rs: Any, sensors: Mapping[int, tuple[Any, Role]]) -> bool:
+def can_sync(rs: Any, sensors: Sequence[tuple[Any, Role]]) -> bool:
     """True if the camera supports hardware synchronisation with others."""
-    return any(sensor.supports(rs.option.inter_cam_sync_mode) for sensor, _ in sensors.values())
+    return any(sensor.supports(rs.option.inter_cam_sync_mode) for sensor, _ in sensors)
 
 
 def _of_sensor(rs: Any, uri: str, sensor: Any, prefix: str, exposure_unit_s: float) -> Iterator[Control]:

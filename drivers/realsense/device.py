@@ -79,12 +79,9 @@ class RealsenseDevice:
         self._clocks: dict[Role, DeviceClock] = {}
         self._queue: FrameQueue[tuple[Role, Any, int]] = FrameQueue()
         streams = [stream for one in used for stream in one.streams]
-        try:
-            self.cameras: Mapping[str, Camera] = cameras(streams)
-        except ValueError as error:
-            raise DeviceError(f"{info.uri}: {error}") from error
         with translated_errors(info.uri):
-            sensors = {number: (one.sensor, one.role) for number, one in enumerate(used)}
+            self.cameras: Mapping[str, Camera] = cameras(streams)
+            sensors = [(one.sensor, one.role) for one in used]
             self.controls = controls.make(rs, info.uri, sensors)
             roles = tuple(SyncRole) if controls.can_sync(rs, sensors) else (SyncRole.FREE,)
         infos = tuple(_info(stream) for stream in streams)

@@ -3,8 +3,8 @@
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
-from urllib.parse import urlsplit
 
+from drivers.contract.address import with_name
 from drivers.contract.device import AddressError, DeviceError, DeviceInfo, SdkMissingError
 from drivers.contract.discovery import UDEV_REMEDY, Availability, Found, choose
 from drivers.realsense import library
@@ -41,17 +41,18 @@ def open_device(uri: str, clock: Callable[[], int]) -> RealsenseDevice:
         return _play(rs, address, str(address.recording), clock)
     serial = choose(discover(1.0), "realsense", address.serial).info.serial
     with library.translated_errors(uri):
-        camera = next(one for one in rs.context().query_devices() if _text(rs, one, "serial_number") == serial)
+        there = (one for one in rs.context().query_devices() if _text(rs, one, "serial_number") == serial)
+        if (camera := next(there, None)) is None:
+            raise DeviceError(f"{uri}: {serial} was unplugged while it was opened")
         for sensor in camera.query_sensors():
             # Otherwise librealsense maps timestamps to host time itself, by an unobservable fit.
             if sensor.supports(rs.option.global_time_enabled):
                 sensor.set_option(rs.option.global_time_enabled, 0.0)
         offers = [(sensor, of_sensor(sensor)) for sensor in camera.query_sensors()]
         chosen = set(map(id, wanted([stream for _, streams in offers for stream in streams], address)))
+        info = replace(device_info(rs, camera), uri=with_name(uri, serial))
     used = [UsedSensor(sensor, [stream for stream in streams if id(stream) in chosen]) for sensor, streams in offers]
-    info = device_info(rs, camera)
-    query = urlsplit(uri).query
-    return _device(rs, camera, replace(info, uri=f"{info.uri}?{query}" if query else info.uri), used, clock)
+    return _device(rs, camera, info, used, clock)
 
 
 def of_device(rs: Any, camera: Any, info: DeviceInfo, clock: Callable[[], int]) -> RealsenseDevice:

@@ -5,8 +5,8 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
-from urllib.parse import urlsplit, urlunsplit
 
+from drivers.contract.address import with_name
 from drivers.contract.capabilities import SyncRole
 from drivers.contract.clock import DeviceClock
 from drivers.contract.device import DeviceError, DeviceInfo, SdkMissingError
@@ -107,7 +107,7 @@ def _info(device: Any, address: Address) -> DeviceInfo:
     link = _LINKS.get(device.getUsbSpeed().name, "") if device.getDeviceInfo().protocol.name == "X_LINK_USB_VSC" else ""
     # A device on the network keeps its address, since discovery does not search the network.
     name = address.name if address.network and address.name else serial
-    uri = urlunsplit(("oak", name, "", urlsplit(address.uri).query, ""))
+    uri = with_name(address.uri, name)
     return DeviceInfo(uri, str(device.getProductName() or device.getDeviceName()), serial, link=link)
 
 

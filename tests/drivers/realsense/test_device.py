@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from drivers.contract.controls import ControlKind
 from drivers.contract.device import AddressError, ControlError, DeviceError, DeviceState, SdkMissingError
 from drivers.contract.frame import Geometry, Kind
+from drivers.realsense import device as realsense_device
 from drivers.realsense import library, open_device
 from drivers.realsense.controls import make
 from drivers.realsense.device import RealsenseDevice
@@ -208,7 +209,7 @@ class Options:
 
 def test_controls_are_in_si_units_and_in_the_cameras_steps() -> None:
     sensor = Options()
-    controls = make(rs, "realsense://1", {0: (sensor, ROLES["depth", 0]), 1: (sensor, ROLES["color", 0])})
+    controls = make(rs, "realsense://1", [(sensor, ROLES["depth", 0]), (sensor, ROLES["color", 0])])
     assert {info.name: info.kind for info in controls.infos}["sync_role"] == ControlKind.CHOICE
     controls.set("exposure_s", 0.0085)
     assert sensor.values[rs.option.exposure] == 8500
@@ -240,3 +241,24 @@ def test_arbitrary_bytes_are_an_image_or_rejected(
 
 def test_the_software_camera_has_the_size_it_says(device: RealsenseDevice) -> None:
     assert {(stream.width, stream.height) for stream in device.capabilities.streams} == {SIZE}
+
+
+def test_a_camera_that_is_unplugged_while_it_is_opened_is_named(
+    camera: SoftwareCamera, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    attached = iter([[camera.device], []])
+    bus = SimpleNamespace(query_devices=lambda: next(attached))
+    monkeypatch.setattr(library, "load", lambda: SimpleNamespace(camera_info=rs.camera_info, context=lambda: bus))
+    with pytest.raises(DeviceError, match=r"^realsense://0001: 0001 was unplugged while it was opened$"):
+        open_device("realsense://0001", time.monotonic_ns)
+
+
+def test_a_camera_that_is_unplugged_while_its_calibration_is_read_is_named(
+    camera: SoftwareCamera, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def gone(streams: object) -> None:
+        raise RuntimeError("xioctl(VIDIOC_S_FMT) failed")
+
+    monkeypatch.setattr(realsense_device, "cameras", gone)
+    with pytest.raises(DeviceError, match=r"^realsense://0001: xioctl"):
+        of_device(rs, camera.device, device_info(rs, camera.device), time.monotonic_ns)
