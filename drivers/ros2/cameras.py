@@ -79,10 +79,10 @@ def camera(info: Any, rectified: bool, T_rs: Pose) -> Camera:
 
 
 def _lens(model: str, coefficients: np.ndarray) -> LensModel:
+    if model == "equidistant":  # not a pinhole without coefficients
+        return KannalaBrandt(coefficients)
     if not np.any(coefficients):
         return Lens()
-    if model == "equidistant":
-        return KannalaBrandt(coefficients)
     if model in {"plumb_bob", "rational_polynomial"} and not np.any(coefficients[8:]):
         return Lens(coefficients[:8])
     raise CameraInfoError(

@@ -1,6 +1,6 @@
 """Calibrations as ROS messages."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -22,7 +22,7 @@ def info(camera: Camera, header: Any, distorted: bool) -> Any:
         header: that of the image.
         distorted: False if the images are without its lens distortion.
     """
-    model, lens = _lens(camera)
+    model, lens = _lens(camera.lens_model if distorted else "", camera.lens if distorted else ())
     projection = np.zeros((3, 4))
     projection[:, :3] = camera.K
     return cdr.make(
@@ -31,7 +31,7 @@ def info(camera: Camera, header: Any, distorted: bool) -> Any:
         height=camera.height,
         width=camera.width,
         distortion_model=model,
-        d=lens if distorted else np.zeros_like(lens),
+        d=lens,
         k=camera.K.ravel(),
         r=np.eye(3).ravel(),
         p=projection.ravel(),
@@ -41,9 +41,9 @@ def info(camera: Camera, header: Any, distorted: bool) -> Any:
     )
 
 
-def _lens(camera: Camera) -> tuple[str, NDArray[np.float64]]:
-    lens = np.pad(np.array(camera.lens, float), (0, 8 - len(camera.lens)))
-    if camera.lens_model == "fisheye":
+def _lens(model: str, coefficients: Sequence[float]) -> tuple[str, NDArray[np.float64]]:
+    lens = np.pad(np.array(coefficients, float), (0, 8 - len(coefficients)))
+    if model == "fisheye":
         return "equidistant", lens[:4]
     return ("rational_polynomial", lens) if lens[PLUMB_BOB:].any() else ("plumb_bob", lens[:PLUMB_BOB])
 

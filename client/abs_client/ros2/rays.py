@@ -18,7 +18,8 @@ def axial_shares(camera: Camera, distorted: bool) -> NDArray[np.float32]:
     """
     v, u = np.mgrid[0 : camera.height, 0 : camera.width].astype(float)
     seen = np.stack([(u - camera.K[0, 2]) / camera.K[0, 0], (v - camera.K[1, 2]) / camera.K[1, 1]])
-    xy = _inverse(camera, seen) if distorted and any(camera.lens) else seen
+    bends = distorted and (any(camera.lens) or camera.lens_model == "fisheye")  # equidistant without coefficients
+    xy = _inverse(camera, seen) if bends else seen
     return (1.0 / np.sqrt(1.0 + (xy * xy).sum(axis=0))).astype(np.float32)
 
 

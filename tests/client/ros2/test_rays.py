@@ -31,6 +31,12 @@ def test_a_lens_is_undone(model):
     np.testing.assert_allclose(axial_shares(camera(model, lens), True), wanted, atol=1e-5)
 
 
+def test_a_fisheye_without_coefficients_is_equidistant():
+    wanted = 1 / build(SIZE, MATRIX, lens_of("fisheye", ())).ray_length
+    np.testing.assert_allclose(axial_shares(camera("fisheye", ()), True), wanted, atol=1e-5)
+    assert wanted[0, 0] < axial_shares(camera("brown_conrady", ()), True)[0, 0] - 0.02
+
+
 def test_images_without_distortion_have_the_rays_of_a_pinhole():
     with_lens = camera("brown_conrady", LENSES["brown_conrady"])
     wanted = axial_shares(replace(with_lens, lens=()), True)

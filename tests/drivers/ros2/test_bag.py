@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from calib import pose
+from calib.lenses.fisheye import KannalaBrandt
 from drivers.contract.frame import Frame, Geometry, Kind
 from drivers.encoding.foreign_recording import ForeignRecordingError
 from drivers.opening import open_recording
@@ -83,6 +84,13 @@ def test_compressed_images_are_read_where_there_are_no_others(tmp_path: Path) ->
         np.testing.assert_array_equal(frames[name].data, encoding)
     assert read.total == len(frames) == 3
     assert read.cameras["color"].lens.name == "fisheye"
+
+
+def test_an_equidistant_lens_without_coefficients_bends(tmp_path: Path) -> None:
+    with Take(tmp_path / "take") as take:
+        take.info(f"{D}/camera_info", "equidistant", (0, 0, 0, 0))
+        take.image(f"{D}/image_raw", "one", "16UC1", DEPTH)
+    assert Ros2Bag(tmp_path / "take").cameras["depth"].lens == KannalaBrandt()
 
 
 def test_depth_in_metres_has_no_return_where_it_is_not_finite(tmp_path: Path) -> None:
