@@ -122,6 +122,7 @@ def fit(
     Raises:
         NoiseError: no sample has a distance or, if the model uses it, an amplitude.
     """
+    samples, repeats = _returns(samples, repeats, model)
     regions = fit_regions(samples, model, labels, own_degree, repeats)
     residual, deviation = _from(regions, samples)
     basis = shrinkage.basis_of(samples.true, tuple(regions.distances), own_degree)
@@ -145,7 +146,7 @@ def fit_regions(
     repeats: Repeats = ONCE,
 ) -> PerPixel:
     """Fits regions relative to the image's model; pixels equal their region, see `fit`."""
-    samples.returns(with_amplitude=model.uses_amplitude)
+    samples, repeats = _returns(samples, repeats, model)
     distances = domain(samples.true)
     residual = samples.residual - model.mean(samples.true, samples.amplitude, samples.pixels)
     deviation = model.deviation(samples.true, samples.amplitude, samples.pixels)
@@ -155,6 +156,12 @@ def fit_regions(
     offsets, factors = shrinkage.shrink(residual, deviation, basis, of, places, repeats, samples.minimum_sigma)
     minimum = fitting.minimum_sigma(factors[of] * deviation)
     return PerPixel(model, np.moveaxis(offsets[labels], -1, 0), factors[labels], np.array(distances), minimum)
+
+
+def _returns(samples: Samples, repeats: Repeats, model: DepthNoise) -> tuple[Samples, Repeats]:
+    """Samples that have what a model needs, and their replicates."""
+    where = samples.where(with_amplitude=model.uses_amplitude)
+    return samples.take(where), Repeats(*(one[where] if one.size == where.size else one for one in repeats))
 
 
 def _from(model: PerPixel, samples: Samples) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -213,7 +213,7 @@ def _spread_of(residual: NDArray[np.floating]) -> float:
 
 
 def _check_variety(columns: NDArray[np.floating]) -> None:
-    scaled = columns / np.linalg.norm(columns, axis=0)
+    scaled = columns / np.maximum(np.linalg.norm(columns, axis=0), np.finfo(float).tiny)  # of zeros, zeros
     if columns.shape[1] and np.linalg.svd(scaled, compute_uv=False)[-1] < _MIN_VARIETY:
         raise NoiseError(
             f"the samples vary too little to tell {columns.shape[1]} coefficients apart; "

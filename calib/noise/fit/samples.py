@@ -62,7 +62,11 @@ class Samples:
         return Samples(*(getattr(self, one.name)[which] for one in fields(self)))
 
     def returns(self, with_amplitude: bool) -> "Samples":
-        """Samples with finite, positive measured and true distance and, if asked for, amplitude.
+        """Samples with finite, positive measured and true distance and, if asked for, amplitude; raises as `where`."""
+        return self.take(self.where(with_amplitude))
+
+    def where(self, with_amplitude: bool) -> NDArray[np.bool_]:
+        """Mask (n,) of these samples.
 
         Raises:
             NoiseError: there are none.
@@ -72,7 +76,7 @@ class Samples:
             good &= (self.amplitude > 0) & np.isfinite(self.amplitude) if with_amplitude else True
         if not good.any():
             raise NoiseError(f"none of {len(self)} samples has a distance" + " and an amplitude" * with_amplitude)
-        return self.take(good)
+        return good
 
 
 def joined(parts: Iterable[Samples]) -> Samples:

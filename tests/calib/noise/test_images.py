@@ -151,6 +151,8 @@ def test_colors_that_do_not_tell_the_filters_apart_are_no_reason_to_guess():
         bayer.fit_crosstalk(greys[:, 0], greys, channel)
     with pytest.raises(NoiseError, match="no pixel lies behind a blue filter"):
         bayer.fit_crosstalk(greys[:, 0], greys, channel % 2)
+    with pytest.raises(NoiseError, match="vary too little"):  # a chart without blue
+        bayer.fit_crosstalk(greys[:, 0], np.column_stack([greys[:, 0], greys[::-1, 1], 0 * greys[:, 2]]), channel)
 
 
 @pytest.mark.parametrize("fit", [*FITS.values(), lambda measured, real: intensity.fit(measured, real, "ir")])

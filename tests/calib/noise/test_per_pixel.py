@@ -85,6 +85,17 @@ def test_a_pixel_without_samples_is_like_its_region(known: Samples) -> None:
     np.testing.assert_allclose(pixels.offset[:, 3, 4], regions.offset[:, 3, 4], atol=1e-9)
 
 
+def test_missing_returns_among_the_samples_change_nothing(head: Head) -> None:
+    means, repeats = averaged(head.boards(3, 4, outliers=0.0))
+    law, missing = tof_amplitude.fit(means), np.arange(len(means)) % 7 == 0
+    seen, times = means.take(~missing), Repeats(*(one[~missing] for one in repeats))
+    gone = dataclasses.replace(means, measured=np.where(missing, np.nan, means.measured))
+    for fit in (per_pixel.fit, per_pixel.fit_regions):
+        found, wanted = fit(gone, law, LABELS, repeats=repeats), fit(seen, law, LABELS, repeats=times)
+        np.testing.assert_array_equal(found.offset, wanted.offset)
+        np.testing.assert_array_equal(found.factor, wanted.factor)
+
+
 def test_outside_the_domain_everything_keeps_its_edge_value() -> None:
     model, p = own_of_pixels(), (np.array([2]), np.array([3]))
     a = np.array([500.0])
