@@ -97,8 +97,8 @@ class Settings:
             raise NoiseError(
                 f"offset and factor in {str(self.file)!r} must be (k, height, width) and (height, width) of one size"
             )
-        if not (np.all(factor > 0) and np.all(np.isfinite(factor)) and np.all(np.isfinite(offset))):
-            raise NoiseError(f"offset and factor in {str(self.file)!r} must be finite, and factor above 0")
+        if not np.all(factor > 0):
+            raise NoiseError(f"factor in {str(self.file)!r} must be above 0")
         maps.check_domain(self.file, arrays, "distances")
         return PerPixel(model, offset, factor, distances, maps.minimum_sigma(self.file, arrays))
 

@@ -45,7 +45,7 @@ def arrays(file: Path, required: set[str]) -> dict[str, NDArray[np.float64]]:
     """Arrays of an .npz file.
 
     Raises:
-        NoiseError: unreadable file, or a required array is missing.
+        NoiseError: unreadable file, or a required array is missing or, unless it is a domain, is no finite numbers.
     """
     try:
         found = limited.arrays(file)
@@ -53,6 +53,9 @@ def arrays(file: Path, required: set[str]) -> dict[str, NDArray[np.float64]]:
         raise NoiseError(f"file = {str(file)!r} cannot be read as .npz: {error}") from error
     if missing := required - set(found):
         raise NoiseError(f"file = {str(file)!r} lacks the array(s) {sorted(missing)}")
+    for key in sorted(required - {"distances", "amplitudes"}):
+        if found[key].dtype.kind not in "iuf" or not np.all(np.isfinite(found[key])):
+            raise NoiseError(f"{key} in {str(file)!r} must be finite numbers")
     return found
 
 

@@ -53,6 +53,8 @@ def test_a_file_that_does_not_say_its_least_deviation_has_the_usual_one(tmp_path
         ("pixel", {"amplitudes": np.array([5.0, 1.0])}, r"amplitudes .* \[lowest, highest\]"),
         ("pixel", {"minimum_sigma": 0.0}, r"minimum_sigma .* above 0, not 0.0"),
         ("pixel", {"mu": np.array([None, {}])}, "cannot be read as .npz"),
+        ("pixel", {"sigma": np.full((2, 1, 4, 5), np.nan)}, r"sigma in .*maps\.npz' must be finite numbers"),
+        ("pixel", {"mu": np.full((1, 1, 4, 5), "0")}, "mu in .* must be finite numbers"),
         ("region", {"labels": None}, r"lacks the array\(s\) \['labels'\]"),
         ("region", {"sigma": np.ones((1, 1, 4, 5))}, r"\(i, j, regions\)"),
         ("region", {"mu": np.ones((1, 1, 2))}, "as many regions"),

@@ -122,7 +122,8 @@ def test_what_is_saved_is_what_a_rig_file_loads(tmp_path: Path) -> None:
     ("changes", "message"),
     [
         ({"factor": np.ones((3, 3))}, "of one size"),
-        ({"factor": np.zeros((HEIGHT, WIDTH))}, "factor above 0"),
+        ({"factor": np.zeros((HEIGHT, WIDTH))}, "factor .* above 0"),
+        ({"offset": np.full((1, HEIGHT, WIDTH), np.inf)}, "offset .* finite numbers"),
         ({"distances": np.array([2.0, 1.0])}, r"distances .* \[lowest, highest\]"),
     ],
 )
