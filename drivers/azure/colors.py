@@ -23,14 +23,13 @@ def color(encoding: str, content: bytes, camera: Camera) -> NDArray[np.generic]:
         image = _DECODERS[encoding](content, camera)
     except cv2.error as error:
         raise ValueError(f"no {encoding} image: {error}") from error
-    if image is None or image.shape != (camera.height, camera.width, 3):
+    if image.shape != (camera.height, camera.width, 3):
         raise ValueError(f"this is no {encoding} image of {camera.width} × {camera.height} pixels")
     return image
 
 
 def _jpeg(content: bytes, camera: Camera) -> Any:
-    image_size.check(content)
-    return cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_COLOR)
+    return image_size.decoded(content, cv2.IMREAD_COLOR)
 
 
 def _nv12(content: bytes, camera: Camera) -> Any:

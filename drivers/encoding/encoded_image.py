@@ -168,13 +168,10 @@ def _jpeg(picture: RawImage) -> CompressedImage:
 def _of_jpeg(message: CompressedImage) -> bytes:
     """The serialized RawImage of a colour image, whatever the order of the channels was."""
     try:
-        image_size.check(message.data)
-        pixels = cv2.imdecode(np.frombuffer(message.data, "u1"), cv2.IMREAD_COLOR_RGB)
-    except (image_size.ImageSizeError, cv2.error) as error:
+        pixels = image_size.decoded(message.data, cv2.IMREAD_COLOR_RGB)
+    except image_size.ImageSizeError as error:
         kind = message.format or "compressed"
         raise CodecError(f"{message.frame_id}: {len(message.data)} bytes are no {kind} image: {error}") from error
-    if pixels is None:
-        raise CodecError(f"{message.frame_id}: {len(message.data)} bytes are no {message.format or 'compressed'} image")
     height, width = pixels.shape[:2]
     image = RawImage(
         timestamp=_stamp(message),

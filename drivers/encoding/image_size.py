@@ -1,8 +1,12 @@
-"""The size of a compressed image, from its header, and whether its end is there: before anything is decoded."""
+"""Decoding of compressed images, whose size, from their header, and completeness are checked before."""
 
 import io
 import warnings
+from typing import Any
 
+import cv2
+import numpy as np
+from numpy.typing import NDArray
 from PIL import Image, UnidentifiedImageError
 
 #: Most pixels of an image: 8192 × 8192. Decoded, they are up to 512 MiB.
@@ -13,7 +17,7 @@ _PNG, _JPEG = b"\x89PNG\r\n\x1a\n", b"\xff\xd8"
 
 
 class ImageSizeError(ValueError):
-    """An image that is too large, or whose size is unknown, or that is not all there."""
+    """An image that is too large, or whose size is unknown, or that is not all there, or cannot be decoded."""
 
 
 def is_cut_off(content: bytes) -> bool:
@@ -61,3 +65,19 @@ def check(content: bytes) -> tuple[int, int]:
     if content.startswith(_PNG) and not _has_all_chunks(content):
         raise ImageSizeError("a part of it is missing")
     return width, height
+
+
+def decoded(content: bytes, flags: int) -> NDArray[Any]:
+    """The pixels that `cv2.imdecode` makes with these flags of an image of a size that is allowed.
+
+    Raises:
+        ImageSizeError: as `check`, or it cannot be decoded.
+    """
+    check(content)
+    try:
+        image = cv2.imdecode(np.frombuffer(content, np.uint8), flags)
+    except cv2.error:  # a check of OpenCV's own
+        image = None
+    if image is None:
+        raise ImageSizeError("it cannot be decoded")
+    return image

@@ -66,3 +66,19 @@ def shape_of(image: RawImage | EncodedImage) -> tuple[int, ...]:
     """Shape of the pixels of an image, whose encoding is one of `ENCODINGS`."""
     channels = ENCODINGS[image.encoding][1]
     return (image.height, image.width) if channels == 1 else (image.height, image.width, channels)
+
+
+def unpadded(data: np.ndarray, encoding: str, width: int, height: int, stride: int) -> np.ndarray:
+    """A copy of an image (height, width) or (height, width, 3) from its bytes, without row padding.
+
+    Raises:
+        CodecError: too few bytes.
+    """
+    dtype, channels = ENCODINGS[encoding]
+    row = width * channels * dtype.itemsize
+    if not 0 < row <= stride or height < 1 or data.size < stride * height:
+        size = f"{width} × {height} × {channels}"
+        raise CodecError(f"{size} {encoding} in rows of {stride} bytes need more than {data.size} bytes")
+    rows = np.asarray(data, np.uint8)[: stride * height].reshape(height, stride)[:, :row]
+    image = rows.copy().view(dtype)
+    return image if channels == 1 else image.reshape(height, width, channels)

@@ -4,7 +4,6 @@ from pathlib import Path
 from typing import Any
 
 import cv2
-import numpy as np
 from numpy.typing import NDArray
 
 from calib.files import limited
@@ -34,12 +33,6 @@ def read(path: Path) -> NDArray[Any]:
     if image_size.is_cut_off(content):
         raise ImageFolderError(f"{path}: the image is truncated: its end is missing")
     try:
-        image_size.check(content)
-        image = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED)
+        return image_size.decoded(content, cv2.IMREAD_UNCHANGED)
     except image_size.ImageSizeError as error:
         raise ImageFolderError(f"{path}: cannot be read as an image, {error}; {READABLE} can") from error
-    except cv2.error:  # a check of OpenCV's own
-        image = None
-    if image is None:
-        raise ImageFolderError(f"{path}: cannot be read as an image; {READABLE} can")
-    return image

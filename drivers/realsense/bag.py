@@ -19,7 +19,7 @@ from calib import pose
 from calib.camera import Camera
 from drivers.contract.frame import Frame, Kind, Reference
 from drivers.encoding.foreign_recording import ForeignRecordingError
-from drivers.realsense.picture import unpadded
+from drivers.encoding.parsing import CodecError, unpadded
 from drivers.realsense.ros import Bag
 from drivers.realsense.streams import Role, StreamError, camera, role_beside
 
@@ -89,7 +89,7 @@ class RealsenseBag:
                 t_ns = max(ticks + offsets_ns.setdefault(domain, round(host_ns) - ticks), 0)
                 try:
                     yield self._frame(self._roles[message.topic], message.content, metadata, t_ns, ticks, domain)
-                except StreamError as error:
+                except (StreamError, CodecError) as error:
                     raise ForeignRecordingError(f"{self._path}: {message.topic}: {error}") from error
 
     def _frame(self, role: Role, image: Any, metadata: Mapping[str, str], t_ns: int, ticks: int, domain: str) -> Frame:
@@ -147,7 +147,8 @@ def pixels(kind: Kind, image: Any) -> tuple[str, NDArray[np.generic]]:
     """Encoding and array of a sensor_msgs/Image.
 
     Raises:
-        StreamError: an encoding that is not supported for the kind, or too few bytes.
+        StreamError: an encoding that is not supported for the kind.
+        CodecError: too few bytes.
     """
     allowed = _ENCODINGS[kind]
     if image.encoding not in allowed or image.is_bigendian:

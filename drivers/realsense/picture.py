@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.contract.capabilities import ClockInfo
-from drivers.contract.frame import ENCODINGS, Frame, Kind, Reference
+from drivers.contract.frame import Frame, Kind, Reference
+from drivers.encoding.parsing import unpadded
 from drivers.realsense.streams import Role, StreamError
 
 #: Frame encodings by kind and pixel format.
@@ -83,7 +84,8 @@ def frame(picture: Picture, role: Role, calib_id: str) -> Frame:
     """Frame of a picture, with device ticks; host times are set by the caller.
 
     Raises:
-        StreamError: a format that does not fit the stream, or too few bytes.
+        StreamError: a format that does not fit the stream.
+        CodecError: too few bytes.
     """
     is_depth = role.kind == Kind.DEPTH
     if is_depth and not 0 < picture.depth_unit_m < math.inf:
@@ -121,22 +123,6 @@ def pixels(picture: Picture, kind: Kind) -> tuple[str, NDArray[np.generic]]:
         raise StreamError(f"{kind} must be one of {', '.join(sorted(FORMATS[kind]))}, not {picture.format}")
     encoding = FORMATS[kind][picture.format]
     return encoding, unpadded(picture.data, encoding, picture.width, picture.height, picture.stride)
-
-
-def unpadded(data: NDArray[np.uint8], encoding: str, width: int, height: int, stride: int) -> NDArray[np.generic]:
-    """A copy of an image (height, width) or (height, width, 3) from its bytes, without row padding.
-
-    Raises:
-        StreamError: too few bytes.
-    """
-    dtype, channels = ENCODINGS[encoding]
-    row = width * channels * dtype.itemsize
-    if not 0 < row <= stride or height < 1 or data.size < stride * height:
-        size = f"{width} × {height} × {channels}"
-        raise StreamError(f"{size} {encoding} in rows of {stride} bytes need more than {data.size} bytes")
-    rows = np.asarray(data, np.uint8)[: stride * height].reshape(height, stride)[:, :row]
-    image = rows.copy().view(dtype)
-    return image if channels == 1 else image.reshape(height, width, channels)
 
 
 def _metadata(frame: Any, key: Any) -> float:

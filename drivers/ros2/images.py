@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from drivers.contract.frame import ENCODINGS, Kind
 from drivers.encoding import image_size
+from drivers.encoding.parsing import CodecError, unpadded
 
 #: ROS encodings: the frame's encoding, and its kind. Depth is in millimetres (16UC1) or metres (32FC1), see REP 118.
 _ENCODINGS: Mapping[str, tuple[str, Kind]] = {
@@ -49,13 +50,10 @@ def _raw(message: Any) -> tuple[Kind, str, NDArray[np.generic]]:
     if message.encoding not in _ENCODINGS or message.is_bigendian:
         raise ImageError(f"the encoding {message.encoding!r} is none of {sorted(_ENCODINGS)}, little-endian")
     encoding, kind = _ENCODINGS[message.encoding]
-    dtype, channels = ENCODINGS[encoding]
-    width, height, step, data = message.width, message.height, message.step, np.asarray(message.data, np.uint8)
-    row = width * channels * dtype.itemsize
-    if not 0 < row <= step or height < 1 or data.size < step * height:
-        raise ImageError(f"{width} × {height} {encoding} in rows of {step} bytes need more than {data.size} bytes")
-    image = data[: step * height].reshape(height, step)[:, :row].copy().view(dtype)
-    return kind, encoding, image if channels == 1 else image.reshape(height, width, channels)
+    try:
+        return kind, encoding, unpadded(message.data, encoding, message.width, message.height, message.step)
+    except CodecError as error:
+        raise ImageError(str(error)) from error
 
 
 def _compressed(message: Any) -> tuple[Kind, str, NDArray[np.generic]]:
@@ -63,13 +61,11 @@ def _compressed(message: Any) -> tuple[Kind, str, NDArray[np.generic]]:
     is_depth = "compressedDepth" in message.format
     if is_depth and (not message.format.startswith("16UC1") or "rvl" in message.format):
         raise ImageError(f"the format {message.format!r} is no 16UC1 as PNG")
-    content = content[_DEPTH_HEADER:] if is_depth else content
-    try:
-        image_size.check(content)
-    except image_size.ImageSizeError as error:
-        raise ImageError(str(error)) from error
     flags = cv2.IMREAD_UNCHANGED if is_depth else cv2.IMREAD_COLOR
-    image = cv2.imdecode(np.frombuffer(content, np.uint8), flags)
-    if image is None or (is_depth and (image.dtype != np.uint16 or image.ndim != 2)):
+    try:
+        image = image_size.decoded(content[_DEPTH_HEADER:] if is_depth else content, flags)
+    except image_size.ImageSizeError as error:
+        raise ImageError(f"an image of the format {message.format!r}: {error}") from error
+    if is_depth and (image.dtype != np.uint16 or image.ndim != 2):
         raise ImageError(f"an image of the format {message.format!r} cannot be decoded")
     return (Kind.DEPTH, "16UC1", image) if is_depth else (Kind.COLOR, "bgr8", image)

@@ -63,12 +63,10 @@ def color(header: ImageHeader, content: bytes) -> tuple[str, NDArray[np.uint8]]:
         if image_size.is_cut_off(content):
             raise SensError("the image is truncated: its end is missing")
         # A camera file's pixels are those of its camera matrix, which knows nothing of a turn that EXIF asks for.
-        image = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
+        image = image_size.decoded(content, cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
     except image_size.ImageSizeError as error:
         raise SensError(str(error)) from error
-    except cv2.error:  # a check of OpenCV's own
-        image = None
-    if image is None or image.shape != (header.height, header.width, 3):
+    if image.shape != (header.height, header.width, 3):
         raise SensError(f"this cannot be decoded as an image of {expected}")
     return "bgr8", image.astype(np.uint8, copy=False)
 

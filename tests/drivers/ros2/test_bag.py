@@ -1,6 +1,7 @@
 """Bags of ROS 2 as rosbags writes them, in both kinds of files, are read back in SI units."""
 
 import contextlib
+import io
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -8,6 +9,7 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from PIL import Image
 
 from calib import pose
 from calib.lenses.fisheye import KannalaBrandt
@@ -91,6 +93,17 @@ def test_an_equidistant_lens_without_coefficients_bends(tmp_path: Path) -> None:
         take.info(f"{D}/camera_info", "equidistant", (0, 0, 0, 0))
         take.image(f"{D}/image_raw", "one", "16UC1", DEPTH)
     assert Ros2Bag(tmp_path / "take").cameras["depth"].lens == KannalaBrandt()
+
+
+def test_an_image_that_opencv_refuses_is_left_out(tmp_path: Path) -> None:
+    content = io.BytesIO()
+    Image.new("L", (2**20 + 1, 1)).save(content, "png")
+    with Take(tmp_path / "take") as take:
+        for name in (D, C):
+            take.info(f"{name}/camera_info")
+        take.image(f"{D}/image_raw", "one", "16UC1", DEPTH)
+        take.compressed(f"{C}/image_raw/compressed", "one", "rgb8; png compressed", content.getvalue())
+    assert Ros2Bag(tmp_path / "take").cameras.keys() == {"depth"}
 
 
 def test_depth_in_metres_has_no_return_where_it_is_not_finite(tmp_path: Path) -> None:

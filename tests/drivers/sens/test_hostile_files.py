@@ -84,7 +84,7 @@ def test_a_header_that_cannot_be_used_is_named(tmp_path: Path, changes: dict[str
         (b"no image", b"", {}, "color of frame 1: no image of a known format"),
         (png(30_000, 30_000), b"", {}, "color of frame 1: more than the 67108864 pixels that are allowed"),
         (png(11, 8), b"", {}, "color of frame 1: the image has 11 × 8 pixels, the header says 10 × 8"),
-        (png(10, 8), b"", {}, "color of frame 1: this cannot be decoded as an image of 10 × 8 pixels"),
+        (png(10, 8), b"", {}, "color of frame 1: it cannot be decoded"),
     ],
 )
 def test_an_image_that_cannot_be_used_is_named(
