@@ -6,7 +6,8 @@ from contextlib import suppress
 from dataclasses import replace
 
 from drivers.contract.device import DeviceError
-from drivers.contract.discovery import Found, choose
+from drivers.contract.discovery import UDEV_REMEDY, Found, choose
+from drivers.contract.errors import translated_sdk_errors
 from drivers.kinect1.address import Address
 from drivers.kinect1.device import Kinect1Device
 from drivers.kinect1.transport.attached import BackendFactory, fresh_backend, list_attached
@@ -34,10 +35,11 @@ def open_camera(
         streaming: factory of isochronous readers.
 
     Raises:
-        DeviceError: not attached, or it cannot be opened; names the remedy.
+        DeviceError: not attached, it cannot be opened, or USB cannot be searched; names the remedy.
     """
-    backend = backends()
-    there_are = list_attached(backend)
+    with translated_sdk_errors(address.uri, UDEV_REMEDY):
+        backend = backends()
+        there_are = list_attached(backend)
     chosen = choose([one.found for one in there_are], "kinect1", address.serial)
     (device,) = [one.device for one in there_are if one.found is chosen]
     port = Port(device, backend, streaming, clock)

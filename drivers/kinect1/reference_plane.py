@@ -85,7 +85,7 @@ def parse(fixed: bytes, shift: bytes) -> ReferencePlane:
     """Parses the answers to the commands for fixed parameters and for the constant shift.
 
     Raises:
-        CalibrationError: too short, or numbers that stream_info no plane.
+        CalibrationError: too short, or numbers that describe no plane.
     """
     if len(fixed) < _PLANE_OFFSET + 16 or len(shift) < 4:
         raise CalibrationError(

@@ -57,7 +57,11 @@ def fresh_backend() -> Any:
 
 
 def list_attached(backend: Any) -> list[AttachedCamera]:
-    """All cameras on the bus; none is left open. Never raises."""
+    """All cameras on the bus; none is left open.
+
+    Raises:
+        usb.core.USBError: the bus cannot be searched.
+    """
     devices: list[Any] = list(usb.core.find(find_all=True, idVendor=usb_numbers.VENDOR, backend=backend) or ())
     result = []
     for device in devices:

@@ -151,6 +151,12 @@ def test_a_camera_in_use_cannot_be_opened(fake: FakeDevice) -> None:
     opened(fake).close()
 
 
+def test_usb_that_cannot_be_searched_is_named() -> None:
+    backends = mock.Mock(side_effect=RuntimeError("no libusb-1.0 can be loaded"))
+    with pytest.raises(DeviceError, match=r"^kinect1://A1: no libusb-1\.0 can be loaded$"):
+        open_camera(parse("kinect1://A1"), time.monotonic_ns, backends, FakeReader)
+
+
 def test_a_slow_link_is_faulty(fake: FakeDevice) -> None:
     fake.speed = 2
     (found,) = find(lambda: FakeBackend([fake]))
