@@ -12,7 +12,7 @@ from calib.board.views import CornerView
 from calib.camera import Camera
 from calib.solve.bundle.parameters.layout import DEPTH_TERMS
 from calib.solve.bundle.parameters.state import State
-from calib.solve.bundle.tasks import Task
+from calib.solve.bundle.tasks import SensorTask, Task
 from calib.solve.solution import Parameter
 from calib.solve.start.board_poses import pose_candidates
 from calib.solve.start.registration import fit_plane
@@ -82,10 +82,9 @@ def require_matching_sensors(task: Task) -> None:
     """
     for view in task.corners:
         sensor = task.sensors[view.sensor]
-        size = np.array([sensor.width, sensor.height])
-        outside = view.pixels[np.any((view.pixels < -0.5) | (view.pixels > size - 0.5), axis=1)]
+        outside = view.pixels[_is_outside(view, sensor)]
         if len(outside):
-            fits = [name for name, other in task.sensors.items() if name != view.sensor and _fits(view, other.width)]
+            fits = [name for name, other in task.sensors.items() if not _is_outside(view, other).any()]
             hint = f"; they would fit {' or '.join(fits)}: are the names mixed up?" if fits else ""
             raise MixedUpError(
                 f"{view.sensor}, shot {view.shot}: a corner at {outside[0].round(1).tolist()} does not lie in an image "
@@ -98,8 +97,9 @@ def require_matching_sensors(task: Task) -> None:
         _require_factory_fits(name, camera, task)
 
 
-def _fits(view: CornerView, width: int) -> bool:
-    return bool(view.pixels.min() >= -0.5 and view.pixels[:, 0].max() < width)
+def _is_outside(view: CornerView, sensor: SensorTask) -> NDArray[np.bool_]:
+    """Corners (n,) that do not lie in the image of a sensor."""
+    return np.any((view.pixels < -0.5) | (view.pixels > np.array([sensor.width, sensor.height]) - 0.5), axis=1)
 
 
 def _require_not_swapped(a: str, b: str, factory: Mapping[str, Camera], task: Task) -> None:

@@ -6,7 +6,7 @@ equations, its deviation from the scatter of the distinct poses (a sandwich esti
 `calib.solve.bundle.uncertainty`).
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import Enum
 
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.solve.bundle.additional_parameters import further
-from calib.solve.bundle.bent_boards import shape_columns
+from calib.solve.bundle.bent_boards import curves, shape_columns
 from calib.solve.solution import Solution
 from calib.solve.validation import projection_uncertainty
 from calib.solve.validation.support import supported
@@ -27,8 +27,8 @@ CERTAIN, CERTAIN_UNEVEN = 5.0, 8.0
 #: motion imitate, by more.
 NOTICED, NOTICED_BEND = 0.15, 0.25
 
-#: Sizes of the errors that columns of the equations stand for: 1 %, 1 mm.
-_SHARE, _BEND_M = 0.01, 1e-3
+#: Size of the errors of lengths that columns of the equations stand for.
+_SHARE = 0.01
 
 
 #: Powers of x and y of points that are displaced within the plane of the board, along each of its axes.
@@ -88,23 +88,23 @@ class ShapeError:
     def finding(self) -> str:
         """One clause for people."""
         size = f"{abs(self.size):.2f} ± {self.sigma:.2f} %"
-        effect = f"change projections by up to {self.effect_px:.2g} px"
-        if self.shape == Shape.STRETCH:
-            longer, other = ("rows", "columns") if self.size > 0 else ("columns", "rows")
-            change = effect.replace("change", "changes")
-            return f"the board's {longer} are {size} longer than described, compared with its {other}, which {change}"
-        if self.shape == Shape.SKEW:
-            size = f"{np.degrees(abs(self.size) / 100):.2f}° ± {np.degrees(self.sigma / 100):.2f}°"
-            return f"the board's rows and columns are {size} from a right angle, which {effect.replace('e', 'es', 1)}"
-        if self.shape == Shape.TAGS:
-            than = "larger" if self.size > 0 else "smaller"
-            change = effect.replace("change", "changes")
-            return f"tags are {size} {than} than described, compared with their distances, which {change}"
+        effect = f"projections by up to {self.effect_px:.2g} px"
         bend = f"{abs(self.size):.2g} ± {self.sigma:.1g} mm"
-        if self.shape == Shape.UNEVEN:
-            change = effect.replace("change", "changes")
-            return f"the print is uneven: from its middle to its edges points are displaced by {bend}, which {change}"
-        return f"a board that is bent by {bend} would explain what the corners miss by, and {effect}"
+        match self.shape:
+            case Shape.STRETCH:
+                longer, other = ("rows", "columns") if self.size > 0 else ("columns", "rows")
+                found = f"the board's {longer} are {size} longer than described, compared with its {other}"
+            case Shape.SKEW:
+                angle = f"{np.degrees(abs(self.size) / 100):.2f}° ± {np.degrees(self.sigma / 100):.2f}°"
+                found = f"the board's rows and columns are {angle} from a right angle"
+            case Shape.TAGS:
+                than = "larger" if self.size > 0 else "smaller"
+                found = f"tags are {size} {than} than described, compared with their distances"
+            case Shape.UNEVEN:
+                found = f"the print is uneven: from its middle to its edges points are displaced by {bend}"
+            case Shape.BEND:
+                return f"a board that is bent by {bend} would explain what the corners miss by, and change {effect}"
+        return f"{found}, which changes {effect}"
 
     def __str__(self) -> str:
         """The finding, and what to do."""
@@ -151,20 +151,13 @@ def _displacements(points: NDArray[np.float64]) -> NDArray[np.float64]:
     stretch = np.stack([x, -y, none], axis=1) * _SHARE / 2
     skew = np.stack([y, x, none], axis=1) * _SHARE / 2
     tags = np.stack([_from_tag(points[:, 0]), _from_tag(points[:, 1]), none], axis=1) * _SHARE
-    along = _curves(points, _UNEVEN)[:, :, None]
+    along = curves(points, _UNEVEN)[:, :, None]
     return np.concatenate([np.stack([stretch, skew, tags], axis=1), along * np.eye(3)[0], along * np.eye(3)[1]], axis=1)
 
 
 def bends(points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Displacements of points of the board (n, 3) in its frame, for each bend (n, 7, 3) [m]."""
-    return _curves(points, _POWERS)[:, :, None] * np.eye(3)[2]
-
-
-def _curves(points: NDArray[np.float64], powers: Sequence[tuple[int, int]]) -> NDArray[np.float64]:
-    """Displacements of points of the board (n, 3) by powers of x and y, 1 mm at its edge (n, m) [m]."""
-    low, high = points.min(axis=0), points.max(axis=0)
-    x, y, _ = ((points - (low + high) / 2) / max((high - low).max() / 2, 1e-12)).T
-    return _BEND_M * np.stack([x**a * y**b for a, b in powers], axis=1)
+    return curves(points, _POWERS)[:, :, None] * np.eye(3)[2]
 
 
 def _from_tag(places: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -106,11 +106,11 @@ def test_a_corner_beside_the_image_is_named_and_fits_no_other_sensor() -> None:
     _, task = scene()
     view = task.corners[0]
     pixels = view.pixels.copy()
-    pixels[3] = -0.7, 12
-    with pytest.raises(
-        MixedUpError, match=rf"{view.sensor}, shot {view.shot}: a corner at \[-0\.7, 12\.0\] .* pixels$"
-    ):
-        calibrate(replace(task, corners=[replace(view, pixels=pixels), *task.corners[1:]]))
+    below = max(sensor.height for sensor in task.sensors.values())
+    for beside, named in (((-0.7, 12), r"\[-0\.7, 12\.0\]"), ((12, below), rf"\[12\.0, {below}\.0\]")):
+        pixels[3] = beside
+        with pytest.raises(MixedUpError, match=rf"{view.sensor}, shot {view.shot}: a corner at {named} .* pixels$"):
+            calibrate(replace(task, corners=[replace(view, pixels=pixels), *task.corners[1:]]))
 
 
 def test_kept_intrinsics_of_another_mode_are_noticed() -> None:
