@@ -29,7 +29,7 @@ from calib.lenses.lens import LensModel
 from calib.pose import Pose
 
 #: Metres per numbered length unit: metre, centimetre (the default), millimetre, inch, foot.
-UNITS = (1.0, 0.01, 0.001, 0.0254, 0.3048)
+UNITS_M = (1.0, 0.01, 0.001, 0.0254, 0.3048)
 
 _NOWHERE = -1
 _PERSPECTIVE, _FISHEYE = 0, 1
@@ -115,7 +115,7 @@ def _link(extrinsics: Mapping[str, Any]) -> tuple[int, Pose]:
     rotation, t = extrinsics["rotationMatrix"], extrinsics["translation"]
     if not rotation:
         return _NOWHERE, pose.identity()
-    translation = UNITS[int(extrinsics.get("lengthUnit", 1))] * np.array([[t["x"]], [t["y"]], [t["z"]]], float)
+    translation = UNITS_M[int(extrinsics.get("lengthUnit", 1))] * np.array([[t["x"]], [t["y"]], [t["z"]]], float)
     return int(extrinsics["toCameraSocket"]), rigid(np.hstack([np.array(rotation, float), translation]))
 
 

@@ -1,8 +1,10 @@
 """A running rig: its estimates, images and calibrations, and commands to it."""
 
 from collections.abc import Mapping, Sequence
-from typing import Self
+from numbers import Integral, Real
+from typing import Any, Self
 
+import numpy as np
 from absmsg.v1.command_pb2 import CommandAnswer, Record, Reinitialize, SetControls
 from absmsg.v1.common_pb2 import Header
 from absmsg.v1.sensor_model_pb2 import SensorModel
@@ -12,7 +14,7 @@ from abs_client.camera import Camera, camera
 from abs_client.connection.link import DEFAULT_ENDPOINT, Link, checked
 from abs_client.connection.received import decoded
 from abs_client.connection.tls import Tls
-from abs_client.errors import ClientError
+from abs_client.errors import ClientError, RangeError
 from abs_client.estimates import feeds, states
 from abs_client.estimates.state import State
 from abs_client.images import Image
@@ -21,8 +23,13 @@ from abs_client.stream import NothingReceivedError, Stream
 #: Estimates that are older are left out [s].
 MAX_AGE_S = 0.5
 
-#: Fields of a control's value by its type.
-_FIELDS = {bool: "on", int: "whole", float: "number", str: "choice"}
+#: Fields of a control's value and what they hold, by its type, also of NumPy.
+_FIELDS = (
+    ((bool, np.bool_), "on", bool),
+    (Integral, "whole", int),
+    (Real, "number", float),
+    (str, "choice", str),
+)
 
 
 class RefusedError(ClientError):
@@ -156,10 +163,13 @@ class Rig:
 
         Returns:
             All controls of the device, as they are then. Raises as `reinitialize`.
+
+        Raises:
+            RangeError: a value of another type.
         """
         command = SetControls(header=self._header(), device=checked(device))
         for name, value in (values or {}).items():
-            command.controls.add(name=name, **{_FIELDS[type(value)]: value})
+            command.controls.add(name=name, **_field(name, value))
         answer = self._command(f"{device}/controls", command)
         return {one.name: getattr(one, field) for one in answer.controls if (field := one.WhichOneof("value"))}
 
@@ -183,3 +193,11 @@ class Rig:
                 raise RefusedError(answer.reason)
             return answer
         raise NothingReceivedError(f"nobody answers on {topic}")
+
+
+def _field(name: str, value: Any) -> dict[str, Any]:
+    """The field of a control's value in its message."""
+    for kind, field, made in _FIELDS:
+        if isinstance(value, kind):
+            return {field: made(value)}
+    raise RangeError(f"{name} = {value!r}: must be true or false, a number or a text")

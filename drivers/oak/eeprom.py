@@ -14,10 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from calib import pose
+from calib.formats.depthai import UNITS_M
 from calib.pose import Pose
-
-#: Metres per depthai's numbered length units: metre, centimetre (default), millimetre, inch, foot.
-UNITS_M = (1.0, 0.01, 0.001, 0.0254, 0.3048)
 
 #: Socket number that means none.
 NO_SOCKET = -1
@@ -49,7 +47,7 @@ def extrinsics_of(rotation: ArrayLike, translation: ArrayLike, socket: int, unit
         rotation: (3, 3), empty without.
         translation: (3,) in depthai's unit number `unit`.
         socket: number of the camera that the coordinates are mapped to.
-        unit: index in `UNITS_M`.
+        unit: index in `calib.formats.depthai.UNITS_M`.
     """
     try:
         return Extrinsics(socket, pose.from_rotation(rotation, UNITS_M[unit] * np.asarray(translation, float)))

@@ -6,7 +6,16 @@ from functools import partial
 
 import numpy as np
 import pytest
-from abs_client import NothingReceivedError, RefusedError, Rig, Status, Tls, UnknownNameError, UnreachableError
+from abs_client import (
+    NothingReceivedError,
+    RangeError,
+    RefusedError,
+    Rig,
+    Status,
+    Tls,
+    UnknownNameError,
+    UnreachableError,
+)
 from abs_client.connection.received import Received
 from abs_client.images import ImageError, read
 from absmsg.v1.common_pb2 import Header
@@ -126,6 +135,10 @@ def test_controls_of_a_device_are_told_and_set(bus, rig, headers):
     assert rig.controls("cam") == before
     changed = {"exposure_s": 0.02, "auto_exposure": False, "infrared_gain": 7, "sync_role": "master"}
     assert rig.controls("cam", changed) == changed
+    of_numpy = {"exposure_s": np.float32(0.03125), "auto_exposure": np.bool_(True), "infrared_gain": np.int64(9)}
+    assert rig.controls("cam", of_numpy) == {**of_numpy, "sync_role": "master"}
+    with pytest.raises(RangeError, match=r"^exposure_s = \[0\.01\]: must be true or false, a number or a text$"):
+        rig.controls("cam", {"exposure_s": [0.01]})
     with pytest.raises(RefusedError, match=r"exposure_s = 2\.0: must be a number from 0\.001 to 0\.033 s"):
         rig.controls("cam", {"exposure_s": 2.0})
 
