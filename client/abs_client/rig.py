@@ -1,7 +1,7 @@
 """A running rig: its estimates, images and calibrations, and commands to it."""
 
 from collections.abc import Mapping, Sequence
-from numbers import Integral, Real
+from numbers import Integral
 from typing import Any, Self
 
 import numpy as np
@@ -27,7 +27,7 @@ MAX_AGE_S = 0.5
 _FIELDS = (
     ((bool, np.bool_), "on", bool),
     (Integral, "whole", int),
-    (Real, "number", float),
+    ((float, np.floating), "number", float),
     (str, "choice", str),
 )
 

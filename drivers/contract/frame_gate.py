@@ -104,7 +104,7 @@ class FrameGate:
                 self._sink.on_state(state, reason)
 
     def guard(self, work: Callable[..., None], *arguments: Any) -> None:
-        """Does the work of a driver's thread, and reports FAILED if it raises: with the reason of a `DeviceError`."""
+        """Runs the work of a driver's thread; if it raises, the device has FAILED for the reason."""
         try:
             work(*arguments)
         except DeviceError as error:

@@ -110,7 +110,7 @@ class CameraLink:
             if buffer is None:
                 return None
             try:
-                return Shot(int(buffer.frame_id), _told(buffer, "timestamp_ns"), tuple(self._parts(buffer)))
+                return Shot(int(buffer.frame_id), _reported(buffer, "timestamp_ns"), tuple(self._parts(buffer)))
             finally:
                 buffer.parent.queue_buffer(buffer)
 
@@ -135,14 +135,14 @@ class CameraLink:
             for part in buffer.parts:
                 name = self._names.get(part.data_format, f"{part.data_format:#x}")
                 data = content[part.data_offset : part.data_offset + part.data_size]
-                yield Part(name, part.width, part.height, data, _told(part, "x_padding") or 0)
+                yield Part(name, part.width, part.height, data, _reported(part, "x_padding") or 0)
         else:  # the feature tells formats of manufacturers, too
             size, data = (int(buffer.width), int(buffer.height)), content[: int(buffer.size_filled)]
-            yield Part(self.nodes.PixelFormat.value, *size, data, _told(buffer, "padding_x") or 0)
+            yield Part(self.nodes.PixelFormat.value, *size, data, _reported(buffer, "padding_x") or 0)
 
 
-def _told(buffer: Any, name: str) -> int | None:
-    """A number of a buffer, or of a part of one; None if the producer does not tell it."""
+def _reported(buffer: Any, name: str) -> int | None:
+    """A number of a buffer, or of a part of one; None if the producer does not report it."""
     try:
         return int(getattr(buffer, name))
     except Exception:  # the producer's own

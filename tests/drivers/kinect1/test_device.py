@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.contract.device import AddressError, ControlError, DeviceError
+from drivers.contract.device import ControlError, DeviceError
 from drivers.contract.discovery import Availability
 from drivers.contract.frame import Geometry, Kind
 from drivers.kinect1 import usb_numbers
@@ -197,42 +197,11 @@ def test_two_cameras_are_selected_by_serial_number(fake: FakeDevice) -> None:
     device.close()
 
 
-@pytest.mark.parametrize(
-    ("uri", "complaint"),
-    [
-        ("kinect1://?streams=depth,colour", "some of depth, color and ir"),
-        ("kinect1://?streams=color,ir", "only one of the two"),
-        ("kinect1://?streams=depth,depth", "each once"),
-        ("kinect1://?streams=", "some of"),
-        ("kinect1://?rate=30", "unknown key 'rate'"),
-        ("kinect1://?streams=ir&streams=depth", "twice"),
-        ("kinect1://A/b", "all that may stand before"),
-    ],
-)
-def test_invalid_addresses_name_what_is_allowed(uri: str, complaint: str) -> None:
-    with pytest.raises(AddressError, match=complaint):
-        parse(uri)
-
-
-@given(st.text("abdehlmoprst:/?&=,%[]@0\n é", max_size=30))
-def test_arbitrary_text_is_an_address_or_an_address_error(rest: str) -> None:
-    try:
-        address = parse(f"kinect1://{rest}")
-    except AddressError:
-        return
-    assert address.streams
-
-
 @given(st.binary(max_size=40))
 def test_a_camera_with_a_garbled_serial_number_is_listed(garbled: bytes) -> None:
     with mock.patch.object(usb_descriptors, "string", return_value=garbled):
         (found,) = find(lambda: FakeBackend([FakeDevice(EmulatedKinect({}), "")]))
     assert found.info.serial.isalnum() or found.info.serial == ""
-
-
-def test_valid_addresses() -> None:
-    assert parse("kinect1://") == Address("", BOTH)
-    assert parse(f"kinect1://{SERIAL}?streams=ir,depth") == Address(SERIAL, (Stream.IR, Stream.DEPTH))
 
 
 def test_the_uri_of_an_opened_camera_reopens_it_with_its_streams(fake: FakeDevice) -> None:
