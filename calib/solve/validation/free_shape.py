@@ -135,13 +135,14 @@ def without(poses: DistinctPoses, known: AlongDirections, members: Members, chan
 
 
 def disagreement(information: Array, scores: Array) -> float:
-    """Mean squared score of the poses, in deviations that noise alone would have."""
+    """Mean squared score of the poses that say anything of the sensors, in deviations that noise alone would have."""
     found = []
     for own, score in zip(information, scores, strict=True):
         sizes, axes = np.linalg.eigh(own)
         known = sizes > 1e-6 * sizes[-1]
-        found.append(np.mean((axes.T @ score)[known] ** 2 / sizes[known]))
-    return max(float(np.mean(found)), 1.0)
+        if known.any():  # of those that only a camera with fixed intrinsics saw, none is
+            found.append(np.mean((axes.T @ score)[known] ** 2 / sizes[known]))
+    return max(float(np.mean(found or 1.0)), 1.0)
 
 
 def _weighted(jacobian: sparse.csr_array, weights: Array) -> sparse.csr_array:

@@ -12,7 +12,7 @@ from calib.board.views import CornerView
 from calib.solve.bundle.tasks import SensorTask, Task
 from calib.solve.calibrate import calibrate
 from calib.solve.solution import Solution
-from calib.solve.validation.free_shape import free_shape
+from calib.solve.validation.free_shape import disagreement, free_shape
 from calib.solve.validation.inconsistent_shots.steadiness import (
     changes_of_optics,
     changes_of_place,
@@ -72,6 +72,13 @@ def test_a_change_of_the_size_that_is_said_to_show_is_named(larger_later: bool) 
     )
     changed = free_shape(solved(zoomed(lambda shot: 1 - least * ((shot < 12) == larger_later))))
     assert len(changes_of_optics(changed, 1.0)) == 1
+
+
+def test_poses_that_only_a_camera_with_fixed_intrinsics_saw_know_nothing_and_do_not_count() -> None:
+    """The mean was NaN with boards of few corners, and no group of shots was found."""
+    information, scores = np.stack([np.zeros((2, 2)), np.eye(2)]), np.array([[0.0, 0.0], [2.0, 2.0]])
+    assert disagreement(information, scores) == 4.0
+    assert disagreement(information[:1], scores[:1]) == 1.0
 
 
 def test_without_tilt_and_with_few_poses_larger_changes_do_not_show() -> None:
