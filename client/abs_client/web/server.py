@@ -1,7 +1,6 @@
 """A web server for one rig: a page, the names of its trackers, and their estimates as server-sent events."""
 
 import json
-from collections.abc import Callable
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from importlib import resources
@@ -9,6 +8,8 @@ from importlib import resources
 from abs_client.connection.link import Link, checked
 from abs_client.errors import ClientError, UnknownNameError
 from abs_client.estimates import states
+from abs_client.estimates.state import State
+from abs_client.stream import Stream
 from abs_client.web.events import events
 
 _PREFIX = "/states/"
@@ -36,15 +37,9 @@ class EstimateServer(ThreadingHTTPServer):
         """Names of the trackers that live."""
         return sorted(self._link.trackers())
 
-    def follow(self, tracker: str, write: Callable[[bytes], object]) -> None:
-        """Writes the events of a tracker until the reader is gone or the link is closed.
-
-        Raises:
-            OSError: the reader is gone.
-        """
-        with states.states(self._link, tracker, self._maximum_age_s) as stream:
-            for event in events(stream):
-                write(event)
+    def estimates(self, tracker: str) -> Stream[State]:
+        """The estimates of a tracker; they end when the link is closed."""
+        return states.states(self._link, tracker, self._maximum_age_s)
 
 
 class _Reader(BaseHTTPRequestHandler):
@@ -71,9 +66,10 @@ class _Reader(BaseHTTPRequestHandler):
         elif self.path == "/trackers":
             self._whole("application/json", json.dumps(self.server.trackers()).encode())
         elif self.path.startswith(_PREFIX):
-            tracker = checked(self.path.removeprefix(_PREFIX))
-            self._head("text/event-stream")
-            self.server.follow(tracker, self.wfile.write)
+            with self.server.estimates(checked(self.path.removeprefix(_PREFIX))) as stream:
+                self._head("text/event-stream")
+                for event in events(stream):
+                    self.wfile.write(event)
         else:
             self.send_error(HTTPStatus.NOT_FOUND, explain="there are /, /trackers and /states/TRACKER")
 

@@ -106,6 +106,15 @@ def test_what_is_not_there_is_refused(address, path):
     refused.value.close()
 
 
+def test_estimates_of_a_closed_link_are_an_error_and_no_stream(bus, endpoint):
+    with Link(endpoint, "demo") as link, EstimateServer(("127.0.0.1", 0), link, 0.5, "") as server:
+        link.close()
+        threading.Thread(target=server.handle_request).start()
+        with pytest.raises(urllib.error.HTTPError, match="502") as refused:
+            urllib.request.urlopen(f"http://127.0.0.1:{server.server_port}/states/sheet", timeout=TIMEOUT_S)
+        refused.value.close()
+
+
 def test_a_page_elsewhere_reads_only_if_it_is_named(bus, endpoint):
     origin = "http://localhost:3000"
     with serving(endpoint, origin) as address, urllib.request.urlopen(f"{address}/trackers") as answer:
