@@ -11,7 +11,7 @@ from calib.solve.bundle.tasks import Task
 from calib.solve.solution import Solution
 from calib.solve.start.board_poses import pose_candidates
 
-#: Shots that are tried as the middle of a heap.
+#: Shots that are tried as the middle of a cluster.
 _TRIED = 50
 
 
@@ -27,7 +27,7 @@ def by_relative_pose(task: Task, cameras: Mapping[str, Camera]) -> set[int]:
         if len(seen) == 2:
             turn, move = pose.to_rotation_vector(seen[names[0]] @ pose.inverse(seen[names[1]]))
             places[shot] = np.concatenate([turn * np.linalg.norm(seen[names[0]][:3, 3]), move])
-    return _heaps(places)
+    return _clusters(places)
 
 
 def by_residuals(solution: Solution) -> set[int]:
@@ -38,11 +38,11 @@ def by_residuals(solution: Solution) -> set[int]:
         if view.of == "corners":
             row = means.setdefault(view.shot, np.zeros((len(names), 2)))
             row[names.index(view.sensor)] = np.median(view.residuals, axis=0)
-    return _heaps({shot: row.ravel() for shot, row in means.items()})
+    return _clusters({shot: row.ravel() for shot, row in means.items()})
 
 
-def _heaps(places: Mapping[int, NDArray[np.float64]]) -> set[int]:
-    """Shots of one of two heaps: those about the two shots from which all others are least far."""
+def _clusters(places: Mapping[int, NDArray[np.float64]]) -> set[int]:
+    """Shots of one of two clusters, about the two medoids."""
     if len(places) < 2:
         return set()
     every = np.stack([*places.values()])

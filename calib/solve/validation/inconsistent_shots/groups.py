@@ -2,7 +2,7 @@
 
 Such a set is explained by something in between, with small residuals. Each distinct pose pulls the solution with its
 own score (see `calib.solve.bundle.uncertainty`); two groups are those whose principal points or focal lengths, one for
-each, explain these scores best. Errors of lens and board pull the poses apart as well, but not into two heaps.
+each, explain these scores best. Errors of lens and board pull the poses apart as well, but not into two clusters.
 """
 
 from dataclasses import dataclass
