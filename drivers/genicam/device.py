@@ -81,7 +81,9 @@ class GenicamDevice:
             stop = self._gate.begin(sink, "starting the camera")
             if stop is None:
                 return
-            if self._thread.is_alive():
+            if self._thread is threading.current_thread():
+                self._link.stop()  # the last run's sink begins this one
+            elif self._thread.is_alive():
                 self._thread.join()  # the last run, which was stopped by the sink itself
             try:
                 self._link.start()
@@ -118,7 +120,8 @@ class GenicamDevice:
                 else:
                     self._deliver(run, shot, self._clock())
         finally:
-            self._link.stop()
+            if self._thread is threading.current_thread():  # its sink has begun no other run
+                self._link.stop()
 
     def _deliver(self, run: "_Run", shot: Shot, t_arrival_ns: int) -> None:
         count = len(self.capabilities.streams)

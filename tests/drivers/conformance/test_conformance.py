@@ -105,6 +105,20 @@ def test_nothing_comes_after_stop_and_a_sink_may_stop_the_device_itself(opener: 
     device.close()
 
 
+def test_a_sink_may_start_the_device_again_itself(opener: Open) -> None:
+    device, again = opener(), RecordingSink()
+
+    class Restarting(RecordingSink):
+        def on_frame(self, frame) -> None:
+            device.stop()
+            device.start(again)
+
+    device.start(Restarting())
+    assert again.receives(3)
+    device.close()
+    assert [state for state, _ in again.states] == [DeviceState.OPENING, DeviceState.STREAMING, DeviceState.CLOSED]
+
+
 def test_it_can_be_closed_while_another_thread_takes_frames(opener: Open) -> None:
     device = opener()
     arrived, go_on = threading.Event(), threading.Event()
