@@ -100,7 +100,7 @@ def translated_sdk_errors(uri: str, access_remedy: str) -> Iterator[None]:
     except DeviceError:
         raise
     except Exception as error:
-        message = str(error)
+        message = str(error) or repr(error)
         if "permission" in message.lower() or "access" in message.lower():
             message = f"{message}; {access_remedy}"
         elif "busy" in message.lower():

@@ -91,7 +91,7 @@ def _camera(sensor: str, profile: Any, reference: Any) -> Camera:
     intrinsics = profile.get_intrinsics()
     size, matrix = (intrinsics.width, intrinsics.height), (intrinsics.fx, intrinsics.fy, intrinsics.ppx, intrinsics.ppy)
     T_rs = pose.identity()
-    if sensor != "depth" and profile is not reference:
+    if profile is not reference:
         extrinsics = profile.get_extrinsics_to(reference)
         # Rotations are stored in column-major order.
         T_rs = pose.from_rotation(np.reshape(extrinsics.rotation, (3, 3)).T, extrinsics.translation)

@@ -34,3 +34,11 @@ def test_a_library_without_a_wheel_for_this_python_asks_for_another(running, is_
     assert (
         "sdk is not installed, and has no wheel for Python 3.14:  make clean all PYTHON=python3.13" in message
     ) == is_reported
+
+
+def test_an_error_of_a_library_without_a_message_is_named():
+    with (
+        pytest.raises(errors.DeviceError, match=r"^camera://1: TimeoutError\(\)$"),
+        errors.translated_sdk_errors("camera://1", ""),
+    ):
+        raise TimeoutError
