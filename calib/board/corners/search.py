@@ -217,8 +217,8 @@ def _find_circles(target: Circles | AsymmetricCircles, levels: Grey, kind: int) 
 def _disc_detector(target: Circles | AsymmetricCircles, levels: Grey) -> cv2.SimpleBlobDetector:
     parameters = cv2.SimpleBlobDetector.Params()
     # The defaults limit blobs to 5000 pixels and use threshold steps so large that centres jump.
-    parameters.maxArea = levels.size / (target.columns * target.rows)
     parameters.minArea = 12
+    parameters.maxArea = max(levels.size / (target.columns * target.rows), parameters.minArea)
     parameters.minDistBetweenBlobs = 4
     parameters.thresholdStep = 5
     return cv2.SimpleBlobDetector.create(parameters)

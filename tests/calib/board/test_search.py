@@ -6,7 +6,7 @@ import pytest
 
 from calib.board.corners.detection import detect
 from calib.board.corners.search import chessboard_size, find
-from calib.board.target import Charuco, Chessboard
+from calib.board.target import Charuco, Chessboard, Circles
 from evaluation.scenes.boards.board_images import VGA, as_bytes, centered, photograph
 
 CHESSBOARD = Chessboard(9, 6, 0.03)
@@ -29,6 +29,12 @@ def test_small_markers_are_found_in_images_of_16_bits_as_in_those_of_8() -> None
     assert len(found[1].ids) >= 0.9 * len(found[0].ids) > 30
     common = np.intersect1d(found[0].ids, found[1].ids, return_indices=True)[1:]
     np.testing.assert_allclose(found[0].pixels[common[0]], found[1].pixels[common[1]], atol=0.1)
+
+
+def test_an_image_with_too_few_pixels_for_the_discs_of_a_board_shows_none() -> None:
+    """OpenCV's own error ended the calibration."""
+    ids, _ = find(Circles(16, 16, 0.02, 0.01), np.full((48, 64), 128, np.uint8))
+    assert not len(ids)
 
 
 @pytest.mark.parametrize("angle", [0, 4, 10])
