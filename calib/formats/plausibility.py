@@ -43,7 +43,7 @@ def doubts(cameras: Mapping[str, Camera]) -> tuple[str, ...]:
                 f"{name}: its principal point ({one.cx:g}, {one.cy:g}) is outside of its images of {one.width} × "
                 f"{one.height} pixels. Was it calibrated with others?"
             )
-        elif _is_turned(one):
+        elif is_turned(one):
             found.append(
                 f"{name}: its principal point ({one.cx:g}, {one.cy:g}) is in the middle of images of {one.height} × "
                 f"{one.width} pixels, not of {one.width} × {one.height}. Are width and height exchanged?"
@@ -51,7 +51,7 @@ def doubts(cameras: Mapping[str, Camera]) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _is_turned(one: Camera) -> bool:
+def is_turned(one: Camera) -> bool:
     """True if the principal point is in the middle only of images whose width and height are exchanged."""
     size, middle = np.array([one.width, one.height]), np.array([one.cx, one.cy])
     as_said, exchanged = (np.abs(middle / each - 0.5) for each in (size, size[::-1]))

@@ -39,14 +39,15 @@ class Images(Protocol):
 
 @dataclass(frozen=True)
 class DepthImages:
-    """Stream `depth` of sensor `depth`: 16-bit depth images.
+    """Stream `depth` of sensor `depth`: depth images of 16-bit integers or of floating-point numbers.
 
     Attributes:
         files: the images.
         camera: camera of the images.
-        scale: length of one unit [m].
+        scale: length of one unit of integers [m].
+        float_scale: length of one unit of floating-point numbers [m].
         geometry: type of distance, z or radial.
-        invalid: the value that means "no return".
+        invalid: the value that means "no return"; what is not finite always does.
         masks: mask images by sequence number; where they are black or transparent, depth is "no return".
     """
 
@@ -56,26 +57,38 @@ class DepthImages:
     geometry: Geometry = Geometry.Z
     invalid: int = 0
     masks: Mapping[int, Path] = field(default_factory=dict)
+    float_scale: float = 1.0
 
     def frame(self, file: ImageFile) -> Frame:
         """Reads a depth image and applies its mask, if any."""
         depth = _read(file.path, self.camera)
-        if depth.dtype != np.uint16 or depth.ndim != 2:
-            raise ImageFolderError(f"{file.path}: depth must have one channel of 16 bits, this is {_format(depth)}")
+        is_float = depth.dtype.kind == "f"
+        if not (is_float or depth.dtype == np.uint16) or depth.ndim != 2:
+            advice = (
+                "; images of 8 bits are for looking at: export the distances themselves"
+                if depth.dtype == np.uint8
+                else ""
+            )
+            raise ImageFolderError(
+                f"{file.path}: depth must have one channel of 16 bits or of floating-point numbers, this is "
+                f"{_format(depth)}{advice}"
+            )
+        if is_float:
+            depth = np.where(np.isfinite(depth), depth, self.invalid)
         filters: tuple[str, ...] = ()
         if file.seq in self.masks:
-            depth = np.where(_mask(self.masks[file.seq], self.camera), depth, np.uint16(self.invalid))
+            depth = np.where(_mask(self.masks[file.seq], self.camera), depth, depth.dtype.type(self.invalid))
             filters = ("mask",)
         return Frame(
             sensor="depth",
             stream="depth",
             kind=Kind.DEPTH,
-            data=np.ascontiguousarray(depth, "<u2"),
-            encoding="16UC1",
+            data=np.ascontiguousarray(depth, "<f4" if is_float else "<u2"),
+            encoding="32FC1" if is_float else "16UC1",
             t_host_ns=file.t_ns,
             t_arrival_ns=file.t_ns,
             seq=file.seq,
-            scale=self.scale,
+            scale=self.float_scale if is_float else self.scale,
             geometry=self.geometry,
             invalid=self.invalid,
             clock_domain="file",

@@ -1,6 +1,5 @@
 """Image files with their timestamps, by number or from a list."""
 
-import math
 import re
 from collections import Counter
 from collections.abc import Sequence
@@ -9,13 +8,20 @@ from itertools import chain, islice, pairwise
 from pathlib import Path
 
 from calib.files import limited
+from drivers.image_folder import times
 
 #: Largest list of images [bytes].
 MAX_LIST_BYTES = 1 << 26
 
-#: Names of images, and how many files are looked at and patterns are named where none matches.
-_SUFFIXES = {".bmp", ".jpeg", ".jpg", ".pgm", ".png", ".ppm", ".tif", ".tiff", ".webp"}
+#: Latest time of a numbered exposure [s], of the year 2106: what is later is no count of exposures.
+_MAX_S = 1 << 32
+
+#: Suffixes of images, and how many files are looked at and patterns are named where none matches.
+_SUFFIXES = {".bmp", ".jpeg", ".jpg", ".npy", ".pgm", ".png", ".ppm", ".tif", ".tiff", ".webp"}
 _LOOKED_AT, _NAMED = 100_000, 4
+
+#: Suffixes of films.
+_VIDEOS = {".avi", ".m4v", ".mkv", ".mov", ".mp4", ".webm"}
 
 
 class ImageFolderError(Exception):
@@ -69,6 +75,12 @@ def by_number(folder: Path, pattern: str, rate_hz: float, *, alone: bool = False
     if not paths:
         raise ImageFolderError(f"{folder}: no file matches {pattern!r}{_instead(folder)}")
     for path in paths:
+        if path.suffix.lower() in _VIDEOS:
+            command = f"ffmpeg -i {path.name} -start_number N color_%06d.png"
+            raise ImageFolderError(
+                f"{path}: is a film; `{command}` makes images of it, where N is the number of the first depth image"
+                f"{_instead(folder)}"
+            )
         if last_number(path.stem) is None:
             raise ImageFolderError(
                 f"{path}: there is no number in its name to tell which exposure it is{_instead(folder)}"
@@ -76,7 +88,34 @@ def by_number(folder: Path, pattern: str, rate_hz: float, *, alone: bool = False
     numbered = {number: path for path in paths if (number := last_number(path.stem)) is not None}
     if len(numbered) < len(paths):
         numbered = dict(enumerate(_by_all_numbers(paths, alone)))
+    if max(numbered) / rate_hz > _MAX_S:
+        path = numbered[max(numbered)]
+        raise ImageFolderError(f"{path}: {max(numbered)} is too large for the number of an exposure")
     return [ImageFile(numbered[number], number, round(number * 1e9 / rate_hz)) for number in sorted(numbered)]
+
+
+def by_name(folder: Path, pattern: str, rate_hz: float) -> list[ImageFile]:
+    """Files that match a pattern by the times in all their names, counted from 0; without such times as `by_number`.
+
+    Raises:
+        ImageFolderError: as `by_number`, or two names have one time.
+    """
+    found: dict[int, Path] = {}
+    for path in sorted(folder.glob(pattern)):
+        time = times.in_name(path.stem)
+        if time is None:
+            return by_number(folder, pattern, rate_hz)
+        if time in found:
+            raise ImageFolderError(f"{path}: has the same time as {found[time].name}")
+        found[time] = path
+    if not found:
+        return by_number(folder, pattern, rate_hz)
+    return [ImageFile(found[time], seq, time) for seq, time in enumerate(sorted(found))]
+
+
+def are_timed(files: Sequence[ImageFile]) -> bool:
+    """True if the times of what `by_name` found are those in the names, not made of numbers."""
+    return all(times.in_name(file.path.stem) == file.t_ns for file in files)
 
 
 def _instead(folder: Path) -> str:
@@ -109,7 +148,7 @@ def _by_all_numbers(paths: Sequence[Path], alone: bool) -> list[Path]:
 
 
 def by_list(folder: Path, name: str) -> list[ImageFile]:
-    """Files in a list of the TUM RGB-D benchmark, by time. A line has a time [s] and a path; `#` starts a comment.
+    """Files in a list of the TUM RGB-D benchmark, by time. A line has a time and a path; `#` starts a comment.
 
     Raises:
         ImageFolderError: missing list, malformed line, or missing file; names the line.
@@ -120,13 +159,13 @@ def by_list(folder: Path, name: str) -> list[ImageFile]:
 
 def time_problem(folder: Path, name: str) -> str:
     """Problem of times that do not increase from line to line of a list, "" if they do; raises as `by_list`."""
-    times = list(_listed(folder, name).values())
-    earlier = sum(after <= before for before, after in pairwise(times))
+    given = list(_listed(folder, name).values())
+    earlier = sum(after <= before for before, after in pairwise(given))
     if not earlier:
         return ""
     return (
-        f"the times of {earlier} of {len(times)} lines are not later than those of the line before, so the images are "
-        f"taken in another order, within {(max(times) - min(times)) * 1e-9:.3g} s"
+        f"the times of {earlier} of {len(given)} lines are not later than those of the line before, so the images are "
+        f"taken in another order, within {(max(given) - min(given)) * 1e-9:.3g} s"
     )
 
 
@@ -135,27 +174,25 @@ def _listed(folder: Path, name: str) -> dict[Path, int]:
     try:
         lines = limited.read(folder / name, MAX_LIST_BYTES).decode().splitlines()
     except (OSError, UnicodeDecodeError) as error:
-        raise ImageFolderError(f"{folder / name}: cannot be read: {getattr(error, 'strerror', 'not text')}") from error
-    times: dict[Path, int] = {}
+        raise ImageFolderError(
+            f"{folder / name}: cannot be read: {getattr(error, 'strerror', 'not text')}; "
+            "it has a time and the path of an image in every line"
+        ) from error
+    listed: dict[Path, int] = {}
     for number, line in enumerate(lines, start=1):
         fields = line.partition("#")[0].split()
         if not fields:
             continue
-        time = _nanoseconds(fields[0])
+        time = times.nanoseconds(fields[0])
         if len(fields) != 2 or time is None:
-            raise ImageFolderError(f"{folder / name}: line {number} must be a time and a path, not {line!r}")
+            raise ImageFolderError(
+                f"{folder / name}: line {number} must be a time and a path, not {line!r}; a time is in seconds, or has "
+                "13, 16 or 19 digits before the point, in ms, µs or ns"
+            )
         path = folder / fields[1]
         if not path.is_file():
             raise ImageFolderError(f"{folder / name}: line {number}: there is no file {path}")
-        times[path] = time
-    if not times:
+        listed[path] = time
+    if not listed:
         raise ImageFolderError(f"{folder / name}: names no image")
-    return times
-
-
-def _nanoseconds(text: str) -> int | None:
-    """Nonnegative decimal seconds as nanoseconds; exact, unlike a float of the current Unix time."""
-    match = re.fullmatch(r"(\d{1,10})(?:\.(\d*))?", text)
-    if match is None:
-        return None
-    return int(match[1]) * 1_000_000_000 + math.floor(int((match[2] or "0")[:9].ljust(9, "0")))
+    return listed

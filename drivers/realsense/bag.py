@@ -65,7 +65,9 @@ class RealsenseBag:
         self._roles = {topic: role for topic in counts if (role := _role(topic, counts)) is not None}
         if not self._roles:
             raise ForeignRecordingError(
-                f"{path}: there are no images of a RealSense in this bag, its topics are {sorted(counts)}"
+                f"{path}: there are no images of librealsense's recorder in this bag, its topics are {sorted(counts)}; "
+                f"of a ROS driver's bag, `rosbags-convert --src {path.name} --dst {path.stem}` makes one that layout "
+                "ros2 takes"
             )
         self._info = self._read_info()
         self.cameras: Mapping[str, Camera] = {}

@@ -17,7 +17,9 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
 from abs_service.calibration.files import exchange, target_file
-from abs_service.commands.images import camera_file, open3d_folder
+from abs_service.commands.images import foreign_cameras, open3d_folder
+from abs_service.commands.parts import camera_file
+from abs_service.commands.parts.options import OptionError
 from abs_service.config import ConfigError, load, load_calibration
 from abs_service.export import viewers
 from abs_service.export.errors import ExportError
@@ -92,6 +94,16 @@ def npz() -> bytes:
     return stream.getvalue()
 
 
+def cameras(path: Path) -> object:
+    return foreign_cameras.load(path, (4, 3), True)
+
+
+def array() -> bytes:
+    stream = io.BytesIO()
+    np.save(stream, np.arange(12, dtype=np.float32).reshape(3, 4))
+    return stream.getvalue()
+
+
 def picture(suffix: str) -> bytes:
     return cv2.imencode(suffix, np.arange(600, dtype=np.uint8).reshape(20, 30))[1].tobytes()
 
@@ -121,6 +133,8 @@ TARGETS = (
     Target("recovery", recording(), recover, (RecoveryError,)),
     Target("scan", SensFile(shots(3)).content(), scanned, (ForeignRecordingError,)),
     Target("export", recording(), exported, (ExportError, DeviceError)),
+    Target("array", array(), image_file.read, (ImageFolderError,)),
+    Target("matrix", b"4.0 0 1.5\n0 4.0 1\n0 0 1\n", cameras, (camera_file.CameraFileError, OptionError)),
     *(Target(suffix, picture(suffix), image_file.read, (ImageFolderError,)) for suffix in SUFFIXES),
     *map(of_format, FORMATS),
 )  # fmt: skip

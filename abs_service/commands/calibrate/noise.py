@@ -38,7 +38,7 @@ from abs_service.calibration.files import target_file, toml_text
 from abs_service.calibration.noise import board_poses, measurement, repeated, report, sigma_consistency
 from abs_service.calibration.shots import sequences
 from abs_service.commands.calibrate.inputs import calibrations
-from abs_service.commands.images import camera_file
+from abs_service.commands.parts import camera_file
 from abs_service.commands.parts.options import OptionError, check_folder, number, whole
 from abs_service.commands.parts.progress import bars
 from abs_service.config import plugins
@@ -164,7 +164,7 @@ def _read(source: str, arguments: argparse.Namespace, advance: Callable[[], None
     depth = camera_file.load(arguments.camera).depth
     images = DepthImages(
         by_number(path, arguments.depth, 30.0, alone=True), depth.camera(), depth.depth_scale or DEPTH_SCALE,
-        Geometry(depth.geometry), depth.invalid,
+        Geometry(depth.geometry), depth.invalid, float_scale=depth.depth_scale or 1.0,
     )  # fmt: skip
     folder = ImageFolder({"depth": images})
     return sequences.of_frames(path.name, folder.frames(), folder.cameras, "depth", arguments.frames, advance)

@@ -9,7 +9,7 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
 
-from abs_service.commands.images.camera_file import CameraFile, CameraFileError, ColorTable, DepthTable, Focal, Size
+from abs_service.commands.parts.camera_file import CameraFile, CameraFileError, ColorTable, DepthTable, Focal, Size
 from abs_service.config.problems import from_pydantic
 from calib.files import limited
 
@@ -25,7 +25,7 @@ class _Intrinsics(BaseModel):
     width: Size
     height: Size
     intrinsic_matrix: Annotated[tuple[FiniteFloat, ...], Field(min_length=9, max_length=9)]
-    depth_scale: Focal = 1000.0
+    depth_scale: Focal | None = None
 
 
 def load(folder: Path) -> CameraFile:
@@ -46,7 +46,8 @@ def read(path: Path) -> CameraFile:
         given = _Intrinsics.model_validate_json(limited.text(path))
         fx, _, _, _, fy, _, cx, cy, _ = given.intrinsic_matrix
         camera = {"width": given.width, "height": given.height, "fx": fx, "fy": fy, "cx": cx, "cy": cy}
-        return CameraFile(depth=DepthTable(**camera, depth_scale=1 / given.depth_scale), color=ColorTable(**camera))
+        scale = None if given.depth_scale is None else 1 / given.depth_scale
+        return CameraFile(depth=DepthTable(**camera, depth_scale=scale), color=ColorTable(**camera))
     except OSError as error:
         raise CameraFileError(f"{path}: cannot be read: {error.strerror}") from None
     except ValidationError as error:

@@ -10,6 +10,7 @@ from abs_service.pairing.images import Image
 from abs_service.tracker.detection.image_alignment import alignment_warnings
 from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection
 from abs_service.tracker.mesh import Mesh, edge_lengths, pieces_of
+from calib.formats.plausibility import is_turned
 from calib.rig import Rig
 
 #: Range of the extent of an object [m]; outside, the distances have the wrong unit.
@@ -141,14 +142,21 @@ def doubts(detection: InitialDetection, mesh: Mesh, images: Mapping[str, Image],
 
 
 def camera_warnings(rig: Rig) -> tuple[str, ...]:
-    """Doubts about cameras that no image is needed for: intrinsics that seem to be those of another image size."""
-    cameras = {name: sensor.camera for name, sensor in rig.sensors.items()}
-    return tuple(
-        f"the principal point of {name}, ({camera.cx:.0f}, {camera.cy:.0f}) px, is far from the middle of its images "
-        f"of {camera.width} × {camera.height} pixels: are its intrinsics those of images of this size?"
-        for name, camera in cameras.items()
-        if max(abs(camera.cx / camera.width - 0.5), abs(camera.cy / camera.height - 0.5)) > MAX_DECENTRING
-    )
+    """Doubts about cameras that no image is needed for: intrinsics that seem to be those of others."""
+    found = []
+    for name, camera in ((name, sensor.camera) for name, sensor in rig.sensors.items()):
+        what = f"the principal point of {name}, ({camera.cx:.0f}, {camera.cy:.0f}) px, is"
+        if is_turned(camera):
+            found.append(
+                f"{what} in the middle of images of {camera.height} × {camera.width} pixels, not of {camera.width} × "
+                f"{camera.height}: are cx and cy exchanged?"
+            )
+        elif max(abs(camera.cx / camera.width - 0.5), abs(camera.cy / camera.height - 0.5)) > MAX_DECENTRING:
+            found.append(
+                f"{what} far from the middle of its images of {camera.width} × {camera.height} pixels: are its "
+                "intrinsics those of images of this size?"
+            )
+    return tuple(found)
 
 
 def mesh_warnings(mesh: Mesh) -> tuple[str, ...]:

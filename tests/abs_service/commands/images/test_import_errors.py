@@ -38,7 +38,7 @@ def test_a_folder_of_open3d_without_intrinsics_is_refused(tmp_path: Path, capsys
         (
             CAMERA,
             ["--depth", "color_*.png"],
-            "color_000.png: depth must have one channel of 16 bits, this is 3 × 8 bit",
+            "color_000.png: depth must have one channel of 16 bits or of floating-point numbers, this is 3 × 8 bit;",
         ),
         (CAMERA.replace("width = 4", "width = 5"), [], "depth_000.png: the image has 4 × 3 pixels, its camera 5 × 3"),
         (CAMERA.replace("fx = 4.0\n", ""), [], "depth.fx: missing, but needed"),
@@ -52,9 +52,9 @@ def test_a_folder_of_open3d_without_intrinsics_is_refused(tmp_path: Path, capsys
         (None, [], "--camera: layout pairs needs a camera file"),
         (CAMERA, ["--rig", "nowhere.toml"], "nowhere.toml: cannot be read"),
         (CAMERA, ["--layout", "tum"], "depth.txt: cannot be read"),
-        (CAMERA, ["--layout", "tum", "--mask", "m*"], "--mask: layout tum takes --camera, --frames"),
-        (CAMERA, ["--layout", "tum", "--depth", "d*"], "--depth: layout tum takes --camera, --frames"),
-        (CAMERA, ["--layout", "tum", "--rate", "9"], "--rate: layout tum takes --camera, --frames"),
+        (CAMERA, ["--layout", "tum", "--mask", "m*"], "--mask: layout tum takes --camera, --depth-scale, --frames"),
+        (CAMERA, ["--layout", "tum", "--depth", "d*"], "--depth: layout tum takes --camera, --depth-scale, --frames"),
+        (CAMERA, ["--layout", "tum", "--rate", "9"], "--rate: layout tum takes --camera, --depth-scale, --frames"),
         (CAMERA, ["--out", "/nowhere/at/all.mcap"], "--out /nowhere/at/all.mcap: there is no folder /nowhere/at"),
     ],
 )

@@ -102,3 +102,13 @@ def test_a_principal_point_of_another_image_size_is_doubted(cx, cy, is_doubtful)
         assert found[0].startswith(
             f"the principal point of tof, ({cx:.0f}, {cy:.0f}) px, is far from the middle of its"
         )
+
+
+@pytest.mark.parametrize(("width", "height"), [(640, 480), (320, 240), (848, 480)])
+def test_an_exchanged_principal_point_is_doubted(width, height):
+    camera = Camera(width, height, 585.0, 585.0, height / 2 + 4, width / 2 - 7)
+    rig = Rig("r", {"tof": Sensor("tof", camera, StructuredLight())})
+    (doubt,) = camera_warnings(rig)
+    assert doubt.endswith(
+        f"in the middle of images of {height} × {width} pixels, not of {width} × {height}: are cx and cy exchanged?"
+    )
