@@ -47,7 +47,8 @@ class DepthImages:
         scale: length of one unit of integers [m].
         float_scale: length of one unit of floating-point numbers [m].
         geometry: type of distance, z or radial.
-        invalid: the value that means "no return"; what is not finite always does.
+        invalid: the value that means "no return"; of floating-point numbers, what is not finite or not positive
+            always does.
         masks: mask images by sequence number; where they are black or transparent, depth is "no return".
     """
 
@@ -74,7 +75,7 @@ class DepthImages:
                 f"{_format(depth)}{advice}"
             )
         if is_float:
-            depth = np.where(np.isfinite(depth), depth, self.invalid)
+            depth = np.where((depth > 0) & np.isfinite(depth), depth, self.invalid)
         filters: tuple[str, ...] = ()
         if file.seq in self.masks:
             depth = np.where(_mask(self.masks[file.seq], self.camera), depth, depth.dtype.type(self.invalid))
@@ -167,4 +168,5 @@ def _mask(path: Path, camera: Camera) -> NDArray[np.bool_]:
 
 def _format(image: NDArray[np.generic]) -> str:
     channels = 1 if image.ndim == 2 else image.shape[2]
-    return f"{channels} × {8 * image.dtype.itemsize} bit"
+    kind = "" if image.dtype.kind == "u" else f" ({image.dtype})"
+    return f"{channels} × {8 * image.dtype.itemsize} bit{kind}"

@@ -5,6 +5,7 @@ An image topic `/camera/depth/image_rect_raw`, or `…/image_raw/compressed`, ha
 calibration, or an encoding that is no image of depth, infra-red or colour, is left out.
 """
 
+import logging
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
@@ -22,6 +23,7 @@ from drivers.ros2.cameras import CameraInfoError, Transforms, camera
 from drivers.ros2.images import ImageError, decode, is_image
 from drivers.ros2.messages import Bag
 
+_log = logging.getLogger(__name__)
 _TRANSFORMS = "/tf_static"
 _TRANSPORTS = ("/compressed", "/compressedDepth")
 
@@ -55,7 +57,12 @@ class Ros2Bag:
         topics = self._bag.topics()
         images = sorted((topic for topic, one in topics.items() if is_image(one.type) and one.count), key=_preference)
         infos = {_info_topic(topic) for topic in images} & {topic for topic, one in topics.items() if one.count}
-        self._streams = {stream.topic: stream for stream in self._find(images, self._firsts({*images, *infos}))}
+        firsts = self._firsts({*images, *infos})
+        self._streams = {stream.topic: stream for stream in self._find(images, firsts)}
+        unstamped = [topic for topic in self._streams if _nanoseconds(firsts[topic].header.stamp) <= 0]
+        self._is_stamped = not unstamped
+        if unstamped:
+            _log.warning("%s: %s has no time stamps: all are taken from when it was recorded", path, unstamped[0])
         self.total = sum(topics[topic].count for topic in self._streams)
         reference = next(stream for stream in self._streams.values() if stream.kind == Kind.DEPTH)
         try:
@@ -68,7 +75,7 @@ class Ros2Bag:
             raise ForeignRecordingError(f"{path}: {error}") from error
 
     def frames(self) -> Iterator[Frame]:
-        """All images in order of recording. Host times are their stamps, of the wall clock."""
+        """All images in order of recording. Host times are their stamps, or without any when they were recorded."""
         counts: Counter[str] = Counter()
         for message in self._bag.messages(self._streams):
             stream = self._streams[message.topic]
@@ -77,7 +84,8 @@ class Ros2Bag:
                 size = data.shape[1], data.shape[0]
                 lens = self.cameras[stream.sensor]
                 if kind != stream.kind or size != (lens.width, lens.height):
-                    raise ImageError(f"{kind} of {size[0]} × {size[1]} pixels is not what its camera takes")
+                    taken = f"{lens.width} × {lens.height}"
+                    raise ImageError(f"{kind} of {size[0]} × {size[1]} pixels is not what its camera takes, {taken}")
             except ImageError as error:
                 raise ForeignRecordingError(f"{self._path}: {message.topic}: {error}") from error
             stamp = message.content.header.stamp
@@ -97,7 +105,7 @@ class Ros2Bag:
             kind=stream.kind,
             data=data,
             encoding=encoding,
-            t_host_ns=max(stamp.sec * 1_000_000_000 + stamp.nanosec, 0),
+            t_host_ns=max(_nanoseconds(stamp) if self._is_stamped else time_ns, 0),
             t_arrival_ns=max(time_ns, 0),
             seq=seq,
             scale=0.001 if is_depth and not is_metres else 1.0,
@@ -125,8 +133,11 @@ class Ros2Bag:
                 continue
             found.setdefault((_namespace(topic), kind), topic)
         if not any(kind == Kind.DEPTH for _, kind in found):
-            why = "; ".join(left_out) or "there are no calibrated images"
+            kinds = (f"{topic} has images of kind {kind}, not 16UC1 or 32FC1" for (_, kind), topic in found.items())
+            why = "; ".join([*left_out, *kinds]) or "there are no images"
             raise ForeignRecordingError(f"{self._path}: it has no depth images that can be used; {why}")
+        if left_out:
+            _log.warning("%s: left out: %s", self._path, "; ".join(left_out))
         names = _names({namespace for namespace, _ in found})
         for (namespace, kind), topic in found.items():
             yield _Stream(topic, names[namespace], kind, firsts[_info_topic(topic)], firsts[topic].header.frame_id)
@@ -139,6 +150,10 @@ class Ros2Bag:
             if len(firsts) == len(topics):
                 break
         return firsts
+
+
+def _nanoseconds(stamp: Any) -> int:
+    return stamp.sec * 1_000_000_000 + stamp.nanosec
 
 
 def _base(topic: str) -> str:

@@ -21,6 +21,8 @@ from calib.lenses.lens import Lens
 
 #: Matrices that describe a camera: K alone, or with a column and row of zeros as ScanNet has it.
 _SHAPES = ((3, 3), (3, 4), (4, 4))
+#: What may stand around a row of numbers: brackets, separators, and the mark with which some editors begin a file.
+_AROUND = " \t,;[]\ufeff"
 
 
 def load(path: Path, size: tuple[int, int], has_color: bool) -> tuple[CameraFile, tuple[str, ...]]:
@@ -47,7 +49,14 @@ def load(path: Path, size: tuple[int, int], has_color: bool) -> tuple[CameraFile
     if path.suffix == ".json" and '"depth"' in text:
         return camera_file.load(path), ()
     try:
-        read = camera_files.read(path, Hints(size=size), exchange.of_content(path, text))
+        name = exchange.of_content(path, text)
+    except exchange.ExchangeError:
+        formats = f"a matrix of 3 × 3 numbers, open3d, {', '.join(exchange.READERS)}, a calibration file of ours"
+        raise CameraFileError(
+            f"{path}: its format is none of {formats}, and it is no camera file as `abs-service import --help` shows it"
+        ) from None
+    try:
+        read = camera_files.read(path, Hints(size=size), name)
     except exchange.ExchangeError as error:
         raise CameraFileError(
             f"{error}; `abs-service calibrate convert` has more options, and what it writes is a file for --camera"
@@ -65,12 +74,14 @@ def _text(path: Path) -> str:
 
 
 def _matrix(text: str) -> NDArray[np.float64] | None:
-    """The numbers of a file that has nothing but rows of them; None of another file."""
-    rows = [re.split(r"[\s,;]+", line.strip(" \t,;[]")) for line in text.splitlines() if line.strip(" \t,;[]")]
+    """The numbers of a file that has nothing but a matrix, in rows or one after the other; None of another file."""
+    lines = (line.strip(_AROUND) for line in text.splitlines())
     try:
-        matrix = np.array(rows, float)
+        matrix = np.array([re.split(r"[\s,;]+", line) for line in lines if line], float)
     except ValueError:
         return None
+    if matrix.size == np.prod(_SHAPES[0]):
+        return matrix.reshape(_SHAPES[0])
     return matrix if matrix.shape in _SHAPES else None
 
 

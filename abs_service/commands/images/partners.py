@@ -24,7 +24,7 @@ def check_numbers(depth: Sequence[ImageFile], color: Sequence[ImageFile], note: 
         ranges = (f"{files[0].path.name} to {files[-1].path.name}" for files in (depth, color))
         raise ImageFolderError(
             f"no colour image has the number of a depth image: {' and '.join(ranges)}; the last number in a name has "
-            "to count the exposures of both from the same one"
+            "to count the exposures of both from the same one; times stand in lists (layout tum)"
         )
     if without:
         note(f"{len(without)} of {len(depth)} depth images have no colour image of their number, as {without[0].path}")

@@ -84,6 +84,7 @@ cam1:
         ("K.txt", "4.0 0.0 1.5\n0.0 5.0 1.0\n0.0 0.0 1.0\n", 0.0, 0.0),
         ("intrinsic_depth.txt", "4 0 1.5 0\n0 5 1 0\n0 0 1 0\n0 0 0 1\n", 0.0, 0.0),
         ("K.csv", "[[4, 0, 1.5],\n [0, 5, 1],\n [0, 0, 1]]\n", 0.0, 0.0),
+        ("flat.txt", "\ufeff4 0 1.5 0 5 1 0 0 1\n", 0.0, 0.0),
         ("camera_info.yaml", ROS, -0.1, 0.0),
         ("camera.yml", OPENCV, -0.1, 0.0),
         ("intrinsics.json", OPEN3D, 0.0, 0.0),
@@ -108,7 +109,7 @@ def test_a_calibration_of_another_program_is_a_camera_file(folder: Path, name, t
             KALIBR,
             "has the cameras cam0, cam1, of which one has to be called depth and one color; `abs-",
         ),
-        ("K.txt", "4.0 0.0 1.5\n0.0 5.0 1.0\n", "K.txt: its format is not recognised; "),
+        ("K.txt", "4.0 0.0 1.5\n0.0 5.0 1.0\n", "K.txt: its format is none of a matrix of 3 × 3 numbers, "),
         ("K.txt", "4 0 0\n0 5 0\n1.5 1 1\n", "K.txt: a camera matrix is [[fx, skew, cx], [0, fy, cy], [0, 0, 1]], not"),
         ("camera_info.yaml", ROS.replace("1.5", "150.0"), "its principal point (150, 1) is outside of its images of 4"),
     ],
@@ -133,7 +134,7 @@ def test_one_camera_without_colour_images_is_that_of_depth(folder: Path) -> None
 @pytest.mark.parametrize("form", ["tiff", "npy32", "npy64"])
 def test_floating_point_depth_is_in_metres_unless_its_scale_is_said(tmp_path: Path, form, scale, metres) -> None:
     depth = np.full((3, 4), 1.25, np.float64 if form == "npy64" else np.float32)
-    depth[0, 0], depth[0, 1], depth[0, 2] = np.nan, np.inf, 0.0
+    depth[0] = np.nan, np.inf, 0.0, -1.0
     if form == "tiff":
         assert cv2.imwrite(str(tmp_path / "depth_0.tiff"), depth)
     else:
@@ -142,7 +143,7 @@ def test_floating_point_depth_is_in_metres_unless_its_scale_is_said(tmp_path: Pa
     camera = str(tmp_path / "camera.toml")
     assert run(tmp_path, "--camera", camera, "--depth", "depth_0.*") == Exit.OK
     (frame,) = frames_of(tmp_path / "out.mcap")
-    assert np.isnan(frame.si()[0, :3]).all()
+    assert np.isnan(frame.si()[0]).all()
     np.testing.assert_allclose(frame.si()[1:], metres, rtol=1e-6)
 
 
@@ -225,3 +226,15 @@ def test_an_image_without_distances_is_told(folder: Path, capsys: pytest.Capture
     cv2.imwrite(str(folder / "depth_000.png"), np.zeros((3, 4), np.uint16))
     assert run(folder, "--camera", str(folder / "camera.toml")) == Exit.OK
     assert "depth_000.png: no distance in it, at 0.001 m a unit" in capsys.readouterr().out
+
+
+def test_the_largest_value_is_asked_about_unless_it_is_said_to_be_no_return(folder: Path, capsys) -> None:
+    cv2.imwrite(str(folder / "depth_000.png"), np.array([[65535, 65535, 700, 700]] * 3, np.uint16))
+    assert run(folder, "--camera", str(folder / "camera.toml")) == Exit.OK
+    assert "depth_000.png: 50% of its pixels have 65535, the largest value; if" in capsys.readouterr().err
+    (folder / "camera.toml").write_text(CAMERA + "invalid = 65535\n" + COLOR)
+    (folder / "out.mcap").unlink()
+    assert run(folder, "--camera", str(folder / "camera.toml")) == Exit.OK
+    captured = capsys.readouterr()
+    assert "65535" not in captured.err
+    assert "depth_000.png: median distance 0.7 m" in captured.out
