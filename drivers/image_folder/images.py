@@ -4,7 +4,7 @@ import heapq
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -149,7 +149,7 @@ class ImageFolder:
             yield streams[number].frame(file)
 
 
-def _read(path: Path, camera: Camera) -> NDArray[np.generic]:
+def _read(path: Path, camera: Camera) -> NDArray[Any]:
     image = image_file.read(path)
     height, width = image.shape[:2]
     if (width, height) != (camera.width, camera.height):

@@ -21,7 +21,7 @@ LAYOUTS = {"open3d": 0.001, "pairs": 0.001, "tum": 1 / 5000}
 #: Metres per unit of depth images of floating-point numbers, likewise.
 _FLOAT_SCALE = 1.0
 #: What some programs write where there is no return, and the share of pixels from which that is asked.
-_LARGEST, _MANY = 65535, 0.001
+_MAXIMUM, _MANY = 65535, 0.001
 #: Depth and colour images of the layouts that find them by their names.
 _PATTERNS = {"open3d": ("depth/*.png", "color/*"), "pairs": ("depth_*.png", "color_*.[jp]*g")}
 #: Lists of depth and colour images of the others.
@@ -130,10 +130,10 @@ def _distance(images: DepthImages) -> str:
     first = images.frame(images.files[0])
     distances = first.si()
     distances = distances[np.isfinite(distances)]
-    if (share := np.mean(first.data == _LARGEST)) > _MANY and first.invalid != _LARGEST:
+    if (share := np.mean(first.data == _MAXIMUM)) > _MANY and first.invalid != _MAXIMUM:
         _note(
-            f"{images.files[0].path}: {share:.0%} of its pixels have {_LARGEST}, the largest value; if that means no "
-            f"return, write invalid = {_LARGEST} into the table depth of a camera file"
+            f"{images.files[0].path}: {share:.0%} of its pixels have {_MAXIMUM}, the largest value; if that means no "
+            f"return, write invalid = {_MAXIMUM} into the table depth of a camera file"
         )
     what = f"median distance {np.median(distances):.3g} m" if distances.size else "no distance in it"
     return f"{images.files[0].path}: {what}, at {first.scale:g} m a unit; --depth-scale sets another"
