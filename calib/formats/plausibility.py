@@ -46,7 +46,7 @@ def doubts(cameras: Mapping[str, Camera]) -> tuple[str, ...]:
         elif is_turned(one):
             found.append(
                 f"{name}: its principal point ({one.cx:g}, {one.cy:g}) is in the middle of images of {one.height} × "
-                f"{one.width} pixels, not of {one.width} × {one.height}. Are width and height exchanged?"
+                f"{one.width} pixels, not of {one.width} × {one.height}. Are width and height exchanged, or cx and cy?"
             )
     return tuple(found)
 

@@ -11,6 +11,7 @@ from abs_service.commands.images import foreign_cameras, frame_numbers, open3d_f
 from abs_service.commands.parts import camera_file
 from abs_service.commands.parts.camera_file import CameraFile
 from abs_service.commands.parts.options import OptionError
+from calib.formats import plausibility
 from drivers.contract.frame import Geometry
 from drivers.image_folder import image_file
 from drivers.image_folder.images import ColorImages, DepthImages, ImageFolder, Images
@@ -104,8 +105,10 @@ def _cameras(arguments: argparse.Namespace, first: ImageFile, has_color: bool) -
     if arguments.camera is not None:
         height, width = image_file.read(first.path).shape[:2]
         cameras, lost = foreign_cameras.load(arguments.camera, (width, height), has_color)
-        for one in lost:
-            _note(f"{arguments.camera}: not taken: {one}")
+        tables = {"depth": cameras.depth, "color": cameras.color}
+        described = {name: table.camera() for name, table in tables.items() if table is not None}
+        for one in (*(f"not taken: {what}" for what in lost), *plausibility.doubts(described)):
+            _note(f"{arguments.camera}: {one}")
         return cameras
     if arguments.layout == "open3d":
         return open3d_folder.load(arguments.path)

@@ -238,3 +238,16 @@ def test_the_largest_value_is_asked_about_unless_it_is_said_to_be_no_return(fold
     captured = capsys.readouterr()
     assert "65535" not in captured.err
     assert "depth_000.png: median distance 0.7 m" in captured.out
+
+
+@pytest.mark.parametrize(
+    ("changes", "doubt"),
+    [
+        (("fx = 4.0", "fx = 0.01"), "depth: its field of view is 179° × 41.1°. Are fx = 0.01 and fy = 4 in pixels of"),
+        (("cx = 1.5", "cx = 9.0"), "depth: its principal point (9, 1) is outside of its images of 4 × 3 pixels."),
+    ],
+)
+def test_intrinsics_that_no_camera_has_are_told(folder: Path, capsys, changes, doubt) -> None:
+    (folder / "camera.toml").write_text(CAMERA.replace(*changes))
+    assert run(folder, "--camera", str(folder / "camera.toml")) == Exit.OK
+    assert f"note: {folder / 'camera.toml'}: {doubt}" in capsys.readouterr().err
