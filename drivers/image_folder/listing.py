@@ -76,7 +76,7 @@ def by_number(folder: Path, pattern: str, rate_hz: float, *, alone: bool = False
         raise ImageFolderError(f"{folder}: no file matches {pattern!r}{_instead(folder)}")
     for path in paths:
         if path.suffix.lower() in _VIDEOS:
-            command = f"ffmpeg -i {path.name} -start_number N color_%06d.png"
+            command = f"ffmpeg -i {path.name} -fps_mode passthrough -start_number N color_%06d.png"
             raise ImageFolderError(
                 f"{path}: is a film; `{command}` makes images of it, where N is the number of the first depth image"
                 f"{_instead(folder)}"
@@ -88,9 +88,6 @@ def by_number(folder: Path, pattern: str, rate_hz: float, *, alone: bool = False
     numbered = {number: path for path in paths if (number := last_number(path.stem)) is not None}
     if len(numbered) < len(paths):
         numbered = dict(enumerate(_by_all_numbers(paths, alone)))
-    if max(numbered) / rate_hz > _MAX_S:
-        path = numbered[max(numbered)]
-        raise ImageFolderError(f"{path}: {max(numbered)} is too large for the number of an exposure")
     return [ImageFile(numbered[number], number, round(number * 1e9 / rate_hz)) for number in sorted(numbered)]
 
 
@@ -100,16 +97,18 @@ def by_name(folder: Path, pattern: str, rate_hz: float) -> list[ImageFile]:
     Raises:
         ImageFolderError: as `by_number`, or two names have one time.
     """
+    paths = sorted(folder.glob(pattern))
+    timed = [(time, path) for path in paths if (time := times.in_name(path.stem)) is not None]
+    if not timed or len(timed) < len(paths):
+        files = by_number(folder, pattern, rate_hz)
+        if files[-1].seq / rate_hz > _MAX_S:
+            raise ImageFolderError(f"{files[-1].path}: {files[-1].seq} is too large for the number of an exposure")
+        return files
     found: dict[int, Path] = {}
-    for path in sorted(folder.glob(pattern)):
-        time = times.in_name(path.stem)
-        if time is None:
-            return by_number(folder, pattern, rate_hz)
+    for time, path in timed:
         if time in found:
             raise ImageFolderError(f"{path}: has the same time as {found[time].name}")
         found[time] = path
-    if not found:
-        return by_number(folder, pattern, rate_hz)
     return [ImageFile(found[time], seq, time) for seq, time in enumerate(sorted(found))]
 
 

@@ -70,7 +70,8 @@ def test_names_that_do_not_all_have_times_are_numbers(tmp_path: Path) -> None:
     assert [file.seq for file in files] == [1305031103, 1305031102160]
     assert not are_timed(files)
     with pytest.raises(ImageFolderError, match=r"1305031102160\.png: 1305031102160 is too large for the number"):
-        by_number(tmp_path, "*.png", 30.0)
+        by_name(tmp_path, "*.png", 30.0)
+    assert by_number(tmp_path, "*.png", 30.0)[-1].seq == 1305031102160, "boards are paired by such numbers"
 
 
 def test_two_images_of_one_time_are_named(tmp_path: Path) -> None:
