@@ -107,7 +107,13 @@ def _cameras(arguments: argparse.Namespace, first: ImageFile, has_color: bool) -
         cameras, lost = foreign_cameras.load(arguments.camera, (width, height), has_color)
         tables = {"depth": cameras.depth, "color": cameras.color}
         described = {name: table.camera() for name, table in tables.items() if table is not None}
-        for one in (*(f"not taken: {what}" for what in lost), *plausibility.doubts(described)):
+        doubts = plausibility.doubts(described)
+        for pair, how in plausibility.baselines(described).items():
+            if how.length > plausibility.MAX_BASELINE_M:
+                doubts += (f"{pair} are {how.length:.4g} m apart: is the translation of T_rs in metres?",)
+            elif how.length or how.angle:
+                print(f"{pair}: {how}, color {how.side} depth as they see it")
+        for one in (*(f"not taken: {what}" for what in lost), *doubts):
             _note(f"{arguments.camera}: {one}")
         return cameras
     if arguments.layout == "open3d":

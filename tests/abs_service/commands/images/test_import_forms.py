@@ -251,3 +251,14 @@ def test_intrinsics_that_no_camera_has_are_told(folder: Path, capsys, changes, d
     (folder / "camera.toml").write_text(CAMERA.replace(*changes))
     assert run(folder, "--camera", str(folder / "camera.toml")) == Exit.OK
     assert f"note: {folder / 'camera.toml'}: {doubt}" in capsys.readouterr().err
+
+
+def test_the_side_of_the_colour_camera_is_told(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(folder, "--camera", str(folder / "camera.toml")) == Exit.OK
+    assert "depth, color: 50.0 mm apart, turned by 0.00°, color to the right of depth" in capsys.readouterr().out
+
+
+def test_a_pose_in_millimetres_is_told(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (folder / "camera.toml").write_text(CAMERA + COLOR.replace("0.05", "50.0"))
+    assert run(folder, "--camera", str(folder / "camera.toml")) == Exit.OK
+    assert "depth, color are 50 m apart: is the translation of T_rs in metres?" in capsys.readouterr().err
