@@ -53,6 +53,11 @@ class Ros2Bag:
 
     def __init__(self, path: Path) -> None:
         self._path = path
+        if path.suffix == ".bag" and path.is_file():
+            raise ForeignRecordingError(
+                f"{path}: is a bag of ROS 1; `rosbags-convert --src {path.name} --dst {path.stem}` makes one of ROS 2, "
+                "and layout realsense takes those that librealsense has recorded"
+            )
         self._bag = Bag(path)
         topics = self._bag.topics()
         images = sorted((topic for topic, one in topics.items() if is_image(one.type) and one.count), key=_preference)

@@ -157,6 +157,20 @@ def test_other_files_are_rejected_with_their_name(tmp_path: Path) -> None:
         RealsenseBag(write(tmp_path / "unit.bag", units=0.0))
 
 
+def test_a_bag_of_a_ros_driver_is_told_with_the_way_out(tmp_path: Path) -> None:
+    pytest.importorskip("rosbags", reason="needs rosbags: make all")
+    from rosbags.rosbag1 import Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    with Writer(tmp_path / "take.bag") as writer:
+        bag = Bag(writer, get_typestore(Stores.ROS1_NOETIC))
+        bag.put("/camera/depth/image_raw", bag.image(0, "16UC1", DEPTH))
+    with pytest.raises(
+        ForeignRecordingError, match=r"'/camera/depth/image_raw'\]; .* --src take.bag --dst take` makes"
+    ):
+        RealsenseBag(tmp_path / "take.bag")
+
+
 def test_a_corrupt_bag_is_read_or_rejected(bag: Path, tmp_path: Path) -> None:
     content, rng = bag.read_bytes(), np.random.default_rng(5)
     damaged = tmp_path / "damaged.bag"

@@ -221,7 +221,14 @@ def test_what_cannot_be_used_is_told(tmp_path: Path, content: Callable[[Take], N
         list(Ros2Bag(tmp_path / "take").frames())
 
 
-@pytest.mark.parametrize(("name", "complaint"), [("none", "cannot be read"), ("x.mcap", "this is no ROS 2 bag")])
+@pytest.mark.parametrize(
+    ("name", "complaint"),
+    [
+        ("none", "cannot be read"),
+        ("x.mcap", "this is no ROS 2 bag"),
+        ("x.bag", "is a bag of ROS 1; `rosbags-convert --src x.bag --dst x` makes one of ROS 2"),
+    ],
+)
 def test_other_files_are_rejected_with_their_name(tmp_path: Path, name: str, complaint: str) -> None:
     pytest.importorskip("rosbags", reason="needs rosbags: make all")
     if name != "none":
