@@ -21,6 +21,7 @@ from abs_service.tracker.posterior.frame_posterior import FramePosterior
 from abs_service.tracker.posterior.posterior import Posterior
 from abs_service.tracker.posterior.relocation import fit_to_points
 from abs_service.tracker.posterior.uncertainty import Uncertainty
+from abs_service.tracker.terms.agreement import shows_other_colors
 
 #: Frames after a start that are searched from scratch: in the first, nothing is known, and in the second, not how fast
 #: the object moves.
@@ -72,7 +73,8 @@ class Tracker:
         frame = self._posterior.observe(observation, prediction)  # observe: noise models rendered per pixel
         budget = Budget(self._evaluations, in_time if self._frames else _without_end)
         search = self._optimizer.follow if self._frames >= COLD_FRAMES else self._optimizer.explore
-        start = frame.search_start()  # the prediction, or where images show the surface's print
+        # The prediction, or where images show the surface's print.
+        start = frame.search_start() if self._frames >= COLD_FRAMES else frame.cold_start()
         frame, outcome = self._search(frame, search, start, budget)
         for _ in range(MORE_SEARCHES):
             if not outcome.is_start and not frame.motion.is_too_narrow(outcome.theta):
@@ -83,8 +85,12 @@ class Tracker:
 
     def relocate(self, points: NDArray[np.float64]) -> None:
         """Warm start from points (k, 3) [m] of a lost object: the next search begins with the mesh laid over them."""
+        self._restart(fit_to_points(self.model, self._last_tracked, points))
+
+    def _restart(self, theta: NDArray[np.float64]) -> None:
+        """The next search begins at theta (dim,), and nothing is known of the motion."""
         motion = self._posterior.motion
-        motion.restart(fit_to_points(self.model, self._last_tracked, points))
+        motion.restart(theta)
         self._uncertainty.restart(motion.longest_covariance)
         self._frames = 0
 
@@ -123,6 +129,11 @@ class Tracker:
         verdict, reasons = status.judge(
             fits, observation.missing, shape, motion.innovation, self._limits, has_back=self.model.mesh.is_complete
         )
+        if verdict == Status.LOST or shows_other_colors(fits):
+            place = frame.recognized_elsewhere(optimum.theta)
+            if place is not None:
+                self._restart(place)  # the vertices keep their material points
+                verdict, reasons = Status.LOST, (*reasons, status.ELSEWHERE)
         if verdict == Status.TRACKING:
             self._last_tracked = optimum.theta
         return Estimate(

@@ -12,6 +12,7 @@ from abs_service.pairing.observation import Observation
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.terms.base import ObservedTerm, Prediction, Term
+from abs_service.tracker.terms.keypoints import Recognized
 from abs_service.tracker.terms.linearization import Part, PointLinearization
 from abs_service.tracker.terms.patches import Patches
 from abs_service.tracker.terms.sensor_fit import SensorFit
@@ -48,6 +49,11 @@ class ObservedObjective(Protocol):
 
     def match(self, surface: Surface, sparse_jacobian: SparseJacobian, patches: Patches) -> list[PointLinearization]:
         """Residuals of the places in the images where the appearance of a population of one is (`ObservedTerm`)."""
+        ...
+
+    @property
+    def recognized(self) -> list[Recognized]:
+        """Keypoints of the appearance that are recognised in the images that have any (`ObservedTerm`)."""
         ...
 
     def misfit(self, surface: Surface) -> NDArray[np.float64]:
@@ -115,6 +121,11 @@ class ObservedTerms:
     def match(self, surface: Surface, sparse_jacobian: SparseJacobian, patches: Patches) -> list[PointLinearization]:
         """Residuals of the places in the images where the appearance is, of all sensors."""
         return [term.match(surface, sparse_jacobian, patches) for term in self._terms]
+
+    @property
+    def recognized(self) -> list[Recognized]:
+        """Keypoints that are recognised in the images of all sensors that have any."""
+        return [found for term in self._terms if len((found := term.recognized).seen)]
 
     def misfit(self, surface: Surface) -> NDArray[np.float64]:
         """Signed distance of each vertex from its measurements, the largest, and its deviation by noise (2, n) [m]."""

@@ -15,6 +15,7 @@ from abs_service.tracker.models.base import ModelError, SparseJacobian, Surface
 from abs_service.tracker.objectives.base import ObservedTerms, TermSum
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.terms.base import Bounds, Term
+from abs_service.tracker.terms.keypoints import Recognized
 from abs_service.tracker.terms.linearization import Part, PointLinearization
 from abs_service.tracker.terms.patches import Patches
 from abs_service.tracker.terms.sensor_fit import SensorFit
@@ -129,6 +130,11 @@ class ObservedSquares:
     def match(self, surface: Surface, sparse_jacobian: SparseJacobian, patches: Patches) -> list[PointLinearization]:
         """See `ObservedObjective`."""
         return self.terms.match(surface, sparse_jacobian, patches)
+
+    @property
+    def recognized(self) -> list[Recognized]:
+        """See `ObservedObjective`."""
+        return self.terms.recognized
 
     def misfit(self, surface: Surface) -> NDArray[np.float64]:
         """See `ObservedObjective`."""

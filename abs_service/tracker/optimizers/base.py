@@ -40,8 +40,8 @@ class FrameProblem(Protocol):
         """Agreement of every contributing sensor with theta (dim,)."""
         ...
 
-    def elsewhere(self, theta: NDArray[np.float64]) -> NDArray[np.float64] | None:
-        """Parameters (dim,) where images show the surface if that is not at theta (dim,), the end of a search."""
+    def shown_at(self, theta: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        """Parameters (dim,) where images show the surface: theta (dim,), a search's end, or others; None if unknown."""
         ...
 
 

@@ -20,7 +20,7 @@ from abs_service.tracker.optimizers.search.ask_and_tell import (
 )
 from abs_service.tracker.optimizers.search.levenberg_marquardt import descend
 from abs_service.tracker.posterior.curvature import search_metric
-from abs_service.tracker.terms.agreement import disagreeing_colors, outlier_share
+from abs_service.tracker.terms.agreement import disagreeing_colors, distances_share, outlier_share
 from abs_service.tracker.terms.patches import SIZE
 
 #: Minimum step size of CMA-ES at the start of a frame, as a share of the initial one.
@@ -28,6 +28,9 @@ MIN_STEP = 0.5
 
 #: Vertices whose colours disagree: half a patch (`terms.patches`). So many may be beside their print.
 MANY = SIZE // 2
+
+#: Where images show a surface at the end of a search, nothing is sampled if this share of its distances agrees as well.
+DISTANCES = 0.95
 
 #: Weight of a new frame in the running mean of the outlier share.
 MEMORY = 0.03
@@ -90,9 +93,12 @@ class Hybrid:
             self._pauses = Pauses(self._settings.fallback_above)
         elif self._pauses.end_at(share):
             beside = disagreeing_colors(found.fits) >= MANY and not budget.exhausted()
-            if beside and (place := problem.elsewhere(found.theta)) is not None:
+            place = problem.shown_at(found.theta) if beside else None
+            if place is not None and place is not found.theta:
                 return replace(found, theta=place, linearized=None, fits=(), is_start=True)
-            tried = (yield from self._fall_back(problem, start, found, budget)).compared(problem)
+            tried = found
+            if place is None or distances_share(found.fits) < DISTANCES:
+                tried = (yield from self._fall_back(problem, start, found, budget)).compared(problem)
             self._pauses.tried(tried.cost < found.cost, share)
             found = tried
         self._update_mean(outlier_share(found.fits))

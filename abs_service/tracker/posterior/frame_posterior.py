@@ -13,8 +13,10 @@ from abs_service.tracker.posterior.optimum import Optimum
 from abs_service.tracker.posterior.priors.motion_prediction import MotionPrediction
 from abs_service.tracker.posterior.priors.shape_prior import ShapePrior
 from abs_service.tracker.posterior.priors.stretch_prior import StretchPrior
+from abs_service.tracker.posterior.relocation import reached
 from abs_service.tracker.posterior.surfaces import FrameSurfaces
-from abs_service.tracker.terms.patches import Patches, is_beside
+from abs_service.tracker.terms.keypoints import Recognized
+from abs_service.tracker.terms.patches import NEAR_PX, Patches, is_beside
 from abs_service.tracker.terms.photometric.matching import SIGNIFICANT
 from abs_service.tracker.terms.sensor_fit import SensorFit
 
@@ -23,6 +25,12 @@ MATCHING_STEPS = 2
 
 #: Gauss–Newton steps by distances alone.
 DISTANCE_STEPS = 5
+
+#: Gauss–Newton steps to the places of keypoints: beside priors alone, which bring it near, and beside distances.
+FAR_STEPS, RECOGNITION_STEPS = 6, 8
+
+#: A surface is found where most of its keypoints are within this of theirs [px]; a search brings it nearer.
+FOUND_PX = 10.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -99,19 +107,24 @@ class FramePosterior:
         matched = self._matched(predicted)
         return predicted if matched is None or not self._is_better(matched, predicted) else matched
 
-    def elsewhere(self, theta: NDArray[np.float64]) -> NDArray[np.float64] | None:
-        """Place (dim,) where images show the appearance of the mesh if not at theta (dim,), the end of a search.
+    def cold_start(self) -> NDArray[np.float64]:
+        """Start (dim,) of a search after a loss: the same, or where images show keypoints of the mesh."""
+        start, recognized = self.search_start(), self.recognized()
+        return start if recognized is None or not self._is_better(recognized, start) else recognized
+
+    def shown_at(self, theta: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        """Place (dim,) where images show the appearance of the mesh: theta (dim,), the end of a search, or another.
 
         Print is looked for within some pixels: of theta, and of where distances alone would lay the mesh. They bring it
-        nearer after a large motion, since colours beside their print agree by chance, and hold it there.
+        nearer after a large motion, since colours beside their print agree by chance, and hold it there. Keypoints are
+        recognised wherever they are. None if all this finds nothing better, and keypoints do not tell that theta is it.
         """
-        matched = self._matched(theta)
-        if matched is not None and self._is_better(matched, theta):
-            return matched
         without = self._by_distances()
-        matched = self._matched(without)
-        place = without if matched is None else matched
-        return place if self._is_better(place, theta) else None
+        found = (self.recognized(), self._matched(theta), without, self._matched(without))
+        better = [place for place in found if place is not None and self._is_better(place, theta)]
+        if better:
+            return min(better, key=lambda place: _cost(self.allowing(place), place))
+        return theta if self._has_keypoints(theta, NEAR_PX) else None
 
     def misfit(self, surface: Surface) -> NDArray[np.float64]:
         """Signed distance of each vertex from its measurements, and its deviation by noise (2, n) [m]."""
@@ -147,6 +160,40 @@ class FramePosterior:
             theta = theta - solved(quadratic.curvature, quadratic.gradient)
             distances = distances.allowing(theta)
         return theta
+
+    def recognized(self) -> NDArray[np.float64] | None:
+        """Theta (dim,) by keypoints and distances, however far from the prediction; None if keypoints do not tell."""
+        found = self.objective.recognized
+        if not found:
+            return None
+        theta = self._nearest_start(max(found, key=lambda one: len(one.seen)))
+        distances = replace(self._of_distances(), motion=self.motion.around(theta))
+        for step in range(FAR_STEPS + RECOGNITION_STEPS):
+            rows = [one.linearize(*self.surfaces.with_jacobian(theta)) for one in found]
+            beside = distances.prior(theta) if step < FAR_STEPS else distances.linearize(theta).quadratic
+            quadratic = beside + gauss_newton(rows, self.dimension)
+            theta = theta - solved(quadratic.curvature, quadratic.gradient)
+        return theta if self._has_keypoints(theta, FOUND_PX) else None
+
+    def recognized_elsewhere(self, theta: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        """The same if keypoints tell that the surface is not at theta (dim,)."""
+        place = self.recognized()
+        return None if place is None or self._has_keypoints(theta, FOUND_PX) else place
+
+    def _nearest_start(self, found: Recognized) -> NDArray[np.float64]:
+        """The prediction (dim,), or the undeformed mesh rigidly moved, whichever has its keypoints nearer to theirs."""
+        predicted, moved = self.motion.theta, found.moved(self.model.mesh.vertices)
+        if found.apart(self._vertices(predicted)) <= found.apart(moved):
+            return predicted
+        return reached(self.model, self.model.rest, moved)
+
+    def _has_keypoints(self, theta: NDArray[np.float64], within_px: float) -> bool:
+        """True if most keypoints of a mesh at theta (dim,) are recognised within some pixels of theirs."""
+        vertices = self._vertices(theta)
+        return any(found.apart(vertices) < within_px for found in self.objective.recognized)
+
+    def _vertices(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        return self.surfaces.deform(theta[None]).vertices[0].T.astype(np.float64)
 
     def _of_distances(self) -> "FramePosterior":
         """The same priors, without the sensors that measure an appearance."""

@@ -35,7 +35,7 @@ def fit_to_points(
     thinned = points[:: max(1, len(points) // _POINTS)]
     rest = model.mesh.vertices
     before = model.deform(last[None]).vertices[0].T.astype(np.float64)
-    theta = _reached(model, last, _moved(rest, before, thinned))
+    theta = reached(model, last, _moved(rest, before, thinned))
     stretch, shape = StretchPrior(model.mesh, _STRETCH), ShapePrior(model.rest, model.prior)
     tree = scipy.spatial.KDTree(thinned)
     for _ in range(_STEPS):
@@ -67,7 +67,7 @@ def _axes(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.
     return center, axes
 
 
-def _reached(model: DeformationModel, theta: NDArray[np.float64], target: NDArray[np.float64]) -> NDArray[np.float64]:
+def reached(model: DeformationModel, theta: NDArray[np.float64], target: NDArray[np.float64]) -> NDArray[np.float64]:
     """Least-squares parameters (dim,) for target vertices (n, 3) [m]."""
     everywhere = np.arange(len(target))
     for _ in range(_STEPS):

@@ -98,6 +98,12 @@ def disagreeing_colors(fits: Sequence[SensorFit]) -> int:
     return max((fit.counts.disagreeing for fit in _of_appearance(fits)), default=0)
 
 
+def shows_other_colors(fits: Sequence[SensorFit]) -> bool:
+    """True if an image of the appearance disagrees with most of the vertices that it shows."""
+    images = [fit for fit in _of_appearance(fits) if _judged(fit) >= MIN_JUDGED]
+    return any(2 * fit.counts.disagreeing > _judged(fit) for fit in images)
+
+
 def contradicting(fits: Sequence[SensorFit]) -> list[tuple[str, str, float]]:
     """Name, kind of measurement and agreeing share of every sensor that contradicts the mesh.
 

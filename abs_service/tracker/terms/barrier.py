@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from abs_service.pairing.images import BeamReading, Image
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.terms.base import NO_OCCLUDERS, Bounds, Prediction
+from abs_service.tracker.terms.keypoints import NOTHING_RECOGNIZED, Recognized
 from abs_service.tracker.terms.linearization import Part, PointLinearization
 from abs_service.tracker.terms.patches import Patches
 from abs_service.tracker.terms.sensor_fit import SensorFit
@@ -76,6 +77,11 @@ class ObservedBarrier:
     def match(self, surface: Surface, sparse_jacobian: SparseJacobian, patches: Patches) -> PointLinearization:
         """No residuals: there is no appearance."""
         return PointLinearization.empty(sparse_jacobian)
+
+    @property
+    def recognized(self) -> Recognized:
+        """No keypoints: there is no appearance."""
+        return NOTHING_RECOGNIZED
 
     def misfit(self, surface: Surface) -> NDArray[np.float64]:
         """Zero: a beam has no vertex."""

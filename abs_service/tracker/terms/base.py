@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from abs_service.pairing.images import Image
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import AS_MEASURED, Resampling, Synthesis
+from abs_service.tracker.terms.keypoints import Recognized
 from abs_service.tracker.terms.linearization import Part, PointLinearization
 from abs_service.tracker.terms.patches import Patches
 from abs_service.tracker.terms.sensor_fit import SensorFit
@@ -125,6 +126,11 @@ class ObservedTerm(Protocol):
             sparse_jacobian: derivative of its vertices with respect to theta.
             patches: of its vertices, which are looked for one by one.
         """
+        ...
+
+    @property
+    def recognized(self) -> Recognized:
+        """Keypoints of the appearance that are recognised in the image; none without an appearance."""
         ...
 
     def misfit(self, surface: Surface) -> NDArray[np.float64]:

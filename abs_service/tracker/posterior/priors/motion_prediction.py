@@ -92,6 +92,10 @@ class MotionPrediction:
         """The prior that allows for theta (dim,), within the bounds of the settings."""
         return replace(self, speed=self.settings.limited(MARGIN * self._mean_innovation(theta)))
 
+    def around(self, theta: NDArray[np.float64]) -> "MotionPrediction":
+        """The widest prior, around theta (dim,) instead: that of an object which nothing was seen of meanwhile."""
+        return replace(self, theta=theta, speed=self.settings.speed)
+
     def cost(self, thetas: NDArray[np.float64]) -> NDArray[np.float64]:
         """Negative log-density (population,) of parameters (population, dim), up to a constant."""
         return self.metric.squares(thetas, self.theta) / (2 * self._deviation_m**2)

@@ -16,6 +16,7 @@ from abs_service.tracker.terms.depth.outline.base import ObservedOutline
 from abs_service.tracker.terms.depth.pixel_classes import UNKNOWN, PixelClasses
 from abs_service.tracker.terms.depth.texels import Texels
 from abs_service.tracker.terms.gradients import color_rows, depth_rows
+from abs_service.tracker.terms.keypoints import NOTHING_RECOGNIZED, Recognized
 from abs_service.tracker.terms.linearization import Part, PointLinearization, of_anything
 from abs_service.tracker.terms.patches import Patches
 from abs_service.tracker.terms.sensor_fit import Remainder, SensorFit, summarize
@@ -127,6 +128,11 @@ class ObservedDepth:
     def match(self, surface: Surface, sparse_jacobian: SparseJacobian, patches: Patches) -> PointLinearization:
         """Residuals of the outermost vertices, if the outline is beside the mesh; there is no other appearance."""
         return self.outline.match(surface, sparse_jacobian)
+
+    @property
+    def recognized(self) -> Recognized:
+        """No keypoints: distances have none."""
+        return NOTHING_RECOGNIZED
 
     def misfit(self, surface: Surface) -> NDArray[np.float64]:
         """Signed distance of each vertex from its measurement, and the deviation of that by noise (2, n) [m].

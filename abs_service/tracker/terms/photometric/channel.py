@@ -1,7 +1,9 @@
 """Term of a sensor with one value per pixel: grey, Bayer mosaic, amplitude, infrared."""
 
 from dataclasses import replace
+from functools import partial
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,6 +11,7 @@ from abs_service.pairing.images import ChannelImage, Image, limits
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.synthesis.window import NOTHING_HAS, Bordered, corner
 from abs_service.tracker.terms.base import Bounds, Prediction
+from abs_service.tracker.terms.keypoints import Grey, Keypoints
 from abs_service.tracker.terms.photometric.channel_cost import VALUE, copy, fill
 from abs_service.tracker.terms.photometric.illumination import Illumination
 from abs_service.tracker.terms.photometric.observed_channel import ObservedChannel
@@ -48,6 +51,7 @@ class ChannelTerm:
         self._view = synthesizer.view(sensor, appearance)
         self._illumination = illumination
         self._bias = RegistrationBias(self._view.camera)
+        self._keypoints = Keypoints(self._view.camera)
         self._noise = noise
         self._bounds = bounds
         self._registration_noise = registration_noise
@@ -72,6 +76,7 @@ class ChannelTerm:
         seen = view.synthesize(predicted)
         if not is_mosaic:
             self._bias.observe(picture[..., VALUE, None], seen, predicted)
+        shown = picture[..., VALUE] if self._synthesizer.resamples else image.values  # as a whole
         observed = ObservedChannel(
             sensor=self.sensor,
             view=view,
@@ -79,6 +84,7 @@ class ChannelTerm:
             illumination=self._illumination,
             widening=NO_WIDENING,
             bias=self._bias,
+            keypoints=self._keypoints.observe(partial(_grey, shown, is_mosaic), predicted),
             image=picture,
             texture=texture.reshape(-1, 4),
             is_mosaic=is_mosaic,
@@ -87,3 +93,8 @@ class ChannelTerm:
         if len(occluders):
             self._bordered.inside[occluded_pixels(self._view.camera, occluders)[window], VALUE] = np.inf
         return replace(observed, widening=widening)
+
+
+def _grey(values: NDArray[np.float32], is_mosaic: bool) -> Grey:
+    """The values (height, width); of a mosaic, the means of all its channels."""
+    return np.asarray(cv2.blur(values, (2, 2)), np.float32) if is_mosaic else values

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 from functools import partial
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,6 +14,7 @@ from abs_service.tracker.synthesis.base import ObservedView, Resampling, Synthes
 from abs_service.tracker.synthesis.perspective import project_with_jacobian
 from abs_service.tracker.terms.base import NO_OCCLUDERS, Bounds, Prediction, facing
 from abs_service.tracker.terms.gradients import noiseless_color_rows
+from abs_service.tracker.terms.keypoints import Keypoints, ObservedKeypoints, Recognized
 from abs_service.tracker.terms.linearization import Part, PointLinearization, not_longer
 from abs_service.tracker.terms.patches import Patches
 from abs_service.tracker.terms.photometric.color_cost import color_cost, color_residuals
@@ -49,6 +51,7 @@ class ColorTerm:
         self._synthesizer = synthesizer
         self._view = synthesizer.view(sensor, colors)
         self._bias = RegistrationBias(self._view.camera)
+        self._keypoints = Keypoints(self._view.camera)
         self._bounds = bounds
         self._sigma = np.array([[noise.sigma]], np.float32)
         self._constant = bounds.inlier + 3 * (np.log(noise.sigma) + LOG_SQRT_2PI)
@@ -72,6 +75,7 @@ class ColorTerm:
         illumination = Exposed().adapt(self._pixels.at(seen.pixel)[seen.pixel[0]], seen.attributes[0].T)
         if len(occluders):
             self._pixels.cover(occluded_pixels(self._view.camera, occluders))
+        shown = picture if self._synthesizer.resamples else image.rgb  # as a whole
         return ObservedColor(
             sensor=self.sensor,
             view=view,
@@ -80,6 +84,7 @@ class ColorTerm:
             bias=self._bias,
             image=picture,
             pixels=self._pixels,
+            keypoints=self._keypoints.observe(partial(_grey, shown), predicted),
             inverse=np.repeat(inverse, 3 // widening.factor.shape[1], axis=1),
             normalizer=(self._constant + 3 * widening.log.mean(axis=1)).astype(np.float32),
         )
@@ -114,6 +119,7 @@ class ObservedColor:
         bounds: costs of the outlier model.
         illumination: exposure of the image.
         bias: of the registration of edges.
+        keypoints: of the appearance.
         image: colours (height, width, 3) in the view's camera.
         pixels: the same with a border of one pixel, as samples read them.
         inverse: inverse deviations (n or 1, 3) of the samples' colours.
@@ -126,6 +132,7 @@ class ObservedColor:
     bounds: Bounds
     illumination: Exposed
     bias: RegistrationBias
+    keypoints: ObservedKeypoints
     image: NDArray[np.float32] | NDArray[np.uint8]
     pixels: CopiedPixels
     inverse: NDArray[np.float32]
@@ -206,12 +213,18 @@ class ObservedColor:
         seen, costs = self._synthesize(surface), costs_of(color_cost, self._measured)
         return matched(self.view.camera, surface, sparse_jacobian, seen, patches, self.image.shape, costs)
 
+    @property
+    def recognized(self) -> Recognized:
+        """See `ObservedTerm`."""
+        return self.keypoints.recognized
+
     def misfit(self, surface: Surface) -> NDArray[np.float64]:
         """Zero: colours carry no distance."""
         return np.zeros((2, 1))
 
     def learn(self, surface: Surface) -> None:
-        """Learns nothing."""
+        """Learns the keypoints of the first image."""
+        self.keypoints.learn(surface)
 
     def _residuals(self, seen: Synthesis) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Normalised residuals (n, 3), and the sums of their squares (n,); infinite where nothing is measured."""
@@ -219,3 +232,8 @@ class ObservedColor:
         residual, square = np.empty((n, 3)), np.empty(n)
         color_residuals(seen.pixel[0], seen.attributes[0], self.pixels.at(seen.pixel), self.inverse, residual, square)
         return residual, square
+
+
+def _grey(picture: NDArray[np.float32] | NDArray[np.uint8]) -> NDArray[np.float32] | NDArray[np.uint8]:
+    """Luma (height, width) of red, green, blue (height, width, 3)."""
+    return cv2.cvtColor(np.ascontiguousarray(picture), cv2.COLOR_RGB2GRAY)

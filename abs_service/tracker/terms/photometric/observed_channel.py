@@ -11,6 +11,7 @@ from abs_service.tracker.synthesis.base import ObservedView, Synthesis
 from abs_service.tracker.synthesis.perspective import project_with_jacobian
 from abs_service.tracker.terms.base import NO_OCCLUDERS, Bounds, facing
 from abs_service.tracker.terms.gradients import channel_gradients, noiseless_color_rows
+from abs_service.tracker.terms.keypoints import ObservedKeypoints, Recognized
 from abs_service.tracker.terms.linearization import Part, PointLinearization, as_measured, not_longer
 from abs_service.tracker.terms.patches import Patches
 from abs_service.tracker.terms.photometric.channel_cost import CHANNEL, INVERSE, NORMALIZER, VALUE, channel_cost
@@ -33,6 +34,7 @@ class ObservedChannel:
         illumination: light of the frame.
         widening: of the noise, by that of the texture's registration.
         bias: of the registration of edges.
+        keypoints: of the appearance.
         image: texels (height, width, 4) in the view's camera, see `channel_cost`.
         texture: the same with a border of one pixel, flattened (pixels, 4).
         is_mosaic: each pixel shows one of several channels.
@@ -44,6 +46,7 @@ class ObservedChannel:
     illumination: Illumination
     widening: Widening
     bias: RegistrationBias
+    keypoints: ObservedKeypoints
     image: NDArray[np.float32]
     texture: NDArray[np.float32]
     is_mosaic: bool
@@ -132,12 +135,18 @@ class ObservedChannel:
         seen, costs = self._synthesize(surface), costs_of(channel_cost, lambda _: self._measured)
         return matched(self.view.camera, surface, sparse_jacobian, seen, patches, self.image.shape, costs)
 
+    @property
+    def recognized(self) -> Recognized:
+        """See `ObservedTerm`."""
+        return self.keypoints.recognized
+
     def misfit(self, surface: Surface) -> NDArray[np.float64]:
         """Zero: brightness carries no distance."""
         return np.zeros((2, 1))
 
     def learn(self, surface: Surface) -> None:
-        """Learns nothing."""
+        """Learns the keypoints of the first image."""
+        self.keypoints.learn(surface)
 
     def _by_channel(self, seen: Synthesis) -> NDArray[np.float64]:
         """Measured values at each sample (m, channels), NaN in the channels that its pixel does not show."""

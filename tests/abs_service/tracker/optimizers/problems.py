@@ -54,7 +54,7 @@ class Known:
         """See `Problem`."""
         return Quadratic(theta / self.deviation**2, np.eye(self.dimension) / self.deviation**2)
 
-    def elsewhere(self, theta: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    def shown_at(self, theta: NDArray[np.float64]) -> NDArray[np.float64] | None:
         """See `Problem`."""
         return self.shown
 

@@ -7,6 +7,8 @@ import pytest
 
 from abs_service.tracker.optimizers import cma, cma_es, hybrid
 from abs_service.tracker.optimizers.base import Budget, Outcome, Stop
+from abs_service.tracker.terms.sensor_fit import Remainder
+from abs_service.tracker.terms.vertex_counts import VertexCounts
 from tests.abs_service.tracker.optimizers.problems import Known, linear, minimize, two_wells
 
 FAR = np.array([1.5, -1.5, 1.5, -1.5])
@@ -68,6 +70,26 @@ def test_where_images_show_the_surface_another_search_begins_before_cma_es():
     assert found.theta is FAR
     assert budget.evaluations < 20
     assert not found.fits  # those of the end of the descent
+
+
+@pytest.mark.parametrize(("share", "sampled"), [(0.04, False), (0.5, True)])
+def test_nothing_is_sampled_where_images_show_the_surface_at_the_end_of_the_descent_unless_distances_disagree(
+    share, sampled
+):
+    class Here(Known):
+        def shown_at(self, theta):
+            return theta
+
+        def fits(self, theta):
+            (distances,) = super().fits(theta)
+            colors = replace(distances, sensor="color", inliers=40, counts=VertexCounts(agreeing=40, disagreeing=60))
+            return replace(distances, remainder=Remainder(at_first=0.0)), colors
+
+    optimizer = search()
+    explore(optimizer, NEAR)
+    found, budget = follow(optimizer, Here(4, NEAR.residuals, lambda theta: share))
+    assert not found.is_start
+    assert (budget.evaluations > 20) == sampled
 
 
 def test_nothing_is_looked_for_when_the_time_is_up():

@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 
 from abs_service.tracker.posterior.frame_posterior import FramePosterior
-from tests.abs_service.tracking.driving import frame_posterior_of
-from tests.abs_service.tracking.test_session import RIG, SHEET, drive, tracking
+from tests.abs_service.tracking.driving import frame_posterior_of, simulate
+from tests.abs_service.tracking.test_session import RIG, SHEET, drive, rig_of, tracking
+
+#: The same sheet with a print of irregular marks.
+PRINTED = simulate("simulated://sheet?seed=1&texture=paper")
 
 
 @pytest.fixture(scope="module")
@@ -57,14 +60,14 @@ def test_a_print_beside_the_prediction_is_where_the_search_begins(observed, jump
 
 def test_a_search_that_ended_at_the_print_ends_there(observed):
     frame, theta = observed
-    assert predicting(frame, theta).elsewhere(theta) is None
+    assert predicting(frame, theta).shown_at(theta) is None
 
 
 @pytest.mark.parametrize("jump_m", [(0.01, 0, 0), (0, -0.012, 0)])
 def test_a_search_that_ended_beside_the_print_begins_anew_there(observed, jump_m):
     frame, theta = observed
     end = moved(frame, theta, jump_m)
-    start = predicting(frame, end).elsewhere(end)
+    start = predicting(frame, end).shown_at(end)
     assert start is not None
     assert away_m(frame, start, theta) < 0.3 * np.linalg.norm(jump_m)
 
@@ -75,6 +78,36 @@ def test_distances_bring_the_mesh_near_a_print_that_is_out_of_reach(observed, ju
     frame, theta = observed
     predicted = predicting(frame, moved(frame, theta, (0.01, 0.008, 0.01)))
     end = moved(frame, theta, jump_m)
-    start = predicted.elsewhere(end)
+    start = predicted.shown_at(end)
     assert start is not None
     assert away_m(frame, start, theta) < 0.5 * away_m(frame, predicted.motion.theta, theta)
+
+
+@pytest.fixture(scope="module")
+def learnt() -> tuple[FramePosterior, np.ndarray]:
+    """The same after the keypoints of the estimate were learnt."""
+    *_, step = drive(one := tracking(vertices=300), PRINTED, [0, 1])
+    assert one.model is not None
+    exposed = PRINTED.expose(1)[0]
+    frame = frame_posterior_of(one.model, rig_of(PRINTED), exposed, exposed)
+    frame.learn(frame.surfaces.deform(step.estimate.theta[None]))
+    return frame, step.estimate.theta
+
+
+@pytest.mark.parametrize("jump_m", [(0.15, -0.1, 0), (-0.2, 0.05, 0.1)])
+def test_a_print_is_recognised_however_far_it_is_from_the_prediction(learnt, jump_m):
+    frame, theta = learnt
+    far = predicting(frame, moved(frame, theta, jump_m))
+    place = far.recognized()
+    assert place is not None
+    assert away_m(frame, place, theta) < 0.004
+    assert away_m(frame, far.cold_start(), theta) < 0.004
+
+
+def test_keypoints_tell_that_a_search_has_ended_where_the_print_is(learnt):
+    frame, theta = learnt
+    assert predicting(frame, theta).shown_at(theta) is theta
+
+
+def test_without_keypoints_nothing_is_recognised(observed):
+    assert observed[0].recognized() is None
