@@ -31,6 +31,10 @@ COLD_FRAMES = 2
 MORE_SEARCHES = 2
 
 
+#: The object has come back, or has moved further than objects do, and is in sight.
+ELSEWHERE = "the keypoints of its print are seen elsewhere in the image – the next search begins there"
+
+
 class Tracker:
     """Finds the parameters Θ of the largest posterior density for each observation.
 
@@ -133,7 +137,7 @@ class Tracker:
             place = frame.recognized_elsewhere(optimum.theta)
             if place is not None:
                 self._restart(place)  # the vertices keep their material points
-                verdict, reasons = Status.LOST, (*reasons, status.ELSEWHERE)
+                verdict, reasons = Status.LOST, (*reasons, ELSEWHERE)
         if verdict == Status.TRACKING:
             self._last_tracked = optimum.theta
         return Estimate(

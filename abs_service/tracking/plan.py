@@ -27,7 +27,7 @@ from abs_service.tracker.posterior.priors.motion_prior import MotionPrior
 from abs_service.tracker.posterior.priors.shape_prior import ShapePrior
 from abs_service.tracker.posterior.priors.stretch_prior import StretchPrior
 from abs_service.tracker.synthesis.base import Synthesizer
-from abs_service.tracker.terms.patches import patches_of
+from abs_service.tracker.terms.places.patches import patches_of
 from abs_service.tracker.tracker import Tracker
 from abs_service.tracking.monitors import loss_monitor
 from abs_service.tracking.offsets.vertex_offsets import Settings as VertexOffsetSettings

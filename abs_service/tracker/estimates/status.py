@@ -175,9 +175,6 @@ _FOLLOW = (
 )
 _FIND = "bring the object back into sight; it is looked for again, at once by abs-service reinitialize"
 
-#: The object has come back, or has moved further than objects do, and is in sight.
-ELSEWHERE = "the keypoints of its print are seen elsewhere in the image – the next search begins there"
-
 #: Without any measurement, the object may be in sight or not.
 _UNMEASURED = "no sensor delivered all its images, so that nothing was measured – see what unused.* of health counts"
 

@@ -12,9 +12,9 @@ from abs_service.pairing.observation import Observation
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.terms.base import ObservedTerm, Prediction, Term
-from abs_service.tracker.terms.keypoints import Recognized
 from abs_service.tracker.terms.linearization import Part, PointLinearization
-from abs_service.tracker.terms.patches import Patches
+from abs_service.tracker.terms.places.keypoints import Recognized
+from abs_service.tracker.terms.places.patches import Patches
 from abs_service.tracker.terms.sensor_fit import SensorFit
 
 

@@ -15,9 +15,9 @@ from abs_service.tracker.models.base import ModelError, SparseJacobian, Surface
 from abs_service.tracker.objectives.base import ObservedTerms, TermSum
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.terms.base import Bounds, Term
-from abs_service.tracker.terms.keypoints import Recognized
 from abs_service.tracker.terms.linearization import Part, PointLinearization
-from abs_service.tracker.terms.patches import Patches
+from abs_service.tracker.terms.places.keypoints import Recognized
+from abs_service.tracker.terms.places.patches import Patches
 from abs_service.tracker.terms.sensor_fit import SensorFit
 from calib.no_return import NEVER
 from calib.noise.base import LOG_SQRT_2PI, DepthNoise

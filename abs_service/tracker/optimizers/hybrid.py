@@ -21,12 +21,12 @@ from abs_service.tracker.optimizers.search.ask_and_tell import (
 from abs_service.tracker.optimizers.search.levenberg_marquardt import descend
 from abs_service.tracker.posterior.curvature import search_metric
 from abs_service.tracker.terms.agreement import disagreeing_colors, distances_share, outlier_share
-from abs_service.tracker.terms.patches import SIZE
+from abs_service.tracker.terms.places.patches import SIZE
 
 #: Minimum step size of CMA-ES at the start of a frame, as a share of the initial one.
 MIN_STEP = 0.5
 
-#: Vertices whose colours disagree: half a patch (`terms.patches`). So many may be beside their print.
+#: Vertices whose colours disagree: half a patch (`terms.places.patches`). So many may be beside their print.
 MANY = SIZE // 2
 
 #: Where images show a surface at the end of a search, nothing is sampled if this share of its distances agrees as well.

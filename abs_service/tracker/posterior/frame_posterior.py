@@ -15,9 +15,9 @@ from abs_service.tracker.posterior.priors.shape_prior import ShapePrior
 from abs_service.tracker.posterior.priors.stretch_prior import StretchPrior
 from abs_service.tracker.posterior.relocation import reached
 from abs_service.tracker.posterior.surfaces import FrameSurfaces
-from abs_service.tracker.terms.keypoints import Recognized
-from abs_service.tracker.terms.patches import NEAR_PX, Patches, is_beside
 from abs_service.tracker.terms.photometric.matching import SIGNIFICANT
+from abs_service.tracker.terms.places.keypoints import Recognized
+from abs_service.tracker.terms.places.patches import Patches, is_beside
 from abs_service.tracker.terms.sensor_fit import SensorFit
 
 #: Gauss–Newton steps to the places of the appearance: under the motion prior, and under one that allows for the first.
@@ -29,8 +29,9 @@ DISTANCE_STEPS = 5
 #: Gauss–Newton steps to the places of keypoints: beside priors alone, which bring it near, and beside distances.
 FAR_STEPS, RECOGNITION_STEPS = 6, 8
 
-#: A surface is found where most of its keypoints are within this of theirs [px]; a search brings it nearer.
-FOUND_PX = 10.0
+#: A surface is found where most of its keypoints are within this of theirs [px]; a search brings it nearer. And it has
+#: been found if they are within a pixel.
+FOUND_PX, THERE_PX = 10.0, 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -124,7 +125,7 @@ class FramePosterior:
         better = [place for place in found if place is not None and self._is_better(place, theta)]
         if better:
             return min(better, key=lambda place: _cost(self.allowing(place), place))
-        return theta if self._has_keypoints(theta, NEAR_PX) else None
+        return theta if self._has_keypoints(theta, THERE_PX) else None
 
     def misfit(self, surface: Surface) -> NDArray[np.float64]:
         """Signed distance of each vertex from its measurements, and its deviation by noise (2, n) [m]."""

@@ -11,7 +11,7 @@ from abs_service.tracker.posterior.priors.motion_prior import MotionPrior
 from abs_service.tracker.posterior.priors.shape_prior import ShapePrior
 from abs_service.tracker.posterior.priors.stretch_prior import StretchPrior
 from abs_service.tracker.posterior.surfaces import FrameSurfaces
-from abs_service.tracker.terms.patches import Patches
+from abs_service.tracker.terms.places.patches import Patches
 
 
 @dataclass(frozen=True, slots=True, eq=False)

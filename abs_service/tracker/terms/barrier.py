@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from abs_service.pairing.images import BeamReading, Image
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.terms.base import NO_OCCLUDERS, Bounds, Prediction
-from abs_service.tracker.terms.keypoints import NOTHING_RECOGNIZED, Recognized
 from abs_service.tracker.terms.linearization import Part, PointLinearization
-from abs_service.tracker.terms.patches import Patches
+from abs_service.tracker.terms.places.keypoints import NOTHING_RECOGNIZED, Recognized
+from abs_service.tracker.terms.places.patches import Patches
 from abs_service.tracker.terms.sensor_fit import SensorFit
 from calib.camera import Camera
 from calib.jit import kernel

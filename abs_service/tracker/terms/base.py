@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from abs_service.pairing.images import Image
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import AS_MEASURED, Resampling, Synthesis
-from abs_service.tracker.terms.keypoints import Recognized
 from abs_service.tracker.terms.linearization import Part, PointLinearization
-from abs_service.tracker.terms.patches import Patches
+from abs_service.tracker.terms.places.keypoints import Recognized
+from abs_service.tracker.terms.places.patches import Patches
 from abs_service.tracker.terms.sensor_fit import SensorFit
 from calib.jit import kernel
 from calib.no_return import CAUTIOUS, NoReturn

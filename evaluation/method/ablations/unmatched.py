@@ -11,7 +11,7 @@ from abs_service.tracker.objectives import likelihood
 from abs_service.tracker.objectives.base import Objective, ObservedObjective
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.terms.linearization import PointLinearization
-from abs_service.tracker.terms.patches import Patches
+from abs_service.tracker.terms.places.patches import Patches
 from calib.rig import Rig
 
 

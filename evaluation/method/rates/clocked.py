@@ -37,9 +37,9 @@ class Clocked:
         """See `FrameProblem`."""
         return self._clocked(lambda: self.problem.fits(theta))
 
-    def elsewhere(self, theta: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    def shown_at(self, theta: NDArray[np.float64]) -> NDArray[np.float64] | None:
         """See `FrameProblem`."""
-        return self._clocked(lambda: self.problem.elsewhere(theta))
+        return self._clocked(lambda: self.problem.shown_at(theta))
 
     def _clocked(self, ask: Callable[[], Answer]) -> Answer:
         begin = time.thread_time()

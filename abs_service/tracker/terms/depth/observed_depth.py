@@ -16,9 +16,9 @@ from abs_service.tracker.terms.depth.outline.base import ObservedOutline
 from abs_service.tracker.terms.depth.pixel_classes import UNKNOWN, PixelClasses
 from abs_service.tracker.terms.depth.texels import Texels
 from abs_service.tracker.terms.gradients import color_rows, depth_rows
-from abs_service.tracker.terms.keypoints import NOTHING_RECOGNIZED, Recognized
 from abs_service.tracker.terms.linearization import Part, PointLinearization, of_anything
-from abs_service.tracker.terms.patches import Patches
+from abs_service.tracker.terms.places.keypoints import NOTHING_RECOGNIZED, Recognized
+from abs_service.tracker.terms.places.patches import Patches
 from abs_service.tracker.terms.sensor_fit import Remainder, SensorFit, summarize
 from calib.jit import kernel
 

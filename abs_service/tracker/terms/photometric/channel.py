@@ -11,7 +11,6 @@ from abs_service.pairing.images import ChannelImage, Image, limits
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.synthesis.window import NOTHING_HAS, Bordered, corner
 from abs_service.tracker.terms.base import Bounds, Prediction
-from abs_service.tracker.terms.keypoints import Grey, Keypoints
 from abs_service.tracker.terms.photometric.channel_cost import VALUE, copy, fill
 from abs_service.tracker.terms.photometric.illumination import Illumination
 from abs_service.tracker.terms.photometric.observed_channel import ObservedChannel
@@ -22,6 +21,7 @@ from abs_service.tracker.terms.photometric.texture_registration_noise import (
     NO_WIDENING,
     TextureRegistrationNoise,
 )
+from abs_service.tracker.terms.places.keypoints import Grey, Keypoints
 from calib.noise.base import LOG_SQRT_2PI, ImageNoise
 
 #: The texel of no measurement.

@@ -14,9 +14,7 @@ from abs_service.tracker.synthesis.base import ObservedView, Resampling, Synthes
 from abs_service.tracker.synthesis.perspective import project_with_jacobian
 from abs_service.tracker.terms.base import NO_OCCLUDERS, Bounds, Prediction, facing
 from abs_service.tracker.terms.gradients import noiseless_color_rows
-from abs_service.tracker.terms.keypoints import Keypoints, ObservedKeypoints, Recognized
 from abs_service.tracker.terms.linearization import Part, PointLinearization, not_longer
-from abs_service.tracker.terms.patches import Patches
 from abs_service.tracker.terms.photometric.color_cost import color_cost, color_residuals
 from abs_service.tracker.terms.photometric.copied_pixels import CopiedPixels
 from abs_service.tracker.terms.photometric.illumination import Exposed
@@ -27,6 +25,8 @@ from abs_service.tracker.terms.photometric.texture_registration_noise import (
     NO_REGISTRATION_NOISE,
     TextureRegistrationNoise,
 )
+from abs_service.tracker.terms.places.keypoints import Grey, Keypoints, ObservedKeypoints, Recognized
+from abs_service.tracker.terms.places.patches import Patches
 from abs_service.tracker.terms.sensor_fit import SensorFit, summarize
 from abs_service.tracker.terms.vertex_counts import VertexMasks
 from calib.noise.base import LOG_SQRT_2PI
@@ -234,6 +234,7 @@ class ObservedColor:
         return residual, square
 
 
-def _grey(picture: NDArray[np.float32] | NDArray[np.uint8]) -> NDArray[np.float32] | NDArray[np.uint8]:
+def _grey(picture: NDArray[np.float32] | NDArray[np.uint8]) -> Grey:
     """Luma (height, width) of red, green, blue (height, width, 3)."""
-    return cv2.cvtColor(np.ascontiguousarray(picture), cv2.COLOR_RGB2GRAY)
+    grey = cv2.cvtColor(np.ascontiguousarray(picture), cv2.COLOR_RGB2GRAY)
+    return np.asarray(grey, np.uint8) if picture.dtype == np.uint8 else np.asarray(grey, np.float32)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import Synthesis
 from abs_service.tracker.terms.linearization import PointLinearization
-from abs_service.tracker.terms.patches import NEAR_PX, Patches, found_at
+from abs_service.tracker.terms.places.patches import NEAR_PX, Patches, found_at
 from calib.camera import Camera
 
 #: Largest shift of a patch to the right or down [px], and largest number of its samples that are compared.

@@ -11,14 +11,14 @@ from abs_service.tracker.synthesis.base import ObservedView, Synthesis
 from abs_service.tracker.synthesis.perspective import project_with_jacobian
 from abs_service.tracker.terms.base import NO_OCCLUDERS, Bounds, facing
 from abs_service.tracker.terms.gradients import channel_gradients, noiseless_color_rows
-from abs_service.tracker.terms.keypoints import ObservedKeypoints, Recognized
 from abs_service.tracker.terms.linearization import Part, PointLinearization, as_measured, not_longer
-from abs_service.tracker.terms.patches import Patches
 from abs_service.tracker.terms.photometric.channel_cost import CHANNEL, INVERSE, NORMALIZER, VALUE, channel_cost
 from abs_service.tracker.terms.photometric.illumination import Illumination
 from abs_service.tracker.terms.photometric.matching import Measured, costs_of, matched
 from abs_service.tracker.terms.photometric.registration_bias import RegistrationBias
 from abs_service.tracker.terms.photometric.texture_registration_noise import Widening
+from abs_service.tracker.terms.places.keypoints import ObservedKeypoints, Recognized
+from abs_service.tracker.terms.places.patches import Patches
 from abs_service.tracker.terms.sensor_fit import SensorFit, summarize
 from abs_service.tracker.terms.vertex_counts import VertexMasks
 

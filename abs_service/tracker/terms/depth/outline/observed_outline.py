@@ -18,7 +18,7 @@ from abs_service.tracker.terms.depth.outline.rim_motion import by_side, displace
 from abs_service.tracker.terms.depth.outline.rim_normal import across_rim
 from abs_service.tracker.terms.depth.outline.round_outline import without_turn
 from abs_service.tracker.terms.linearization import Linearization, PointLinearization
-from abs_service.tracker.terms.patches import found_at
+from abs_service.tracker.terms.places.patches import found_at
 from abs_service.tracker.terms.sensor_fit import RimFit
 
 #: Fewer vertices that hang over the outline, where the object went on at first, may be strays.

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from abs_service.tracker.terms.depth.outline.rim import Look
 from abs_service.tracker.terms.depth.outline.rim_motion import MIN_EXPLAINED, MIN_OF_A_SIDE, MIN_SHOWN, shown_by
 from abs_service.tracker.terms.median import median
-from abs_service.tracker.terms.patches import NEAR_PX
+from abs_service.tracker.terms.places.patches import NEAR_PX
 
 #: Number of steps of the registration.
 STEPS = 12

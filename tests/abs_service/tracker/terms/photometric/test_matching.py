@@ -11,11 +11,11 @@ from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.objectives import likelihood
 from abs_service.tracker.terms.base import Prediction, Term
 from abs_service.tracker.terms.linearization import PointLinearization
-from abs_service.tracker.terms.patches import MAX_PATCHES, SIGMA_PX, SIZE, is_beside, patches_of
 from abs_service.tracker.terms.photometric.channel import ChannelTerm
 from abs_service.tracker.terms.photometric.color import ColorTerm
 from abs_service.tracker.terms.photometric.illumination import Passive
 from abs_service.tracker.terms.photometric.matching import REACH_PX
+from abs_service.tracker.terms.places.patches import MAX_PATCHES, SIGMA_PX, SIZE, is_beside, patches_of
 from calib.camera import Camera
 from calib.noise.images.color import GaussianColor
 from calib.noise.images.grey import GaussianGrey

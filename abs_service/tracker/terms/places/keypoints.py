@@ -100,7 +100,7 @@ class ObservedKeypoints:
 
     @cached_property
     def recognized(self) -> "Recognized":
-        """Those that are recognised in the image."""
+        """The keypoints that are recognised in the image."""
         camera, known = self._keypoints.camera, self._keypoints.known
         if len(known.descriptors) < MIN_RECOGNIZED:
             return NOTHING_RECOGNIZED
@@ -227,7 +227,7 @@ def _as_levels(grey: Grey) -> NDArray[np.uint8]:
 
 
 def _bound(found: NDArray[np.float64], descriptors: NDArray[np.float32], places: NDArray[np.float64]) -> Described:
-    """Those keypoints at pixels (k, 2) that lie on a mesh, as means of the vertices around them.
+    """The keypoints at pixels (k, 2) that lie on a mesh, as means of the vertices around them.
 
     Args:
         found: the keypoints.

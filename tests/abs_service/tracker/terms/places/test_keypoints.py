@@ -1,6 +1,7 @@
 """Keypoints of a print are recognised however it has moved and turned, and nothing is recognised without one."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.models.rigid import Rigid
-from abs_service.tracker.terms.keypoints import (
+from abs_service.tracker.terms.places.keypoints import (
     MIN_RECOGNIZED,
     NOTHING_RECOGNIZED,
     SIGMA_PX,
@@ -69,6 +70,14 @@ def test_a_print_that_has_moved_turned_and_come_nearer_is_recognised(kind: Calla
     assert found.apart(there) < 0.7
     assert found.apart(MESH.vertices) > 15
     np.testing.assert_allclose(found.moved(MESH.vertices), there, atol=0.004)
+
+
+def test_a_camera_of_a_rig_sees_the_rigid_motion_in_the_rig():
+    T_rs, T = pose.from_rotation_vector((0.2, -0.3, 0.1), (0.4, 0.1, -0.2)), moved(2.2, 0.02, 1.0)
+    found = recognized(picture := blobs(1), shown(picture, T))
+    of_rig = replace(found, camera=replace(CAMERA, T_rs=T_rs))
+    before, there = (pose.transform(T_rs, vertices) for vertices in (MESH.vertices, pose.transform(T, MESH.vertices)))
+    np.testing.assert_allclose(of_rig.moved(before), there, atol=0.004)
 
 
 def test_nothing_is_recognised_without_a_print_in_another_one_and_before_any_is_known():

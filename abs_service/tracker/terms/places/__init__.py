@@ -1,0 +1,1 @@
+"""Places in an image of the appearance of a mesh: of patches nearby, of keypoints anywhere."""
