@@ -11,6 +11,7 @@ from abs_service.tracker.objectives import likelihood
 from abs_service.tracker.objectives.base import Objective, ObservedObjective
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.terms.linearization import PointLinearization
+from abs_service.tracker.terms.places.keypoints import Recognized
 from abs_service.tracker.terms.places.patches import Patches
 from calib.rig import Rig
 
@@ -52,4 +53,9 @@ class ObservedUnmatched:
 
     def match(self, surface: Surface, sparse_jacobian: SparseJacobian, patches: Patches) -> list[PointLinearization]:
         """No matches."""
+        return []
+
+    @property
+    def recognized(self) -> list[Recognized]:
+        """No keypoints."""
         return []

@@ -96,7 +96,7 @@ def test_a_mesh_that_is_made_anew_where_it_does_not_fit_is_named():
     ]
 
 
-@pytest.mark.parametrize(
+BACK = pytest.mark.parametrize(
     "back",
     [
         thing(0.3, 0.2, place=(0.12, 0.08, 1.1), turn=(0.0, 0.0, np.deg2rad(30))),
@@ -104,11 +104,25 @@ def test_a_mesh_that_is_made_anew_where_it_does_not_fit_is_named():
     ],
     ids=["moved", "bent"],
 )
-def test_the_same_sheet_is_found_at_the_first_attempt(back):
-    steps, meshes = swapped(back)
+
+
+@BACK
+def test_a_sheet_without_a_print_is_found_at_the_first_attempt(back):
+    plain = dataclasses.replace(back, texture=GREY)
+    steps, meshes = swapped(plain, sheet=dataclasses.replace(SHEET, texture=GREY))
     statuses = [step.estimate.status for step in steps]
     assert meshes == 2
     lost = statuses.index(Status.LOST)
     assert statuses[-1] == Status.TRACKING
     assert statuses.index(Status.TRACKING, lost) <= lost + 6  # three frames LOST, two DEGRADED
     assert "found again, a new mesh was made 1 of 3 estimates ago" in steps[lost + 3].estimate.reasons
+
+
+@BACK
+def test_a_print_is_recognised_before_any_attempt_and_keeps_its_mesh(back):
+    steps, meshes = swapped(back)
+    statuses = [step.estimate.status for step in steps]
+    assert meshes == 1
+    lost = statuses.index(Status.LOST)
+    assert any("keypoints of its print are seen elsewhere" in reason for reason in steps[lost].estimate.reasons)
+    assert statuses[lost + 1 :] == [Status.DEGRADED] * 2 + [Status.TRACKING] * (COUNT - lost - 3)
