@@ -21,6 +21,7 @@ SIMULATION = simulate("simulated://sheet?seed=1&speed=0&color=160x120")
 SHEET = SIMULATION.scene.surfaces[0].at(0)
 assert isinstance(SHEET, PlacedRectangle)
 GREY = Texture(np.full((2, 2, 4), 0.5, np.float32), 1.0)
+PLAIN = dataclasses.replace(SHEET, texture=GREY)
 NEAREST, QUICK = nearest.Settings(), cma.Settings(generations=2)
 #: Exposure from which something else is in sight, and number of exposures.
 SWAPPED, COUNT = 3, 16
@@ -108,8 +109,7 @@ BACK = pytest.mark.parametrize(
 
 @BACK
 def test_a_sheet_without_a_print_is_found_at_the_first_attempt(back):
-    plain = dataclasses.replace(back, texture=GREY)
-    steps, meshes = swapped(plain, sheet=dataclasses.replace(SHEET, texture=GREY))
+    steps, meshes = swapped(dataclasses.replace(back, texture=GREY), sheet=PLAIN)
     statuses = [step.estimate.status for step in steps]
     assert meshes == 2
     lost = statuses.index(Status.LOST)
