@@ -1,5 +1,6 @@
 """The cost of theta for one frame: likelihood of its measurements times the priors (eq. 16)."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,7 +17,7 @@ from abs_service.tracker.posterior.priors.stretch_prior import StretchPrior
 from abs_service.tracker.posterior.relocation import reached
 from abs_service.tracker.posterior.surfaces import FrameSurfaces
 from abs_service.tracker.terms.photometric.matching import SIGNIFICANT
-from abs_service.tracker.terms.places.keypoints import Recognized
+from abs_service.tracker.terms.places.keypoints import RIGID_PX, Recognized
 from abs_service.tracker.terms.places.patches import Patches, is_beside
 from abs_service.tracker.terms.sensor_fit import SensorFit
 
@@ -168,13 +169,21 @@ class FramePosterior:
         if not found:
             return None
         theta = self._nearest_start(max(found, key=lambda one: len(one.seen)))
+        try:
+            theta = self._fitted(theta, found)
+        except np.linalg.LinAlgError:  # wrong matches lead anywhere
+            return None
+        return theta if self._has_keypoints(theta, FOUND_PX) else None
+
+    def _fitted(self, theta: NDArray[np.float64], found: Sequence[Recognized]) -> NDArray[np.float64]:
+        """Theta (dim,) by keypoints, priors and at last distances, from a start (dim,) on."""
         distances = replace(self._of_distances(), motion=self.motion.around(theta))
         for step in range(FAR_STEPS + RECOGNITION_STEPS):
             rows = [one.linearize(*self.surfaces.with_jacobian(theta)) for one in found]
             beside = distances.prior(theta) if step < FAR_STEPS else distances.linearize(theta).quadratic
             quadratic = beside + gauss_newton(rows, self.dimension)
             theta = theta - solved(quadratic.curvature, quadratic.gradient)
-        return theta if self._has_keypoints(theta, FOUND_PX) else None
+        return theta
 
     def recognized_elsewhere(self, theta: NDArray[np.float64]) -> NDArray[np.float64] | None:
         """The same if keypoints tell that the surface is not at theta (dim,)."""
@@ -184,7 +193,7 @@ class FramePosterior:
     def _nearest_start(self, found: Recognized) -> NDArray[np.float64]:
         """The prediction (dim,), or the undeformed mesh rigidly moved, whichever has its keypoints nearer to theirs."""
         predicted, moved = self.motion.theta, found.moved(self.model.mesh.vertices)
-        if found.apart(self._vertices(predicted)) <= found.apart(moved):
+        if min(found.apart(self._vertices(predicted)), RIGID_PX) <= found.apart(moved):
             return predicted
         return reached(self.model, self.model.rest, moved)
 

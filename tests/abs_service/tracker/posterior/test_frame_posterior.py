@@ -1,11 +1,13 @@
 """A search begins where images show the print of the mesh."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 
+from abs_service.tracker.objectives.base import ObservedObjective
 from abs_service.tracker.posterior.frame_posterior import FramePosterior
+from abs_service.tracker.terms.places.keypoints import Recognized
 from tests.abs_service.tracking.driving import frame_posterior_of, simulate
 from tests.abs_service.tracking.test_session import RIG, SHEET, drive, rig_of, tracking
 
@@ -111,3 +113,29 @@ def test_keypoints_tell_that_a_search_has_ended_where_the_print_is(learnt):
 
 def test_without_keypoints_nothing_is_recognised(observed):
     assert observed[0].recognized() is None
+
+
+@dataclass(frozen=True)
+class WrongMatches:
+    """The objective of a frame in which all keypoints are taken for others."""
+
+    objective: ObservedObjective
+    seed: int
+
+    @property
+    def recognized(self) -> list[Recognized]:
+        (found,) = self.objective.recognized
+        rng, few = np.random.default_rng(self.seed), np.s_[:14]
+        seen = rng.uniform((0, 0), (found.camera.width, found.camera.height), (14, 2))
+        return [replace(found, corners=found.corners[few], weights=found.weights[few], seen=seen)]
+
+    def __getattr__(self, name: str) -> object:
+        return getattr(self.objective, name)
+
+
+def test_wrong_matches_are_no_place(learnt):
+    frame, theta = learnt
+    for seed in range(40):
+        wrong = replace(predicting(frame, theta), objective=WrongMatches(frame.objective, seed))
+        assert wrong.recognized() is None
+        assert wrong.recognized_elsewhere(theta) is None
