@@ -32,13 +32,6 @@ except SdkMissingError as error:
 
 
 @pytest.fixture
-def camera() -> Iterator[SoftwareCamera]:
-    software = SoftwareCamera()
-    yield software
-    software.halt()
-
-
-@pytest.fixture
 def device(camera: SoftwareCamera) -> Iterator[RealsenseDevice]:
     opened = of_device(rs, camera.device, device_info(rs, camera.device), time.monotonic_ns)
     yield opened

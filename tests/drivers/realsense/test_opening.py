@@ -1,7 +1,6 @@
 """Opening RealSense cameras: addresses, and cameras that are not there or unplugged meanwhile."""
 
 import time
-from collections.abc import Iterator
 from types import SimpleNamespace
 
 import pytest
@@ -16,13 +15,6 @@ try:
     rs = library.load()
 except SdkMissingError as error:
     pytest.skip(f"{error}, or  make all", allow_module_level=True)
-
-
-@pytest.fixture
-def camera() -> Iterator[SoftwareCamera]:
-    software = SoftwareCamera()
-    yield software
-    software.halt()
 
 
 @pytest.mark.parametrize(
