@@ -1,11 +1,12 @@
 """The cost of theta for one frame: likelihood of its measurements times the priors (eq. 16)."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from abs_service.tracker.memo import Memo
 from abs_service.tracker.models.base import DeformationModel, SparseJacobian, Surface
 from abs_service.tracker.objectives.base import ObservedObjective
 from abs_service.tracker.posterior.curvature import Quadratic, gauss_newton, posterior_covariance, solved
@@ -41,6 +42,7 @@ class FramePosterior:
 
     Attributes:
         patches: of the vertices, whose appearance is looked for.
+        recognitions: places of keypoints by objective and prediction.
     """
 
     model: DeformationModel
@@ -50,6 +52,9 @@ class FramePosterior:
     motion: MotionPrediction
     surfaces: FrameSurfaces
     patches: Patches
+    recognitions: Memo[tuple[ObservedObjective, bytes], NDArray[np.float64] | None] = field(
+        default_factory=Memo[tuple[ObservedObjective, bytes], NDArray[np.float64] | None]
+    )
 
     @property
     def dimension(self) -> int:
@@ -165,6 +170,10 @@ class FramePosterior:
 
     def recognized(self) -> NDArray[np.float64] | None:
         """Theta (dim,) by keypoints and distances, however far from the prediction; None if keypoints do not tell."""
+        # The width of the motion prior has no part in it, so all searches of a frame have the same.
+        return self.recognitions.get((self.objective, self.motion.theta.tobytes()), lambda key: self._recognized())
+
+    def _recognized(self) -> NDArray[np.float64] | None:
         found = self.objective.recognized
         if not found:
             return None

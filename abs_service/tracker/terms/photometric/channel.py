@@ -84,7 +84,7 @@ class ChannelTerm:
             illumination=self._illumination,
             widening=NO_WIDENING,
             bias=self._bias,
-            keypoints=self._keypoints.observe(partial(_grey, shown, is_mosaic), predicted),
+            keypoints=self._keypoints.observe(partial(_means if is_mosaic else np.asarray, shown), predicted),
             image=picture,
             texture=texture.reshape(-1, 4),
             is_mosaic=is_mosaic,
@@ -95,6 +95,6 @@ class ChannelTerm:
         return replace(observed, widening=widening)
 
 
-def _grey(values: NDArray[np.float32], is_mosaic: bool) -> Grey:
-    """The values (height, width); of a mosaic, the means of all its channels."""
-    return np.asarray(cv2.blur(values, (2, 2)), np.float32) if is_mosaic else values
+def _means(mosaic: NDArray[np.float32]) -> Grey:
+    """Means (height, width) of all channels of a mosaic."""
+    return np.asarray(cv2.blur(mosaic, (2, 2)), np.float32)

@@ -158,7 +158,7 @@ class Recognized:
         if not found:
             return np.full_like(vertices, np.nan)
         T_sm = pose.from_rotation_vector(rotation.ravel(), shift.ravel())
-        return pose.transform(pose.inverse(self.camera.T_sr) @ T_sm, vertices)
+        return pose.transform(self.camera.T_rs @ T_sm, vertices)
 
     def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> PointLinearization:
         """Residuals of the places of a population of one, two for each keypoint.
