@@ -69,12 +69,41 @@ class ObservedObjective(Protocol):
         ...
 
 
+class Feedback(Protocol):
+    """Information of an estimate on the sensors."""
+
+    def fits(self, terms: Sequence[ObservedTerm], surface: Surface) -> list[SensorFit]:
+        """Agreement of the sensor of every term with a population of one."""
+        ...
+
+    def learn(self, terms: Sequence[ObservedTerm], surface: Surface) -> None:
+        """Takes the estimate in, a population of one."""
+        ...
+
+
+class NoiseFeedback:
+    """Feedback to noise models: residuals tell whether they are right, and what to correct."""
+
+    def fits(self, terms: Sequence[ObservedTerm], surface: Surface) -> list[SensorFit]:
+        """The agreement as every term has it."""
+        return [term.fit(surface) for term in terms]
+
+    def learn(self, terms: Sequence[ObservedTerm], surface: Surface) -> None:
+        """Passes the estimate to every term."""
+        for term in terms:
+            term.learn(surface)
+
+
+_OF_NOISE = NoiseFeedback()
+
+
 class TermSum:
     """The sum of all sensors' terms (eq. 16); a sensor without a frame contributes zero."""
 
-    def __init__(self, synthesizer: Synthesizer, terms: Sequence[Term]):
+    def __init__(self, synthesizer: Synthesizer, terms: Sequence[Term], feedback: Feedback = _OF_NOISE):
         self._synthesizer = synthesizer
         self._terms = terms
+        self._feedback = feedback
         self._frames = 0
 
     def observe(self, observation: Observation, predicted: Surface, reach_m: float = np.inf) -> "ObservedTerms":
@@ -87,7 +116,8 @@ class TermSum:
             prediction = replace(prediction, occluders=np.concatenate([prediction.occluders, found.occluders]))
         self._frames = frame = self._frames + 1
         distances = [observed[term.sensor] for term in terms if term.finds_occluders]
-        return ObservedTerms([observed[term.sensor] for term in terms], distances, lambda: self._frames == frame)
+        everything = [observed[term.sensor] for term in terms]
+        return ObservedTerms(everything, distances, self._feedback, lambda: self._frames == frame)
 
 
 class ObservedTerms:
@@ -96,12 +126,20 @@ class ObservedTerms:
     Args:
         terms: one of every sensor.
         distances: those among them of the sensors that measure distances.
+        feedback: information of an estimate on the sensors.
         is_newest: False once a sensor's next image was observed, which uses the same memory.
     """
 
-    def __init__(self, terms: Sequence[ObservedTerm], distances: Sequence[ObservedTerm], is_newest: Callable[[], bool]):
+    def __init__(
+        self,
+        terms: Sequence[ObservedTerm],
+        distances: Sequence[ObservedTerm],
+        feedback: Feedback,
+        is_newest: Callable[[], bool],
+    ):
         self._observed = terms
         self._distances = distances
+        self._feedback = feedback
         self._is_newest = is_newest
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
@@ -116,7 +154,7 @@ class ObservedTerms:
 
     def fits(self, surface: Surface) -> list[SensorFit]:
         """Agreement of every contributing sensor with a population of one."""
-        return [term.fit(surface) for term in self._terms]
+        return self._feedback.fits(self._terms, surface)
 
     def match(self, surface: Surface, sparse_jacobian: SparseJacobian, patches: Patches) -> list[PointLinearization]:
         """Residuals of the places in the images where the appearance is, of all sensors."""
@@ -133,13 +171,12 @@ class ObservedTerms:
         return reduce(_larger, (term.misfit(surface) for term in self._terms), none)
 
     def learn(self, surface: Surface) -> None:
-        """Passes the estimate to every term."""
-        for term in self._terms:
-            term.learn(surface)
+        """Takes the estimate in, a population of one."""
+        self._feedback.learn(self._terms, surface)
 
     def of_distances(self) -> "ObservedTerms":
         """The sum of those of the sensors that measure distances."""
-        return ObservedTerms(self._distances, self._distances, self._is_newest)
+        return ObservedTerms(self._distances, self._distances, self._feedback, self._is_newest)
 
     @property
     def _terms(self) -> Sequence[ObservedTerm]:

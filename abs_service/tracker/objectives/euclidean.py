@@ -1,23 +1,19 @@
 """Euclidean fitness, the baseline of the likelihood: squared differences with hand-tuned weights."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
 from annotated_types import Gt
-from numpy.typing import NDArray
 
-from abs_service.pairing.observation import Observation
 from abs_service.tracker.measurements import measurement
 from abs_service.tracker.measurements.base import Comparison
 from abs_service.tracker.mesh import Mesh
-from abs_service.tracker.models.base import ModelError, SparseJacobian, Surface
-from abs_service.tracker.objectives.base import ObservedTerms, TermSum
+from abs_service.tracker.models.base import ModelError, Surface
+from abs_service.tracker.objectives.base import TermSum
 from abs_service.tracker.synthesis.base import Synthesizer
-from abs_service.tracker.terms.base import Bounds, Term
-from abs_service.tracker.terms.linearization import Part, PointLinearization
-from abs_service.tracker.terms.places.keypoints import Recognized
-from abs_service.tracker.terms.places.patches import Patches
+from abs_service.tracker.terms.base import Bounds, ObservedTerm, Term
 from abs_service.tracker.terms.sensor_fit import SensorFit
 from calib.no_return import NEVER
 from calib.noise.base import LOG_SQRT_2PI, DepthNoise
@@ -56,14 +52,14 @@ class Settings:
     cutoff_intensity: Annotated[float, Gt(0)] = 4000.0
     barrier_weight: Annotated[float, Gt(0)] = 5.0
 
-    def build(self, rig: Rig, mesh: Mesh, synthesizer: Synthesizer) -> "SquareSum":
+    def build(self, rig: Rig, mesh: Mesh, synthesizer: Synthesizer) -> TermSum:
         """The fitness of a mesh in a rig.
 
         Raises:
             ModelError: a sensor measures something without a weight.
         """
         terms = [self._term(sensor, mesh, synthesizer) for sensor in rig.sensors.values()]
-        return SquareSum(TermSum(synthesizer, terms))
+        return TermSum(synthesizer, terms, WeightFeedback())
 
     def _term(self, sensor: Sensor, mesh: Mesh, synthesizer: Synthesizer) -> Term:
         level, cutoff = _deviation(self.color_weight), self.color_weight * self.cutoff_levels**2
@@ -90,62 +86,15 @@ class Settings:
         return measurement(noise).term(sensor, mesh, synthesizer, Comparison(bounds))
 
 
-@dataclass(frozen=True)
-class SquareSum:
-    """The weighted squares of all sensors.
+class WeightFeedback:
+    """Feedback to weights, which are no noise model that measurements could contradict."""
 
-    Attributes:
-        terms: their sum, as likelihoods.
-    """
+    def fits(self, terms: Sequence[ObservedTerm], surface: Surface) -> list[SensorFit]:
+        """The agreement without normalised residuals."""
+        return [replace(term.fit(surface), normalized_residual=float("nan")) for term in terms]
 
-    terms: TermSum
-
-    def observe(self, observation: Observation, predicted: Surface, reach_m: float = np.inf) -> "ObservedSquares":
-        """See `Objective`."""
-        return ObservedSquares(self.terms.observe(observation, predicted, reach_m))
-
-
-@dataclass(frozen=True)
-class ObservedSquares:
-    """The weighted squares of the sensors that contribute to one frame.
-
-    Attributes:
-        terms: their sum, as likelihoods.
-    """
-
-    terms: ObservedTerms
-
-    def cost(self, surface: Surface) -> NDArray[np.float64]:
-        """See `ObservedObjective`."""
-        return self.terms.cost(surface)
-
-    def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> list[Part]:
-        """See `ObservedObjective`."""
-        return self.terms.linearize(surface, sparse_jacobian)
-
-    def fits(self, surface: Surface) -> list[SensorFit]:
-        """Agreement of every sensor; without normalised residuals, because weights are no noise model."""
-        return [replace(fit, normalized_residual=float("nan")) for fit in self.terms.fits(surface)]
-
-    def match(self, surface: Surface, sparse_jacobian: SparseJacobian, patches: Patches) -> list[PointLinearization]:
-        """See `ObservedObjective`."""
-        return self.terms.match(surface, sparse_jacobian, patches)
-
-    @property
-    def recognized(self) -> list[Recognized]:
-        """See `ObservedObjective`."""
-        return self.terms.recognized
-
-    def misfit(self, surface: Surface) -> NDArray[np.float64]:
-        """See `ObservedObjective`."""
-        return self.terms.misfit(surface)
-
-    def of_distances(self) -> "ObservedSquares":
-        """See `ObservedObjective`."""
-        return ObservedSquares(self.terms.of_distances())
-
-    def learn(self, surface: Surface) -> None:
-        """Learns nothing: weights are no noise model that measurements could contradict."""
+    def learn(self, terms: Sequence[ObservedTerm], surface: Surface) -> None:
+        """Learns nothing."""
 
 
 def _deviation(weight: float) -> float:
