@@ -30,8 +30,7 @@ COLD_FRAMES = 2
 #: Searches of a frame after the first one: after a sudden motion, or where images show the surface elsewhere.
 MORE_SEARCHES = 2
 
-
-#: The object has come back, or has moved further than objects do, and is in sight.
+#: Reason of a loss whose object is in sight: it has come back, or moved further than objects do.
 ELSEWHERE = "the keypoints of its print are seen elsewhere in the image – the next search begins there"
 
 
@@ -45,6 +44,9 @@ class Tracker:
         limits: thresholds of the status.
         registration_m: standard deviation of the pose of a template's mesh; 0 if the first frame defines it [m].
         centers: centres of the imaging sensors, each (3,) [m].
+
+    Attributes:
+        model: the deformation model.
     """
 
     def __init__(
@@ -73,12 +75,12 @@ class Tracker:
             observation: the images of all sensors at one moment.
             in_time: False when the time is up; the first frame is searched to the end.
         """
+        is_cold = self._frames < COLD_FRAMES
         prediction = self._posterior.predict(observation.t_host_ns)  # predict: the motion prior of Θ
         frame = self._posterior.observe(observation, prediction)  # observe: noise models rendered per pixel
-        budget = Budget(self._evaluations, in_time if self._frames else _without_end)
-        search = self._optimizer.follow if self._frames >= COLD_FRAMES else self._optimizer.explore
-        # The prediction, or where images show the surface's print.
-        start = frame.search_start() if self._frames >= COLD_FRAMES else frame.cold_start()
+        start = frame.cold_start() if is_cold else frame.search_start()  # prediction, or where images show the print
+        search = self._optimizer.explore if is_cold else self._optimizer.follow
+        budget = Budget(self._evaluations, in_time if self._frames else lambda: True)
         frame, outcome = self._search(frame, search, start, budget)
         for _ in range(MORE_SEARCHES):
             if not outcome.is_start and not frame.motion.is_too_narrow(outcome.theta):
@@ -86,17 +88,6 @@ class Tracker:
             frame, outcome = self._search(frame, self._optimizer.follow, outcome.theta, budget)
         self._frames += 1
         return self._estimate(observation, frame, outcome, budget)
-
-    def relocate(self, points: NDArray[np.float64]) -> None:
-        """Warm start from points (k, 3) [m] of a lost object: the next search begins with the mesh laid over them."""
-        self._restart(fit_to_points(self.model, self._last_tracked, points))
-
-    def _restart(self, theta: NDArray[np.float64]) -> None:
-        """The next search begins at theta (dim,), and nothing is known of the motion."""
-        motion = self._posterior.motion
-        motion.restart(theta)
-        self._uncertainty.restart(motion.longest_covariance)
-        self._frames = 0
 
     def _search(
         self, frame: FramePosterior, search: StartSearch, start: NDArray[np.float64], budget: Budget
@@ -118,7 +109,7 @@ class Tracker:
         return running.outcome
 
     def _estimate(self, observation: Observation, frame: FramePosterior, outcome: Outcome, spent: Budget) -> Estimate:
-        """Covariances, agreement of the sensors and status at the optimum."""
+        """The optimum with its covariances, the agreement of the sensors and the status."""
         optimum = frame.optimum(outcome.theta, outcome.linearized)
         motion = self._posterior.motion.update(frame.motion, optimum.theta, optimum.inverse_curvature)
         covariance = self._uncertainty.update(optimum, frame, motion)
@@ -133,11 +124,8 @@ class Tracker:
         verdict, reasons = status.judge(
             fits, observation.missing, shape, motion.innovation, self._limits, has_back=self.model.mesh.is_complete
         )
-        if verdict == Status.LOST or shows_other_colors(fits):
-            place = frame.recognized_elsewhere(optimum.theta)
-            if place is not None:
-                self._restart(place)  # the vertices keep their material points
-                verdict, reasons = Status.LOST, (*reasons, ELSEWHERE)
+        if (verdict == Status.LOST or shows_other_colors(fits)) and self._restarts_elsewhere(frame, optimum.theta):
+            verdict, reasons = Status.LOST, (*reasons, ELSEWHERE)
         if verdict == Status.TRACKING:
             self._last_tracked = optimum.theta
         return Estimate(
@@ -156,6 +144,20 @@ class Tracker:
             search=SearchReport.of(outcome, spent),
         )
 
+    def relocate(self, points: NDArray[np.float64]) -> None:
+        """Warm start from points (k, 3) [m] of a lost object: the next search begins with the mesh laid over them."""
+        self._restart(fit_to_points(self.model, self._last_tracked, points))
 
-def _without_end() -> bool:
-    return True
+    def _restarts_elsewhere(self, frame: FramePosterior, theta: NDArray[np.float64]) -> bool:
+        """True if keypoints tell that the surface is not at theta (dim,): the next search begins where they are."""
+        place = frame.recognized_elsewhere(theta)
+        if place is not None:
+            self._restart(place)  # the vertices keep their material points
+        return place is not None
+
+    def _restart(self, theta: NDArray[np.float64]) -> None:
+        """The next search begins at theta (dim,), and nothing is known of the motion."""
+        motion = self._posterior.motion
+        motion.restart(theta)
+        self._uncertainty.restart(motion.longest_covariance)
+        self._frames = 0
