@@ -9,7 +9,7 @@ from typing import Any, Literal
 from abs_service import config, wiring
 from abs_service.api import checks
 from abs_service.api.checks import ArgumentError
-from abs_service.api.tracker import RigTracker, Tracker
+from abs_service.api.tracker import Tracker, tracker_of
 from abs_service.api.tracker_parts import tracker_parts
 from calib.camera import Camera
 
@@ -68,7 +68,7 @@ class Rig:
                     f'cameras = {dict(given)}: must have one of "{sensor}", a sensor of tracker "{name}" that has '
                     f'none in the rig file: cameras={{"{sensor}": Camera(…)}}'
                 )
-        return RigTracker(tracker_parts(self._settings, name, known, geometry, bayer, budget_ms))
+        return tracker_of(tracker_parts(self._settings, name, known, geometry, bayer, budget_ms))
 
 
 def load_rig(path: str | Path) -> Rig:

@@ -178,8 +178,8 @@ class Tracker:
             return one and with_mesh(one.estimate, session.mesh, session.mesh_version)
 
 
-class RigTracker(Tracker):
+def tracker_of(parts: TrackerParts) -> Tracker:
     """A tracker that a rig file describes, in place of arguments."""
-
-    def __init__(self, parts: TrackerParts):
-        self._parts = parts
+    tracker = Tracker.__new__(Tracker)
+    tracker._parts = parts  # noqa: SLF001
+    return tracker
