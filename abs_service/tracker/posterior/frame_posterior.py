@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.memo import Memo
-from abs_service.tracker.models.base import DeformationModel, SparseJacobian, Surface
+from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.objectives.base import ObservedObjective
 from abs_service.tracker.posterior.curvature import Quadratic, gauss_newton, posterior_covariance, solved
 from abs_service.tracker.posterior.linearized_cost import LinearizedCost
@@ -45,7 +45,6 @@ class FramePosterior:
         recognitions: places of keypoints by objective and prediction.
     """
 
-    model: DeformationModel
     objective: ObservedObjective
     stretch: StretchPrior
     shape: ShapePrior
@@ -201,10 +200,11 @@ class FramePosterior:
 
     def _nearest_start(self, found: Recognized) -> NDArray[np.float64]:
         """The prediction (dim,), or the undeformed mesh rigidly moved, whichever has its keypoints nearer to theirs."""
-        predicted, moved = self.motion.theta, found.moved(self.model.mesh.vertices)
+        model, predicted = self.surfaces.model, self.motion.theta
+        moved = found.moved(model.mesh.vertices)
         if min(found.apart(self._vertices(predicted)), RIGID_PX) <= found.apart(moved):
             return predicted
-        return reached(self.model, self.model.rest, moved)
+        return reached(model, model.rest, moved)
 
     def _has_keypoints(self, theta: NDArray[np.float64], within_px: float) -> bool:
         """True if most keypoints of a mesh at theta (dim,) are recognised within some pixels of theirs."""

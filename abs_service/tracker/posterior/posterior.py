@@ -47,4 +47,4 @@ class Posterior:
         self.stretch.rest_on(self.model.mesh.vertices)
         surfaces = FrameSurfaces(self.model)
         observed = self.objective.observe(observation, surfaces.deform(prediction.theta[None]), prediction.reach_m)
-        return FramePosterior(self.model, observed, self.stretch, self.shape, prediction, surfaces, self.patches)
+        return FramePosterior(observed, self.stretch, self.shape, prediction, surfaces, self.patches)

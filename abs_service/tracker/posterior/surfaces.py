@@ -12,20 +12,20 @@ class FrameSurfaces:
 
     Sensors know a surface that they have seen in this frame again. Nobody asks for a population twice.
 
-    Args:
+    Attributes:
         model: the deformation model, which does not change within the frame.
     """
 
     def __init__(self, model: DeformationModel):
-        self._model = model
+        self.model = model
         self._single: Memo[bytes, Surface] = Memo()
         self._jacobians: Memo[bytes, SparseJacobian] = Memo()
 
     def deform(self, thetas: NDArray[np.float64]) -> Surface:
         """The mesh deformed with every row of `thetas` (population, dim)."""
         if len(thetas) > 1:
-            return self._model.deform(thetas)
-        return self._single.get(thetas.tobytes(), lambda key: self._model.deform(thetas))
+            return self.model.deform(thetas)
+        return self._single.get(thetas.tobytes(), lambda key: self.model.deform(thetas))
 
     def with_jacobian(self, theta: NDArray[np.float64]) -> tuple[Surface, SparseJacobian]:
         """The mesh deformed with theta (dim,), a population of one, and the derivatives of its vertices."""
@@ -33,4 +33,4 @@ class FrameSurfaces:
 
     def sparse_jacobian(self, theta: NDArray[np.float64]) -> SparseJacobian:
         """Derivatives of the vertices with respect to theta (dim,)."""
-        return self._jacobians.get(theta.tobytes(), lambda key: self._model.sparse_jacobian(theta))
+        return self._jacobians.get(theta.tobytes(), lambda key: self.model.sparse_jacobian(theta))

@@ -34,7 +34,7 @@ def predicting(frame: FramePosterior, theta: np.ndarray) -> FramePosterior:
 
 def moved(frame: FramePosterior, theta: np.ndarray, jump_m: tuple[float, float, float]) -> np.ndarray:
     """Parameters (dim,) of the mesh at theta (dim,) that has moved by a jump (3,) [m]."""
-    jacobian = frame.model.sparse_jacobian(theta).dense
+    jacobian = frame.surfaces.model.sparse_jacobian(theta).dense
     jumps = np.tile(jump_m, jacobian.shape[0])
     return theta + np.linalg.lstsq(jacobian.reshape(-1, len(theta)), jumps, rcond=None)[0]
 
