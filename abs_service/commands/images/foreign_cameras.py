@@ -14,7 +14,6 @@ from abs_service.commands.parts import camera_file
 from abs_service.commands.parts.camera_file import CameraFile, CameraFileError, ColorTable, DepthTable
 from abs_service.config.tables.camera import PoseTable
 from calib.camera import Camera
-from calib.files import limited
 from calib.formats import content
 from calib.formats.content import FormatError, Hints
 from calib.lenses.lens import Lens
@@ -38,7 +37,7 @@ def load(path: Path, size: tuple[int, int], has_color: bool) -> tuple[CameraFile
     Raises:
         CameraFileError, OptionError, ConfigError: the file cannot be read or used.
     """
-    text = _text(path)
+    text = camera_files.text_of(path)
     if (matrix := _matrix(text)) is not None:
         return _registered(_of_matrix(path, matrix, size), has_color), ()
     if '"intrinsic_matrix"' in text:
@@ -56,21 +55,12 @@ def load(path: Path, size: tuple[int, int], has_color: bool) -> tuple[CameraFile
             f"{path}: its format is none of {formats}, and it is no camera file as `abs-service import --help` shows it"
         ) from None
     try:
-        read = camera_files.read(path, Hints(size=size), name)
+        read = camera_files.parse(path, text, Hints(size=size), name)
     except exchange.ExchangeError as error:
         raise CameraFileError(
             f"{error}; `abs-service calibrate convert` has more options, and what it writes is a file for --camera"
         ) from None
     return _chosen(path, read.cameras, has_color), read.lost
-
-
-def _text(path: Path) -> str:
-    try:
-        return limited.text(path)
-    except OSError as error:
-        raise CameraFileError(f"{path}: cannot be read: {error.strerror}") from None
-    except UnicodeDecodeError as error:
-        raise CameraFileError(f"{path}: is no text: {error}") from None
 
 
 def _matrix(text: str) -> NDArray[np.float64] | None:

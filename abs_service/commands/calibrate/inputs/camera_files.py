@@ -18,32 +18,48 @@ UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 
 
 def read_all(paths: Sequence[Path], hints: Hints, source: str | None, unit: str | None) -> list[Content]:
-    """The cameras of several files; see `read`. OpenCV's extrinsics.yml belongs to the intrinsics.yml beside it."""
-    texts = [(path, _text(path)) for path in paths]
+    """The cameras of several files; see `parse`. OpenCV's extrinsics.yml belongs to the intrinsics.yml beside it."""
+    texts = [(path, text_of(path)) for path in paths]
     pairs = [one for one in texts if len(texts) > 1 and source in (None, "opencv") and opencv.is_pair(one[1])]
     if len(pairs) == 1:
         texts.remove(pairs[0])
         hints = replace(hints, pair=pairs[0][1])
-    return [_content(path, text, hints, source, unit) for path, text in texts]
+    return [parse(path, text, hints, source, unit) for path, text in texts]
 
 
-def read(path: Path, hints: Hints, source: str | None = None, unit: str | None = None) -> Content:
-    """The cameras of a file.
+def read(path: Path, hints: Hints, unit: str) -> Content:
+    """The cameras of a file; see `parse`."""
+    return parse(path, text_of(path), hints, unit=unit)
+
+
+def text_of(path: Path) -> str:
+    """The text of a file.
+
+    Raises:
+        OptionError: it cannot be read, or holds something else.
+    """
+    try:
+        return limited.text(path)
+    except OSError as error:
+        raise OptionError(f"{path}: cannot be read: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise OptionError(f"{path}: all formats are UTF-8 text, byte {error.start} is not") from error
+
+
+def parse(path: Path, text: str, hints: Hints, source: str | None = None, unit: str | None = None) -> Content:
+    """The cameras of the text of a file.
 
     Args:
         path: the file.
+        text: what it holds.
         hints: values that it omits.
         source: its format; None to detect it.
         unit: of its translations, one of `UNITS`; None if it is the format's.
 
     Raises:
-        OptionError: it cannot be read, or what it says cannot be.
+        ExchangeError: its format is unknown, or it does not conform to it.
+        OptionError: what it says cannot be.
     """
-    return _content(path, _text(path), hints, source, unit)
-
-
-def _content(path: Path, text: str, hints: Hints, source: str | None, unit: str | None) -> Content:
-    """The cameras of the text of a file, see `read`."""
     name = source or exchange.of_content(path, text)
     if hints.lens and name != "opencv":
         raise OptionError(f"--lens {hints.lens}: {path} says itself which lens it has")
@@ -54,15 +70,6 @@ def _content(path: Path, text: str, hints: Hints, source: str | None, unit: str 
     scaled = {key: _scaled(one, UNITS[unit or "m"]) for key, one in content.cameras.items()}
     _check(path, scaled, unit)
     return replace(content, cameras=scaled)
-
-
-def _text(path: Path) -> str:
-    try:
-        return limited.text(path)
-    except OSError as error:
-        raise OptionError(f"{path}: cannot be read: {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        raise OptionError(f"{path}: all formats are UTF-8 text, byte {error.start} is not") from error
 
 
 def _scaled(one: Camera, unit: float) -> Camera:
