@@ -117,7 +117,7 @@ class FrameBuilder:
         return t_ns
 
     def _check_complete(self, frames: Mapping[tuple[str, str], Frame], labels: Mapping[str, str]) -> None:
-        """Refuses a depth image without the amplitude or disparity that its noise model needs."""
+        """Refuses a depth image without the amplitude or deviation that its noise model needs."""
         for sensor in self._rig.sensors.values():
             if not isinstance(sensor.noise, DepthNoise) or (sensor.head, "depth") not in frames:
                 continue

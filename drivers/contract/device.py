@@ -1,9 +1,10 @@
 """The contract between the service and every device.
 
-A driver is a module or package of `drivers`, named after the scheme of its addresses, with two functions:
+A driver is a module or package of `drivers`, named after the scheme of its addresses, with three functions:
 
 - `open_device(uri: str, clock: Callable[[], int]) -> Device`: `clock` is CLOCK_MONOTONIC [ns]; settings that must be
   chosen before opening (sizes, rates, mode) are in the query of the address. `scheme://` opens the only attached one.
+- `check_address(uri: str) -> None`: AddressError if no device can have the address; opens nothing.
 - `discover(timeout_s: float) -> list[Found]`, see `drivers.contract.discovery`.
 
 A driver opens a device, delivers frames and reports failure. It never reconnects: the device supervisor
