@@ -60,6 +60,7 @@ class Tracker:
     ):
         self.model = model = posterior.model
         self._posterior = posterior
+        self._motion = posterior.motion
         self._optimizer = optimizer
         self._evaluations = evaluations
         self._limits = limits.for_side(np.sqrt(model.mesh.area))
@@ -76,7 +77,7 @@ class Tracker:
             in_time: False when the time is up; the first frame is searched to the end.
         """
         is_cold = self._frames < COLD_FRAMES
-        prediction = self._posterior.predict(observation.t_host_ns)  # predict: the motion prior of Θ
+        prediction = self._motion.predict(observation.t_host_ns)  # predict: the motion prior of Θ
         frame = self._posterior.observe(observation, prediction)  # observe: noise models rendered per pixel
         start = frame.cold_start() if is_cold else frame.search_start()  # prediction, or where images show the print
         search = self._optimizer.explore if is_cold else self._optimizer.follow
@@ -111,7 +112,7 @@ class Tracker:
     def _estimate(self, observation: Observation, frame: FramePosterior, outcome: Outcome, spent: Budget) -> Estimate:
         """The optimum with its covariances, the agreement of the sensors and the status."""
         optimum = frame.optimum(outcome.theta, outcome.linearized)
-        motion = self._posterior.motion.update(frame.motion, optimum.theta, optimum.inverse_curvature)
+        motion = self._motion.update(frame.motion, optimum.theta, optimum.inverse_curvature)
         covariance = self._uncertainty.update(optimum, frame, motion)
         shape = self._shape.compare(
             optimum.vertices,
@@ -157,7 +158,6 @@ class Tracker:
 
     def _restart(self, theta: NDArray[np.float64]) -> None:
         """The next search begins at theta (dim,), and nothing is known of the motion."""
-        motion = self._posterior.motion
-        motion.restart(theta)
-        self._uncertainty.restart(motion.longest_covariance)
+        self._motion.restart(theta)
+        self._uncertainty.restart(self._motion.longest_covariance)
         self._frames = 0

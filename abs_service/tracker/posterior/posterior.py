@@ -34,10 +34,6 @@ class Posterior:
         """Number of parameters."""
         return len(self.model.rest)
 
-    def predict(self, t_ns: int) -> MotionPrediction:
-        """Prior of theta at time `t_ns` [ns] from the motion of the last frames."""
-        return self.motion.predict(t_ns)
-
     def observe(self, observation: Observation, prediction: MotionPrediction) -> FramePosterior:
         """Renders every noise model over its image around the predicted surface.
 

@@ -101,4 +101,4 @@ def posterior_of(model: DeformationModel, rig: Rig, frames: list[Frame]) -> Post
 def frame_posterior_of(model: DeformationModel, rig: Rig, first: list[Frame], second: list[Frame]) -> FramePosterior:
     """The posterior of a second exposure, without a motion before it, of a model that has observed a first one."""
     posterior, observation = posterior_of(model, rig, first), Observer(rig).observe(frame_set(second, 1))
-    return posterior.observe(observation, posterior.predict(observation.t_host_ns))
+    return posterior.observe(observation, posterior.motion.predict(observation.t_host_ns))

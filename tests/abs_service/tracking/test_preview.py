@@ -67,7 +67,7 @@ def test_the_classes_are_those_of_the_tracker(exposure):
     observation = Observer(RIG).observe(frames)
     model = PLAN.model.build(detect_object(observation, RIG, "tof", PLAN.region.build(), PLAN.vertices))
     posterior, _ = make_posterior(PLAN, RIG, model, observation)
-    (fit,) = posterior.observe(observation, posterior.predict(observation.t_host_ns)).fits(model.rest)
+    (fit,) = posterior.observe(observation, posterior.motion.predict(observation.t_host_ns)).fits(model.rest)
     assert seen.found is not None
     free, occluded = (np.sum(seen.found.classes == rim_class) for rim_class in (RimClass.FREE, RimClass.OCCLUDED))
     assert (fit.rim.visible + fit.rim.occluded, fit.rim.covered) == (free, occluded)

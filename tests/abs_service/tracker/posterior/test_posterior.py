@@ -64,7 +64,7 @@ def test_the_posterior_of_a_frame_answers_no_more_once_the_next_is_observed():
     theta, exposed = step.estimate.theta, SHEET.expose(1)[0]
     posterior = posterior_of(one.model, RIG, exposed)
     observation = Observer(RIG).observe(frame_set(exposed, 1))
-    prediction = posterior.predict(observation.t_host_ns)
+    prediction = posterior.motion.predict(observation.t_host_ns)
     first, second = posterior.observe(observation, prediction), posterior.observe(observation, prediction)
     assert len(second.fits(theta)) == 2
     with pytest.raises(RuntimeError, match="after the next frame"):
