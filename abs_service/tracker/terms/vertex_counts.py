@@ -118,6 +118,12 @@ class Tally(NamedTuple):
         )
 
 
+#: Indices of the fields of a `Tally`.
+_VISIBLE, _MISSING, _BEHIND_OCCLUDER, _BEHIND_ITSELF, _OUTSIDE, _UNJUDGED, _MEASURED, _AGREEING, _SAMPLES, _INLIERS = (
+    range(len(Tally._fields))
+)
+
+
 @kernel
 def count_samples(
     masks: VertexMasks,
@@ -130,20 +136,20 @@ def count_samples(
     squares = 0.0
     for v in range(masks.pixel.size):
         pixel, agrees = masks.pixel[v], measured[v] and residual[v] < minimum
-        counts[8] += 1 if measured[v] else 0
-        counts[9] += 1 if agrees else 0
+        counts[_SAMPLES] += 1 if measured[v] else 0
+        counts[_INLIERS] += 1 if agrees else 0
         squares += residual[v] * residual[v] if agrees else 0.0
         if pixel <= 0:
             if masks.facing[v]:
-                counts[3 if pixel < 0 else 4] += 1
+                counts[_BEHIND_ITSELF if pixel < 0 else _OUTSIDE] += 1
         elif masks.behind_occluder[v]:
-            counts[2] += 1
+            counts[_BEHIND_OCCLUDER] += 1
         elif masks.missing[v]:
-            counts[1] += 1
+            counts[_MISSING] += 1
         elif masks.unjudged[v]:
-            counts[5] += 1
+            counts[_UNJUDGED] += 1
         else:
-            counts[0] += 1
-            counts[6] += 1 if measured[v] else 0
-            counts[7] += 1 if agrees else 0
+            counts[_VISIBLE] += 1
+            counts[_MEASURED] += 1 if measured[v] else 0
+            counts[_AGREEING] += 1 if agrees else 0
     return squares
