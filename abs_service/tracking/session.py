@@ -7,29 +7,22 @@ from enum import Enum, auto
 from functools import partial
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from abs_service.pairing.observation import Observation
 from abs_service.tracker.appearance import with_appearance
 from abs_service.tracker.detection.grid_mesh import grid_mesh
 from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection, UndecidedError
-from abs_service.tracker.detection.plausibility import ExtentError, doubts
+from abs_service.tracker.detection.plausibility import ExtentError
 from abs_service.tracker.detection.regions.base import Region
 from abs_service.tracker.detection.segmentation import detect_object
 from abs_service.tracker.estimates.estimate import Estimate, Status, initializing
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import DeformationModel, ModelError
-from abs_service.tracker.tracker import Tracker
 from abs_service.tracking.monitors import loss_monitor
-from abs_service.tracking.monitors.appearance_monitor import AppearanceMonitor
 from abs_service.tracking.monitors.arrival_monitor import ArrivalMonitor
-from abs_service.tracking.monitors.first_view import FirstView
-from abs_service.tracking.monitors.growth_monitor import MIN_GROWTH, GrowthMonitor
+from abs_service.tracking.monitors.growth_monitor import MIN_GROWTH
 from abs_service.tracking.observer import Observer
-from abs_service.tracking.offsets.vertex_offsets import FixedOffsets, VertexOffsets
 from abs_service.tracking.plan import Plan, build_template, derived, make_tracker
-from calib.noise.base import ImageNoise
+from abs_service.tracking.tracked_object import Built, TrackedObject
 from calib.rig import Rig
 from drivers.contract.frame import FrameSet
 
@@ -58,15 +51,6 @@ class _Failure(NamedTuple):
     warnings: tuple[str, ...] = ()
 
 
-class _Built(NamedTuple):
-    """A tracker of a detected object, its mesh, their offsets, and the detection that all are of."""
-
-    tracker: Tracker
-    mesh: Mesh
-    vertex_offsets: VertexOffsets
-    detection: InitialDetection
-
-
 class TrackingSession:
     """One object over time: detected, tracked, lost, detected again.
 
@@ -86,27 +70,21 @@ class TrackingSession:
         self._region = self._configured = plan.region.build()
         self._template = build_template(plan.template, plan.vertices)
         self._observer = Observer(rig)
-        self._tracker: Tracker | None = None
-        self._view: FirstView | None = None
-        self._vertices: NDArray[np.floating] = np.zeros((0, 3))
-        self._vertex_offsets: VertexOffsets = FixedOffsets()
+        self._object: TrackedObject | None = None
         self._loss_monitor = loss_monitor.LossMonitor(plan.reinitialization, plan.status)
-        self._growth_monitor = GrowthMonitor(plan.reinitialization.grow_s)
         self._growth_due = False
         self._arrival_monitor = ArrivalMonitor()
         self._requested: deque[Region] = deque()  # the latest counts; other threads add to it
-        self._appearance_monitor = AppearanceMonitor((), plan.reinitialization.every_s)
-        self._warnings: tuple[str, ...] = ()
 
     @property
     def model(self) -> DeformationModel | None:
         """The deformation model; None before the first detection."""
-        return None if self._tracker is None else self._tracker.model
+        return None if self._object is None else self._object.tracker.model
 
     @property
     def derived(self) -> Mapping[str, tuple[float, ...]]:
         """Numbers that follow from the first image unless keys give them, by key; empty before the first detection."""
-        return {} if self._tracker is None else derived(self._plan, self._tracker.model)
+        return {} if self._object is None else derived(self._plan, self._object.tracker.model)
 
     def track(self, frames: FrameSet, in_time: Callable[[], bool]) -> Estimate:
         """The estimate for a frame set, whose search ends when `in_time` is False.
@@ -123,13 +101,14 @@ class TrackingSession:
         due, failure = self._due(observation), _Failure()
         if due is not None:
             failure = self._attempt(due, observation)
-        if self._tracker is None:
+        tracked = self._object
+        if tracked is None:
             return initializing(observation, failure.reasons, failure.warnings)
-        estimate = self._loss_monitor.with_hysteresis(self._tracker.track(observation, in_time))
-        self._vertices = estimate.vertices
-        warned = (*self._warnings, *self._appearance_monitor.warnings)
+        estimate = self._loss_monitor.with_hysteresis(tracked.tracker.track(observation, in_time))
+        tracked.vertices = estimate.vertices
+        warned = (*tracked.warnings, *tracked.appearance_monitor.warnings)
         if estimate.status == Status.TRACKING:
-            self._learn(self._tracker, estimate, observation)
+            self._learn(tracked, estimate, observation)
             return replace(estimate, warnings=warned) if warned else estimate
         reasons = (*estimate.reasons, *(f"looked for the object again: {reason}" for reason in failure.reasons))
         return replace(estimate, reasons=reasons, warnings=warned)
@@ -145,7 +124,7 @@ class TrackingSession:
     def _forget(self, host_clock: str) -> None:
         """Discards the object: on another clock, the time since the last frame is unknown."""
         self._host_clock = host_clock
-        self._tracker = None
+        self._object = None
         self._region = self._configured = self._plan.region.build()
         self._loss_monitor = loss_monitor.LossMonitor(self._plan.reinitialization, self._plan.status)
         self._growth_due, self._arrival_monitor = False, ArrivalMonitor()
@@ -158,11 +137,11 @@ class TrackingSession:
         grow, self._growth_due = self._growth_due, False
         if requested is not None:
             return _Due(_Cause.REQUEST, requested)
-        if self._tracker is None:
+        if self._object is None:
             return _Due(_Cause.START, self._region)
         if self._loss_monitor.take_attempt(observation.t_host_ns):
             return _Due(_Cause.LOSS, self._region)
-        if not self._loss_monitor.is_lost and self._appearance_monitor.take_attempt(
+        if not self._loss_monitor.is_lost and self._object.appearance_monitor.take_attempt(
             observation.missing, observation.t_host_ns
         ):
             return _Due(_Cause.APPEARANCE, self._region)
@@ -180,68 +159,65 @@ class TrackingSession:
         except ExtentError as error:
             return _Failure((str(error),), (str(error),))
         except (DetectionError, ModelError) as error:
-            if due.cause == _Cause.APPEARANCE:
-                self._appearance_monitor.failed(str(error))
+            if self._object is not None and due.cause == _Cause.APPEARANCE:
+                self._object.appearance_monitor.failed(str(error))
             return _Failure((str(error),))
         return _Failure()
 
     def _detect(self, due: _Due, observation: Observation) -> None:
         """Detects the object for a cause; DetectionError or ModelError if that fails."""
-        tracker, mesh = self._tracker, self.mesh
-        if tracker is None or mesh is None or due.cause in (_Cause.START, _Cause.REQUEST):
+        tracked = self._object
+        if tracked is None or due.cause in (_Cause.START, _Cause.REQUEST):
             self._adopt(self._build(observation, due.region), observation)
             self._region = due.region
         elif due.cause == _Cause.GROWTH:
-            self._grow(mesh, observation)
+            self._grow(tracked, observation)
         elif due.cause == _Cause.LOSS and self._loss_monitor.keeps_mesh(observation.t_host_ns):
-            self._relocate(tracker, mesh, observation)
+            self._relocate(tracked, observation)
         else:
-            self._renew(mesh, observation)
+            self._renew(tracked, observation)
 
-    def _relocate(self, tracker: Tracker, lost: Mesh, observation: Observation) -> None:
+    def _relocate(self, lost: TrackedObject, observation: Observation) -> None:
         """Fits the mesh of a lost object to the surface that is detected."""
         detection = self._detection(observation, self._region)
-        self._loss_monitor.check_likeness(with_appearance(grid_mesh(detection), observation.images, self._rig), lost)
-        tracker.relocate(detection.points)
+        found = with_appearance(grid_mesh(detection), observation.images, self._rig)
+        self._loss_monitor.check_likeness(found, lost.mesh)
+        lost.tracker.relocate(detection.points)
 
-    def _renew(self, old: Mesh, observation: Observation) -> None:
+    def _renew(self, old: TrackedObject, observation: Observation) -> None:
         """Replaces the mesh by a new one of about the same size and colours, or with sides that the first image hid."""
         built = self._build(observation, self._region)
-        grown = built.mesh.area > MIN_GROWTH * old.area and not self._loss_monitor.is_lost
-        if not (grown and self._view is not None and self._view.hid(built.mesh, self._vertices)):
-            self._loss_monitor.check_likeness(built.mesh, old)
+        grown = built.mesh.area > MIN_GROWTH * old.mesh.area and not self._loss_monitor.is_lost
+        if not (grown and old.view.hid(built.mesh, old.vertices)):
+            self._loss_monitor.check_likeness(built.mesh, old.mesh)
         self._adopt(built, observation)
         self._loss_monitor.restart("a new mesh was made")
 
-    def _grow(self, old: Mesh, observation: Observation) -> None:
+    def _grow(self, old: TrackedObject, observation: Observation) -> None:
         """Replaces the mesh if much more of the object is in sight."""
         built = self._build(observation, self._region)
-        if built.mesh.area > MIN_GROWTH * old.area:
+        if built.mesh.area > MIN_GROWTH * old.mesh.area:
             self._adopt(built, observation)
             self._loss_monitor.restart("a larger mesh was made")
 
-    def _learn(self, tracker: Tracker, estimate: Estimate, observation: Observation) -> None:
+    def _learn(self, tracked: TrackedObject, estimate: Estimate, observation: Observation) -> None:
         """Learns from an estimate that can be trusted: vertex offsets, and whether the object continues beyond it."""
-        if self._growth_monitor.take_attempt(estimate.fits, observation.t_host_ns):
+        if tracked.growth_monitor.take_attempt(estimate.fits, observation.t_host_ns):
             self._growth_due = True
-        surface = tracker.model.deform(estimate.theta[None])
-        self._vertex_offsets.update(observation.images.get(self._plan.reference), surface, observation.t_host_ns)
+        surface = tracked.tracker.model.deform(estimate.theta[None])
+        image = observation.images.get(self._plan.reference)
+        tracked.vertex_offsets.update(image, surface, observation.t_host_ns)
 
-    def _adopt(self, built: _Built, observation: Observation) -> None:
-        self._tracker, self.mesh, self._vertex_offsets, detection = built
-        self._view, self._vertices = FirstView(detection, built.mesh), built.mesh.vertices
-        self._warnings = doubts(detection, built.mesh, observation.images, self._rig)
-        self.made_ns = observation.t_host_ns
-        unknown = [n for n in observation.missing if isinstance(self._rig.sensors[n].noise, ImageNoise)]
-        self._appearance_monitor = AppearanceMonitor(unknown, self._plan.reinitialization.every_s)
-        self._growth_monitor = GrowthMonitor(self._plan.reinitialization.grow_s)
+    def _adopt(self, built: Built, observation: Observation) -> None:
+        self._object = TrackedObject(built, observation, self._rig, self._plan.reinitialization)
+        self.mesh, self.made_ns = built.mesh, observation.t_host_ns
         self.mesh_version += 1
 
     def _detection(self, observation: Observation, region: Region) -> InitialDetection:
         found = partial(detect_object, observation, self._rig, self._plan.reference, region, self._plan.vertices)
         # What is found again has to be as large as what was lost, so that a part of it will do.
-        return self._arrival_monitor.checked(found, observation.t_host_ns) if self._tracker is None else found()
+        return self._arrival_monitor.checked(found, observation.t_host_ns) if self._object is None else found()
 
-    def _build(self, observation: Observation, region: Region) -> _Built:
+    def _build(self, observation: Observation, region: Region) -> Built:
         detection = self._detection(observation, region)
-        return _Built(*make_tracker(self._plan, self._template, self._rig, detection, observation), detection)
+        return Built(*make_tracker(self._plan, self._template, self._rig, detection, observation), detection)
