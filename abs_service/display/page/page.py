@@ -39,7 +39,7 @@ MESH_S, IMAGES_S, WORDS_S, IDLE_S = 1 / 30, 0.25, 1.0, 0.5
 SAME_NS = 20_000_000
 
 #: Buttons that the recorder may have no use for.
-RECORDING = "Start recording", "Stop recording"
+RECORDING = START, STOP = "Start recording", "Stop recording"
 
 #: The page listens here only.
 HOST = "127.0.0.1"
@@ -126,7 +126,7 @@ class Page:
             return
         self._drawn[tracker] = ShownMesh(view, mesh.header.t_host_ns, state)
         self._scene.show_mesh(tracker, view, self._scales[name].colors(FIELDS[name].values(view)), stale)
-        self._scene.show_first(tracker, view, self._panel.shows[0])
+        self._scene.show_first(tracker, view, self._panel.shows.first_pose)
         self._scene.show_gravity(tracker, view, gravity.down(self._feed, tracker))
         self._trails.extend(tracker, (mesh.header.boot_id, mesh.mesh_version), self._drawn[tracker], self._feed.now_s)
         self._scene.show_trails(tracker, self._trails.lines(tracker))
@@ -157,7 +157,7 @@ class Page:
         return camera if camera and (camera.height, camera.width) == frame.data.shape[:2] else None
 
     def _draw_images(self) -> None:
-        self._scene.show_cameras(self._feed.cameras(), self._panel.shows[2])
+        self._scene.show_cameras(self._feed.cameras(), self._panel.shows.cameras)
         chosen = self._drawn.get(self._panel.tracker)
         vertices, faces, classes = joined(one.view for one in self._drawn.values())
         for topic in self._feed.streams():
@@ -170,7 +170,7 @@ class Page:
             if frame.kind == Kind.DEPTH:
                 measured = self._measured[frame.sensor] = Measured(pictures.radial(frame, camera), camera)
                 points_r, _, spacing_m = pictures.cloud(measured.distance, camera)
-                self._scene.show_points(frame.sensor, points_r, spacing_m, stale, self._panel.shows[1])
+                self._scene.show_points(frame.sensor, points_r, spacing_m, stale, self._panel.shows.points)
             drawn = pictures.with_mesh(pictures.grey(image) if stale else image, camera, vertices, faces, classes)
             name = topic.removesuffix("/image")
             self._panel.show_image(name, words.stream(name, age_s, self._feed.image_rate_hz(topic)), drawn)
@@ -234,8 +234,8 @@ class Page:
             "Draw a lasso": Button(
                 "Detect the object that you click around", lambda: self._choosing.by_lasso(self._panel.tracker)
             ),
-            RECORDING[0]: Button("Record from now on, with the seconds before", lambda: record(True)),
-            RECORDING[1]: Button("End the recording", lambda: record(False)),
+            START: Button("Record from now on, with the seconds before", lambda: record(True)),
+            STOP: Button("End the recording", lambda: record(False)),
         }
 
     def _look(self, tracker: str) -> Measured | None:

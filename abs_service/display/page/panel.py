@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from html import escape
+from typing import NamedTuple
 
 import numpy as np
 import viser
@@ -28,6 +29,14 @@ class Button:
 
     hint: str
     press: Callable[[], None]
+
+
+class Shown(NamedTuple):
+    """Check boxes for parts of the scene: True to draw them."""
+
+    first_pose: bool
+    points: bool
+    cameras: bool
 
 
 class Panel:
@@ -82,9 +91,9 @@ class Panel:
         return self._residual.value
 
     @property
-    def shows(self) -> tuple[bool, bool, bool]:
-        """Check boxes for first pose, points and cameras: True to draw them."""
-        return self._first.value, self._points.value, self._cameras.value
+    def shows(self) -> Shown:
+        """Parts of the scene that are to be drawn beside the mesh."""
+        return Shown(self._first.value, self._points.value, self._cameras.value)
 
     def offer(self, trackers: Sequence[str]) -> None:
         """Offers trackers to choose from, once there is more than one."""
