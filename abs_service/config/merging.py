@@ -55,7 +55,7 @@ def merge(rig: dict[str, Any], source: str, base: Path, text: str) -> dict[str, 
         if name not in sensors
     ]
     if unknown:
-        raise error_of(str(path), unknown, content.decode())
+        raise error_of(str(path), unknown, _text(content))
     given = {name: _given(calibrated) for name, calibrated in file.sensors.items()}
     tables = {name: sensors[name] if isinstance(sensors[name], dict) else {} for name in given}
     clashes = [problem for name in given for problem in _clashes(name, tables[name], given[name], path)]
@@ -77,10 +77,15 @@ def _read(path: Path) -> bytes:
         raise ConfigError(f"{path}: the calibration cannot be read: {error.strerror}") from None
 
 
+def _text(content: bytes) -> str:
+    """The text of a file without a byte order mark, as `limited.text` has it."""
+    return content.decode("utf-8-sig")
+
+
 def _parse(path: Path, content: bytes) -> CalibrationFile:
     text = ""
     try:
-        text = content.decode("utf-8")
+        text = _text(content)
         file = nested.toml(text)
         # JSON in strict mode is TOML's own type system, as for the rig's own file.
         tables = json.dumps(file, default=str)

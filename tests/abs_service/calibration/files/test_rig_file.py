@@ -141,6 +141,13 @@ def test_a_rig_uses_the_calibration_that_it_names(rig: Path) -> None:
     assert (tof.depth_offset, tof.depth_scale) == (0.004, -0.002)
 
 
+def test_a_calibration_may_begin_with_the_mark_that_some_editors_write(rig: Path) -> None:
+    path = rig.parent / "lab" / "bench.calibration.toml"
+    before = config.load(rig).sensors
+    path.write_text(path.read_text(encoding="utf-8"), encoding="utf-8-sig")
+    assert config.load(rig).sensors == before
+
+
 def test_the_merged_configuration_needs_no_other_file_and_knows_where_it_comes_from(rig: Path, tmp_path: Path) -> None:
     made = config.load(rig)
     text = config.to_toml(made)
