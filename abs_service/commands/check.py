@@ -78,16 +78,7 @@ def describe(rig: config.ServiceConfig, source: str, toml: str = "", recording: 
         CheckError: something that it names does not exist or cannot be made.
     """
     problems: list[Problem] = list(addresses.check({name: device.uri for name, device in rig.devices.items()}))
-    wrong = {problem.key for problem in problems}
-    streams: dict[str, list[StreamInfo]] = {}
-    if recording:
-        with _noting(("--replay",), problems):
-            streams = device_checks.recorded_streams(rig, recording)
-    for name in (name for name in rig.devices if not recording and ("devices", name, "uri") not in wrong):
-        with _noting(("devices", name, "uri"), problems):
-            streams |= device_checks.device_streams(rig, name)
-        with _noting(("devices", name, "controls"), problems):
-            device_checks.check_controls(rig, name)
+    streams = _streams(rig, recording, problems)
     problems += _unusable_parts(rig, streams)
     if recording and not problems:
         for name in rig.trackers:
@@ -115,6 +106,22 @@ def describe(rig: config.ServiceConfig, source: str, toml: str = "", recording: 
         "records": str(rig.record.directory.resolve()) if rig.record.enabled else None,
         "disk": disk.lasts(rig, 1e6 * images["recorded_mb_s"][1]),
     }
+
+
+def _streams(rig: config.ServiceConfig, recording: Path | None, problems: list[Problem]) -> dict[str, list[StreamInfo]]:
+    """Streams by sensor, of a recording or of the devices whose addresses have no problem; adds to the problems."""
+    streams: dict[str, list[StreamInfo]] = {}
+    if recording:
+        with _noting(("--replay",), problems):
+            streams = device_checks.recorded_streams(rig, recording)
+        return streams
+    wrong = {problem.key for problem in problems}
+    for name in (name for name in rig.devices if ("devices", name, "uri") not in wrong):
+        with _noting(("devices", name, "uri"), problems):
+            streams |= device_checks.device_streams(rig, name)
+        with _noting(("devices", name, "controls"), problems):
+            device_checks.check_controls(rig, name)
+    return streams
 
 
 def _unusable_parts(rig: config.ServiceConfig, streams: Mapping[str, list[StreamInfo]]) -> list[Problem]:
