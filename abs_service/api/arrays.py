@@ -52,9 +52,9 @@ class FrameBuilder:
         self._streams = [f"{head}/{stream}" for head, stream in streams(rig.sensors.values())]
         pictures = [one for one in self._streams if one.endswith(("/color", "/bayer"))]
         own = {"depth_m": Kind.DEPTH, "amplitude": Kind.AMPLITUDE, "deviation_m": Kind.DEVIATION}
+        named = {name: f"{reference}/{kind}" for name, kind in own.items()}
         #: Stream of every argument that has one.
-        self._arguments = {name: f"{reference}/{kind}" for name, kind in own.items()}
-        self._arguments = {name: stream for name, stream in self._arguments.items() if stream in self._streams}
+        self._arguments = {name: stream for name, stream in named.items() if stream in self._streams}
         if "depth_m" not in self._arguments:
             needed = f'"{reference}" finds the object, so it needs a model of distances, such as noise.Constant(0.001)'
             raise ArgumentError(f"noise = {rig.sensors[reference].noise}: {needed}")
@@ -75,7 +75,6 @@ class FrameBuilder:
             ArgumentError: an array that does not fit, that nothing uses or that is missing; a time that is not later.
         """
         t_ns = self._time_ns(time_s)
-        labels = {stream: name for name, stream in self._arguments.items()}
         frames: dict[tuple[str, str], Frame] = {}
         for name, array in given.items():
             if array is None:
@@ -84,11 +83,11 @@ class FrameBuilder:
             if stream not in self._streams:
                 raise ArgumentError(f"{name} is given, but the tracker uses no such image; it uses {self._uses()}")
             head, _, kind = stream.partition("/")
-            label = labels.get(stream, f"streams[{stream!r}]")
+            label = self._label(stream)
             if (head, kind) in frames:
                 raise ArgumentError(f"{name} is given, and {label} too, which is the same image: leave one out")
             frames[head, kind] = self._frame(head, Kind(kind), checks.array(label, array), label, t_ns)
-        self._check_complete(frames, labels)
+        self._check_complete(frames)
         self._last_ns, self._seq = t_ns, self._seq + 1
         return FrameSet(self._seq - 1, t_ns, frames)
 
@@ -101,8 +100,11 @@ class FrameBuilder:
         return ("depth_m has no return: all of it is 0 or NaN",)
 
     def _uses(self) -> str:
-        labels = {stream: name for name, stream in self._arguments.items()}
-        return ", ".join(labels.get(stream, f"streams[{stream!r}]") for stream in self._streams)
+        return ", ".join(map(self._label, self._streams))
+
+    def _label(self, stream: str) -> str:
+        """The argument that an image is given as."""
+        return next((name for name, own in self._arguments.items() if own == stream), f"streams[{stream!r}]")
 
     def _time_ns(self, time_s: float) -> int:
         seconds = checks.number("time_s", time_s, "a time in seconds")
@@ -116,18 +118,15 @@ class FrameBuilder:
             raise ArgumentError(f"time_s = {time_s}: must be later than the frame before, {self._last_ns * 1e-9:g}")
         return t_ns
 
-    def _check_complete(self, frames: Mapping[tuple[str, str], Frame], labels: Mapping[str, str]) -> None:
+    def _check_complete(self, frames: Mapping[tuple[str, str], Frame]) -> None:
         """Refuses a depth image without the amplitude or deviation that its noise model needs."""
         for sensor in self._rig.sensors.values():
             if not isinstance(sensor.noise, DepthNoise) or (sensor.head, "depth") not in frames:
                 continue
             for kind in measurement(sensor.noise).frames:
-                stream = f"{sensor.head}/{kind}"
                 if (sensor.head, kind.value) not in frames:
-                    raise ArgumentError(
-                        f'{labels.get(stream, f"streams[{stream!r}]")} is missing: the noise model of "{sensor.head}" '
-                        "depends on it"
-                    )
+                    label = self._label(f"{sensor.head}/{kind}")
+                    raise ArgumentError(f'{label} is missing: the noise model of "{sensor.head}" depends on it')
 
     def _frame(self, head: str, kind: Kind, array: NDArray[Any], label: str, t_ns: int) -> Frame:
         camera = self._cameras[head]
