@@ -90,7 +90,7 @@ def is_scene(surface: NDArray[np.bool_], measured: NDArray[np.bool_]) -> bool:
     return _spans(columns, surface.shape[1]) or _spans(rows, surface.shape[0])
 
 
-def lining(surface: NDArray[np.bool_], measured: NDArray[np.bool_]) -> int:
+def border_length(surface: NDArray[np.bool_], measured: NDArray[np.bool_]) -> int:
     """Length [px] over which a surface lies along the image's border; 0 if it may be a thing that the image cuts off.
 
     It is that along the border of what is measured, where that is about the image's.
@@ -107,7 +107,7 @@ def lining(surface: NDArray[np.bool_], measured: NDArray[np.bool_]) -> int:
 def at_border(surface: NDArray[np.bool_], measured: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Pixels (height, width) of a surface at the border of what is measured, where that is about the image's.
 
-    Arguments as of `lining`.
+    Arguments as of `border_length`.
     """
     below = _below_border(surface, measured)
     return (below > 0) & (below <= BELOW_BORDER_PX)
@@ -220,7 +220,7 @@ def warnings(detection: InitialDetection) -> tuple[str, ...]:
             f"the object fills {np.mean(inside):.0%} of the image, {inside.sum() / measured.sum():.0%} of all returns, "
             "from side to side: is the region right?",
         )
-    if length := lining(inside, measured):
+    if length := border_length(inside, measured):
         return (
             f"the object lies along {length} pixels of the image's border, like a wall or "
             "a floor: is the region right? A seed or a box would tell where the object is",

@@ -35,7 +35,7 @@ DISTANCES = 0.95
 #: Weight of a new frame in the running mean of the outlier share.
 MEMORY = 0.03
 
-#: So many tries of CMA-ES in a row that find nothing better than the descent begin a pause; most frames of a pause.
+#: So many tries of CMA-ES in a row that find nothing better than the descent begin the backoff; its most frames.
 PATIENCE, MAX_PAUSE = 4, 7
 
 
@@ -82,7 +82,7 @@ class Hybrid:
         self._schedule = Schedule("cma_es", settings.generations, SIGNIFICANT)
         self._mean_outliers = 1.0
         self._in_fallback = False
-        self._pauses = Pauses(settings.fallback_above)
+        self._backoff = Backoff(settings.fallback_above)
 
     def follow(self, problem: FrameProblem, start: NDArray[np.float64], budget: Budget) -> Search:
         """Descends; with too many outliers, begins anew where images show the surface, or samples the priors."""
@@ -90,8 +90,8 @@ class Hybrid:
         limit = self._settings.fallback_until if self._in_fallback else self._settings.fallback_above
         share = outlier_share(found.fits)
         if share <= self._mean_outliers + limit:
-            self._pauses = Pauses(self._settings.fallback_above)
-        elif self._pauses.end_at(share):
+            self._backoff = Backoff(self._settings.fallback_above)
+        elif self._backoff.take_attempt(share):
             beside = disagreeing_colors(found.fits) >= MANY and not budget.exhausted()
             place = problem.shown_at(found.theta) if beside else None
             if place is not None and place is not found.theta:
@@ -99,7 +99,7 @@ class Hybrid:
             tried = found
             if place is None or distances_share(found.fits) < DISTANCES:
                 tried = (yield from self._fall_back(problem, start, found, budget)).compared(problem)
-            self._pauses.tried(tried.cost < found.cost, share)
+            self._backoff.tried(tried.cost < found.cost, share)
             found = tried
         self._update_mean(outlier_share(found.fits))
         return found
@@ -135,8 +135,8 @@ class Hybrid:
         self._mean_outliers += MEMORY * (outliers - self._mean_outliers)
 
 
-class Pauses:
-    """Frames without CMA-ES after it has found nothing better `PATIENCE` times: one, three, `MAX_PAUSE`.
+class Backoff:
+    """Exponential backoff: frames without CMA-ES after it has found nothing better `PATIENCE` times: 1, 3, `MAX_PAUSE`.
 
     Something may hide measurements for seconds, such as a hand that takes hold of the object: the descent explains all
     others, and samples cost several times as much as it does.
@@ -149,7 +149,7 @@ class Pauses:
         self._surprise = surprise
         self._in_vain, self._left, self._share = 0, 0, 0.0
 
-    def end_at(self, share: float) -> bool:
+    def take_attempt(self, share: float) -> bool:
         """True if CMA-ES is to be tried in a frame with this outlier share; else a frame of the pause has passed."""
         if self._left and share <= self._share + self._surprise:
             self._left -= 1

@@ -15,7 +15,7 @@ from abs_service.tracker.posterior.optimum import Optimum
 from abs_service.tracker.posterior.priors.motion_prediction import MotionPrediction
 from abs_service.tracker.posterior.priors.shape_prior import ShapePrior
 from abs_service.tracker.posterior.priors.stretch_prior import StretchPrior
-from abs_service.tracker.posterior.relocation import reached
+from abs_service.tracker.posterior.relocation import fit_to_vertices
 from abs_service.tracker.posterior.surfaces import FrameSurfaces
 from abs_service.tracker.terms.photometric.matching import SIGNIFICANT
 from abs_service.tracker.terms.places.keypoints import RIGID_PX, Recognized
@@ -204,7 +204,7 @@ class FramePosterior:
         moved = found.moved(model.mesh.vertices)
         if min(found.apart(self._vertices(predicted)), RIGID_PX) <= found.apart(moved):
             return predicted
-        return reached(model, model.rest, moved)
+        return fit_to_vertices(model, model.rest, moved)
 
     def _has_keypoints(self, theta: NDArray[np.float64], within_px: float) -> bool:
         """True if most keypoints of a mesh at theta (dim,) are recognised within some pixels of theirs."""

@@ -35,7 +35,7 @@ def fit_to_points(
     thinned = points[:: max(1, len(points) // _POINTS)]
     rest = model.mesh.vertices
     before = model.deform(last[None]).vertices[0].T.astype(np.float64)
-    theta = reached(model, last, _moved(rest, before, thinned))
+    theta = fit_to_vertices(model, last, _aligned(rest, before, thinned))
     stretch, shape = StretchPrior(model.mesh, _STRETCH), ShapePrior(model.rest, model.prior)
     tree = scipy.spatial.KDTree(thinned)
     for _ in range(_STEPS):
@@ -49,7 +49,9 @@ def fit_to_points(
     return theta
 
 
-def _moved(rest: NDArray[np.float64], before: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+def _aligned(
+    rest: NDArray[np.float64], before: NDArray[np.float64], points: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """Rest vertices (n, 3) rigidly aligned with points (k, 3), with the smallest rotation from `before`."""
     center, own = _axes(rest)
     place, seen = _axes(points)
@@ -67,8 +69,10 @@ def _axes(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.
     return center, axes
 
 
-def reached(model: DeformationModel, theta: NDArray[np.float64], target: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Least-squares parameters (dim,) for target vertices (n, 3) [m]."""
+def fit_to_vertices(
+    model: DeformationModel, theta: NDArray[np.float64], target: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Least-squares parameters (dim,) for target vertices (n, 3) [m], from theta (dim,) on."""
     everywhere = np.arange(len(target))
     for _ in range(_STEPS):
         vertices = model.deform(theta[None]).vertices[0].T.astype(np.float64)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.detection.depth_view import DepthView, limited
 from abs_service.tracker.detection.initial_detection import DetectionError
-from abs_service.tracker.detection.plausibility import lining
+from abs_service.tracker.detection.plausibility import border_length
 from abs_service.tracker.detection.segments.depth_segments import (
     deepest_pixel,
     is_within_reach,
@@ -64,7 +64,7 @@ class Settings(SurfaceSettings):
             return alone if is_within_reach(self.seed, alone) else thing
         labels, large = self._surfaces(above)
         things = _before_background([labels == label for label in large], plane, view)
-        if lining(things[0], view.measured):
+        if border_length(things[0], view.measured):
             self._refuse_background(things[0], things[1:], view)
             return things[0]
         for thing in things:
@@ -81,7 +81,7 @@ class Settings(SurfaceSettings):
         medians = {
             float(np.median(view.distance[other])): other
             for other in others
-            if not (_is_speck(other, main) or lining(other, view.measured))
+            if not (_is_speck(other, main) or border_length(other, view.measured))
         }
         if medians and min(medians) < away:
             row, column = deepest_pixel(medians[min(medians)])
@@ -126,7 +126,7 @@ def _before_background(
     """
     end = np.percentile(view.distance[plane], PLANE_PERCENT)
     for k, surface in enumerate(surfaces):
-        if not (lining(surface, view.measured) and np.median(view.distance[surface]) > end):
+        if not (border_length(surface, view.measured) and np.median(view.distance[surface]) > end):
             return surfaces if _is_speck(surface, surfaces[0]) else surfaces[k:]
     return surfaces
 
