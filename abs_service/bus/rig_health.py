@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 
 import zenoh
 from absmsg.v1.health_pb2 import Health
@@ -53,8 +54,7 @@ def ask(
         deadline_s = time.monotonic() + PATIENCE_S
         for reply in session.liveliness().get(keys.key(rig, keys.live("**")), timeout=PATIENCE_S):
             if reply.ok is not None:
-                name, component = _rig_and_component(reply.ok)
-                health.setdefault(name, {})[component] = None
+                _note(reply.ok, None, health)
         while time.monotonic() < deadline_s and not _complete(health, expected):
             while (sample := subscriber.try_recv()) is not None:
                 _take(sample, health)
@@ -70,14 +70,13 @@ def _complete(health: RigHealth, expected: Expected) -> bool:
 
 
 def _take(sample: zenoh.Sample, health: RigHealth) -> None:
-    name, component = _rig_and_component(sample)
-    try:
-        health.setdefault(name, {})[component] = parse_valid(Health, sample.payload.to_bytes())
-    except MessageError:
-        return  # from a stranger; the component's own follows, or its silence is reported
+    # One that is not valid is a stranger's; the component's own follows, or its silence is reported.
+    with suppress(MessageError):
+        _note(sample, parse_valid(Health, sample.payload.to_bytes()), health)
 
 
-def _rig_and_component(sample: zenoh.Sample) -> tuple[str, str]:
-    # abs/<rig>/health/<component> and abs/<rig>/live/<component>
-    _, rig, _, component = str(sample.key_expr).split("/", 3)
-    return rig, component
+def _note(sample: zenoh.Sample, own: Health | None, health: RigHealth) -> None:
+    # abs/<rig>/health/<component> and abs/<rig>/live/<component>; keys with wildcards, or fewer parts, are strangers'
+    parts = str(sample.key_expr).split("/", 3)
+    if len(parts) == 4 and "*" not in parts[1] + parts[3]:
+        health.setdefault(parts[1], {})[parts[3]] = own

@@ -181,9 +181,13 @@ class ZenohBus:
         return keys.key(self._rig, topic)
 
     def _sample(self, sample: zenoh.Sample) -> Sample:
-        payload, attachment = copied(sample.payload), sample.attachment
+        payload, attachment, key = copied(sample.payload), sample.attachment, str(sample.key_expr)
+        try:
+            topic = keys.topic(self._rig, key)
+        except keys.KeyNameError:  # with wildcards, say abs/**, which includes topics of the rig
+            topic = f"/{key}"  # is none, and will be refused and counted
         return Sample(
-            keys.topic(self._rig, str(sample.key_expr)),
+            topic,
             _message(sample.encoding),
             payload or b"",
             b"" if attachment is None else attachment.to_bytes(),

@@ -7,6 +7,7 @@ import numpy as np
 
 from abs_service.api.estimate import Estimate
 from abs_service.export.errors import ExportError
+from calib.files import atomic
 
 _PLY = """ply
 format binary_little_endian 1.0
@@ -41,7 +42,7 @@ def write(estimates: Iterable[Estimate], path: Path) -> int:
     for number, one in enumerate(estimates, start=1):
         if len(one.vertices):
             content = _obj(one) if path.suffix == ".obj" else _ply(one)
-            path.with_name(f"{path.stem}_{number - 1:06d}{path.suffix}").write_bytes(content)
+            atomic.write(path.with_name(f"{path.stem}_{number - 1:06d}{path.suffix}"), content)
     return number
 
 

@@ -10,8 +10,11 @@ import time
 import pytest
 
 from abs_service.bus.contract import EVENTS, IMAGES, STATE, Sample
-from abs_service.bus.session import SessionMode
+from abs_service.bus.health import Health
+from abs_service.bus.session import SessionMode, open_session
+from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.bus.zenoh_bus import ZenohBus
+from abs_service.wire.checked_bus import CheckedBus
 
 
 def listen(bus, pattern):
@@ -35,6 +38,21 @@ def publish_until_received(publisher, arrived, *message):
         except queue.Empty:
             continue
     raise AssertionError("nothing arrived within ten seconds")
+
+
+@pytest.mark.parametrize("key", ["abs/**", "**", "abs/demo", "abs/*/tof/depth/image"])
+def test_a_key_with_wildcards_is_refused_as_no_topic(open_bus, endpoint, key):
+    open_bus()
+    with CheckedBus(open_bus(), time.monotonic_ns) as receiver, open_session(endpoint, SessionMode.CLIENT) as stranger:
+        listen(receiver, "**")
+        health = Health(receiver, "run", HeaderFactory("demo", WallClock()))
+        for _ in range(200):
+            stranger.put(key, b"")
+            receiver.report(health)
+            if receiver.trouble:
+                break
+            time.sleep(0.05)
+    assert health.counted("refused.topic") > 1
 
 
 def next_after(arrived, earlier):

@@ -2,6 +2,7 @@
 
 import json
 import threading
+import time
 
 import pytest
 from absmsg.v1.health_pb2 import Health as Message
@@ -9,6 +10,7 @@ from absmsg.v1.health_pb2 import Health as Message
 from abs_service import cli
 from abs_service.bus.contract import EVENTS
 from abs_service.bus.health import Health, Level
+from abs_service.bus.session import SessionMode, open_session
 from abs_service.bus.stamps import HeaderFactory, WallClock
 
 
@@ -117,6 +119,30 @@ def test_a_page_that_speaks_later_than_the_others_is_waited_for(rig, endpoint, o
     ended.set()
     thread.join()
     assert (code, "view         ok" in said.out) == (0, True)
+
+
+def test_keys_with_wildcards_or_without_a_component_are_nobodys(rig, endpoint, capsys):
+    ended = threading.Event()
+    keys = ("**", "abs/**", "abs/demo/health", "abs/*/health/run", "abs/demo/live/**")
+
+    def disturb():
+        with open_session(endpoint, SessionMode.CLIENT) as stranger:
+            tokens = [stranger.liveliness().declare_token(key) for key in ("abs/demo/live", *keys)]
+            while not ended.wait(0.01):
+                for key in keys:
+                    stranger.put(key, Message().SerializeToString())
+            for token in tokens:
+                token.undeclare()
+
+    thread = threading.Thread(target=disturb)
+    thread.start()
+    try:
+        time.sleep(0.3)
+        code, said = status(endpoint, capsys)
+    finally:
+        ended.set()
+        thread.join()
+    assert (code, said.out.count("\n")) == (0, 4)
 
 
 def test_a_bus_that_capture_hosts_lacks_no_run(open_bus, endpoint, capsys):
