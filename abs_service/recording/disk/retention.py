@@ -14,6 +14,11 @@ from abs_service.recording.recording_file import ACTIVE
 KEEP = ".keep"
 
 
+#: 2020: no recording of this service is older. What seems to be was recorded by a clock without a battery, which begins
+#: in 1970 at each start [ns since the epoch].
+OLDEST_NS = 1_577_836_800_000_000_000
+
+
 @dataclass(frozen=True, slots=True)
 class RetainedFile:
     """A file of the recorder: its name, size [bytes] and time of its last change [ns since the epoch]."""
@@ -31,7 +36,8 @@ class Ages:
 
     A clock that follows no time server may be wrong by years, as without a battery, and all that is older would be
     deleted at once. Until it follows one, a time longer than `retain_s` in which nothing was recorded is no part of an
-    age. For the same reason, `restic forget --keep-within` counts from the latest snapshot.
+    age. For the same reason, `restic forget --keep-within` counts from the latest snapshot. Nobody knows how old that is
+    which was recorded before `OLDEST_NS`: it counts from now on.
 
     Args:
         wall: wall-clock time of a time of the monotonic clock [ns].
@@ -66,7 +72,7 @@ class Ages:
         changed_ns, doubted, is_trusted = {}, list[str](), self._is_synchronised()
         left_out_ns, later_ns, wall_ns = 0, now_ns, self._wall(0)
         for file in reversed(files):
-            t_ns = min(file.mtime_ns - wall_ns, now_ns)
+            t_ns = min(file.mtime_ns - wall_ns, now_ns) if file.mtime_ns >= OLDEST_NS else now_ns
             if not is_trusted and later_ns - t_ns > self._retain_s * 1e9:
                 left_out_ns += later_ns - t_ns
             later_ns, name = t_ns, file.name.removesuffix(ACTIVE)

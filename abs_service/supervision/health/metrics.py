@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from abs_service.supervision.health.rig_view import RigView
 from drivers.contract.errors import install_extra
@@ -13,6 +13,9 @@ if TYPE_CHECKING:
 
 #: Period in which the numbers are taken [ns]; health comes as often.
 PERIOD_NS = 1_000_000_000
+
+#: Time that who connects has for a request [s]; each keeps a thread meanwhile.
+IDLE_S = 10.0
 
 _STATUSES = ("INITIALIZING", "TRACKING", "DEGRADED", "LOST")
 
@@ -41,10 +44,13 @@ def served(port: int) -> Iterator[Callable[[RigView], None]]:
         raise MetricsError(missing) from error
     snapshot, registry = _Snapshot(), CollectorRegistry()
     registry.register(snapshot)
+    server: Any  # whose handler of requests is typed as a function
     try:
         server, thread = start_http_server(port, "127.0.0.1", registry)
     except OSError as error:
         raise MetricsError(f"run.metrics_port = {port}: {error.strerror}; choose another port, or 0") from error
+    server.RequestHandlerClass.timeout = IDLE_S
+    server.handle_error = _ignore_error  # who says nothing, or nonsense, is no error of the rig
     try:
         yield snapshot.update
     finally:
@@ -125,4 +131,8 @@ def _of_components(view: RigView) -> Iterator[Row]:
 
 
 def _ignore(view: RigView) -> None:
+    pass
+
+
+def _ignore_error(request: object, client: object) -> None:
     pass

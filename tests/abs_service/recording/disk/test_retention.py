@@ -53,6 +53,11 @@ def test_what_is_too_old_is_deleted(week):
     assert len(list(week.iterdir())) == 4
 
 
+def test_what_a_clock_of_1970_recorded_is_not_as_old_as_that(week):
+    put(week, "demo_1970-01-01T00-00-09Z.mcap", NOW_NS / DAY_NS)
+    assert names(apply(Retention(week, "demo", "", retain_s=5.5 * 86_400, retain_bytes=math.inf))) == [take(1), take(2)]
+
+
 def test_the_oldest_are_deleted_until_the_others_fit(week):
     assert names(apply(Retention(week, "demo", "", math.inf, 350))) == [take(day) for day in (1, 2, 3, 4)]
 

@@ -121,6 +121,14 @@ def test_only_loopback_is_answered_and_nobody_after_the_end(read, port):
         read()
 
 
+def test_who_says_nothing_is_let_go_without_a_word(read, port, monkeypatch, capfd):
+    monkeypatch.setattr(metrics, "IDLE_S", 0.2)
+    with metrics.served(port), socket.create_connection(("127.0.0.1", port), 5) as idle:
+        assert read() == {}
+        assert idle.recv(1) == b"", "closed"
+    assert capfd.readouterr().err == ""
+
+
 def test_a_port_in_use_is_named(read, port):
     with (
         metrics.served(port),
