@@ -34,6 +34,8 @@ from drivers.encoding.message_content import MessageError
 
 #: Topics of which messages are taken. A rig of ten sensors and four trackers has about 70.
 MAX_TOPICS = 1000
+#: Time without a message after which a topic makes room for a new one where there are that many [s].
+QUIET_S = 600
 #: Messages of one topic that are taken in a second; the fastest cameras deliver 300.
 MAX_PER_S = 1000
 #: Most parts of a topic: sensor, stream, image.
@@ -86,8 +88,11 @@ class Edge:
         now_s = self._clock() // _SECOND_NS
         with self._lock:
             if topic not in self._seconds and len(self._seconds) >= MAX_TOPICS:
-                raise MessageError("topics", f"one more than {MAX_TOPICS} topics")
-            second, number = self._seconds.get(topic, (now_s, 0))
+                quietest = next(iter(self._seconds))
+                if now_s - self._seconds[quietest][0] < QUIET_S:
+                    raise MessageError("topics", f"one more than {MAX_TOPICS} topics")
+                del self._seconds[quietest]  # a flood of long ago must not keep out a tracker that is added
+            second, number = self._seconds.pop(topic, (now_s, 0))  # the last one heard is at the end
             number = number + 1 if second == now_s else 1
             self._seconds[topic] = now_s, number
         if number > MAX_PER_S:

@@ -14,7 +14,7 @@ from abs_service.recording.recording_file import ACTIVE
 KEEP = ".keep"
 
 
-#: 2020: no recording of this service is older. What seems to be was recorded by a clock without a battery, which begins
+#: 2020: no recording of this service is older. What seems to be was recorded by a clock without battery, which begins
 #: in 1970 at each start [ns since the epoch].
 OLDEST_NS = 1_577_836_800_000_000_000
 
@@ -36,8 +36,9 @@ class Ages:
 
     A clock that follows no time server may be wrong by years, as without a battery, and all that is older would be
     deleted at once. Until it follows one, a time longer than `retain_s` in which nothing was recorded is no part of an
-    age. For the same reason, `restic forget --keep-within` counts from the latest snapshot. Nobody knows how old that is
-    which was recorded before `OLDEST_NS`: it counts from now on.
+    age. For the same reason, `restic forget --keep-within` counts from the latest snapshot.
+
+    Nobody knows the age of what was recorded before `OLDEST_NS`: it counts from now on.
 
     Args:
         wall: wall-clock time of a time of the monotonic clock [ns].

@@ -44,6 +44,7 @@ class EstimateServer(ThreadingHTTPServer):
 
 class _Reader(BaseHTTPRequestHandler):
     server: EstimateServer  # pyright: ignore[reportIncompatibleVariableOverride]
+    timeout = 10.0  # one that asks nothing or reads nothing for so long is let go, since each keeps a thread [s]
 
     def do_GET(self) -> None:
         try:

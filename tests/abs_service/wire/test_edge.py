@@ -19,7 +19,7 @@ from abs_service.bus.health import Health as HealthPublisher
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.capture import sensor_metadata
 from abs_service.wire.checked_bus import CheckedBus
-from abs_service.wire.edge import MAX_PER_S, MAX_TOPICS, Edge
+from abs_service.wire.edge import MAX_PER_S, MAX_TOPICS, QUIET_S, Edge
 from abs_service.wire.viewer_messages import point_cloud, scene_update
 from tests.abs_service.bus.loopback import LoopbackBus, health_now
 from tests.abs_service.wire.golden.freeze import BINARY, published
@@ -156,6 +156,20 @@ def test_too_many_topics_are_refused_and_the_known_ones_go_on():
     assert sum(map(edge.admits, flood)) == MAX_TOPICS
     assert edge.refused == {"topics": 5}
     assert edge.admits(flood[0])
+
+
+def test_topics_of_a_flood_make_room_when_it_is_long_over():
+    now_ns = [0]
+    edge = Edge(lambda: now_ns[0])
+    known, *flood = [sample(f"health/{number}", Health(component=str(number))) for number in range(MAX_TOPICS + 2)]
+    for one in (known, *flood[:-2], known):
+        assert edge.admits(one)
+    now_ns[0] = (QUIET_S - 1) * S
+    assert edge.admits(known)
+    assert not edge.admits(flood[-1])
+    now_ns[0] += S
+    assert edge.admits(flood[-1])
+    assert edge.admits(known)
 
 
 @given(samples())

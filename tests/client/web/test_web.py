@@ -5,6 +5,7 @@ import json
 import os
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -12,6 +13,7 @@ import urllib.error
 import urllib.request
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -104,6 +106,16 @@ def test_what_is_not_there_is_refused(address, path):
     with pytest.raises(urllib.error.HTTPError, match="404") as refused:
         urllib.request.urlopen(address + path, timeout=TIMEOUT_S)
     refused.value.close()
+
+
+def test_who_asks_nothing_is_let_go(bus, endpoint, monkeypatch):
+    with Link(endpoint, "demo") as link, EstimateServer(("127.0.0.1", 0), link, 0.5, "") as server:
+        handler: Any = server.RequestHandlerClass
+        assert handler.timeout == 10
+        monkeypatch.setattr(handler, "timeout", 0.1)
+        with socket.create_connection(("127.0.0.1", server.server_port), TIMEOUT_S) as idle:
+            server.handle_request()
+            assert idle.recv(1) == b"", "closed"
 
 
 def test_estimates_of_a_closed_link_are_an_error_and_no_stream(bus, endpoint):
