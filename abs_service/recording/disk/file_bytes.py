@@ -29,19 +29,22 @@ class FileBytes:
         if end - begin > WINDOW:
             return self._read(begin, end)
         if not self._begin <= begin <= end <= self._begin + len(self._window):
-            self._begin, self._window = begin, self._read(begin, min(begin + WINDOW, self._size))
+            self._move(begin)
         return self._window[begin - self._begin : max(end, begin) - self._begin]
 
     def find(self, byte: bytes, start: int) -> int:
         """Position of the first such byte at or after `start`; -1 if there is none."""
         while start < self._size:
-            inside = self._begin <= start < self._begin + len(self._window)
-            end = self._begin + len(self._window) if inside else min(start + WINDOW, self._size)
-            found = self[start:end].find(byte)
+            if not self._begin <= start < self._begin + len(self._window):
+                self._move(start)
+            found = self._window.find(byte, start - self._begin)  # not in a copy: random bytes have 4096 in each
             if found >= 0:
-                return start + found
-            start = end
+                return self._begin + found
+            start = self._begin + len(self._window)
         return -1
+
+    def _move(self, begin: int) -> None:
+        self._begin, self._window = begin, self._read(begin, min(begin + WINDOW, self._size))
 
     def _read(self, begin: int, end: int) -> bytes:
         try:
