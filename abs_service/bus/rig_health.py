@@ -77,6 +77,7 @@ def _take(sample: zenoh.Sample, health: RigHealth) -> None:
 
 def _note(sample: zenoh.Sample, own: Health | None, health: RigHealth) -> None:
     # abs/<rig>/health/<component> and abs/<rig>/live/<component>; keys with wildcards, or fewer parts, are strangers'
-    parts = str(sample.key_expr).split("/", 3)
-    if len(parts) == 4 and "*" not in parts[1] + parts[3]:
+    key = str(sample.key_expr)
+    parts = key.split("/", 3)
+    if len(parts) == 4 and "*" not in key and (own is None or own.component == parts[3]):
         health.setdefault(parts[1], {})[parts[3]] = own

@@ -123,13 +123,13 @@ def test_a_page_that_speaks_later_than_the_others_is_waited_for(rig, endpoint, o
 
 def test_keys_with_wildcards_or_without_a_component_are_nobodys(rig, endpoint, capsys):
     ended = threading.Event()
-    keys = ("**", "abs/**", "abs/demo/health", "abs/*/health/run", "abs/demo/live/**")
+    keys = ("**", "abs/**", "abs/demo/health", "abs/*/health/run", "abs/demo/live/**", "abs/demo/*/state")
 
     def disturb():
         with open_session(endpoint, SessionMode.CLIENT) as stranger:
             tokens = [stranger.liveliness().declare_token(key) for key in ("abs/demo/live", *keys)]
             while not ended.wait(0.01):
-                for key in keys:
+                for key in (*keys, "abs/demo/health/another"):
                     stranger.put(key, Message().SerializeToString())
             for token in tokens:
                 token.undeclare()
