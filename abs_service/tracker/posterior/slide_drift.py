@@ -5,7 +5,13 @@ of Θ end at some millimetres, while the object goes on. Between two frames it m
 allows for, whose velocity v lasts for a time τ: 2 τ v² t in squares after a time t. What holds it with the information
 h takes all but 1 / (1 + h σ²) of that error away. Of a shift that is held to a millimetre nothing is left; a surface
 that nothing holds is known to 13 cm after a second.
+
+An outline holds a surface if it is its end. Of a sheet that rolls up it is a silhouette, which single images may show
+to be an end, at the place to which it has drawn the mesh. So after a long drift it has to be one in some in a row.
 """
+
+from collections import deque
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +24,10 @@ MIN_VARIANCE = 1e-8
 
 #: A slide is no longer than the object: larger variances are those of a surface that is anywhere, in squares of `size`.
 _MAX_VARIANCE = 4.0
+
+#: A surface that may have drifted farther than this [m], as within a sixth of a second, is held by an outline again if
+#: that is the object's end in so many images in a row.
+LONG_DRIFT_M, IN_A_ROW = 0.03, 8
 
 
 class SlideDrift:
@@ -32,6 +42,18 @@ class SlideDrift:
     def restart(self) -> None:
         """Restarts without drift, after a relocation, which has an error of its own."""
         self._variance = np.zeros(6)
+        self._by_outline = deque[NDArray[np.float64]](maxlen=IN_A_ROW)
+
+    def believed(self, slides: Slides) -> Slides:
+        """The slides of the estimate of a frame without what an outline holds for the moment, after a long drift."""
+        if not len(slides.held):
+            return slides
+        order = np.argsort(slides.held)
+        self._by_outline.append(slides.by_outline[order])
+        momentary = np.zeros(6)
+        momentary[order] = slides.by_outline[order] - np.min(self._by_outline, axis=0)
+        momentary[order] *= self._variance > LONG_DRIFT_M**2
+        return replace(slides, held=slides.held - momentary)
 
     def update(self, slides: Slides, prediction: MotionPrediction) -> NDArray[np.float64]:
         """Covariance of the vertices (n, 3, 3) by drift [m²], or (1, 1, 1) without any.

@@ -65,7 +65,7 @@ class Uncertainty:
         """
         theta = self._theta.update(optimum, frame, recent)
         vertices = self._vertices.update(optimum, frame, theta)
-        slides = self._slides.of(optimum)
+        slides = self._drift.believed(self._slides.of(optimum))
         return EstimateCovariance(
             theta,
             vertices + self._drift.update(slides, frame.motion),

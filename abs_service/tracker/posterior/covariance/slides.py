@@ -37,21 +37,25 @@ class Slides:
     """Rigid motions of the surface of one estimate, and what holds them.
 
     Attributes:
-        deviation_m: standard deviation of the vertices, root mean square, along the one that is held least; 0 for a
-            model that does not slide [m].
-        no_outline_deviation_m: the same without the outline, infinite for a model that does not slide [m].
+        no_outline_deviation_m: `deviation_m` without the outline, infinite for a model that does not slide [m].
         held: information (6,) on each of them [1/m²]; (0,) for a model that does not slide.
+        by_outline: what the outline has in it (6,) [1/m²].
         motions: the motions (6, 6), columns, of which each moves the vertices by 1, root mean square; see `_motions`.
         vertices: of the estimate (n, 3) [m].
         size: root mean square of their distances from their centre [m].
     """
 
-    deviation_m: float
     no_outline_deviation_m: float
     held: NDArray[np.float64]
+    by_outline: NDArray[np.float64]
     motions: NDArray[np.float64]
     vertices: NDArray[np.float64]
     size: float
+
+    @property
+    def deviation_m(self) -> float:
+        """Deviation of the vertices, root mean square, along the one that is held least; 0 if none slides [m]."""
+        return _deviation(self.held) if len(self.held) else 0.0
 
     def displacements(self, which: NDArray[np.intp]) -> NDArray[np.float64]:
         """Displacements of the vertices (n, 3, k) by k of the motions."""
@@ -59,7 +63,7 @@ class Slides:
 
 
 #: Of a model that does not slide.
-NO_SLIDES = Slides(0.0, np.inf, np.zeros(0), np.zeros((6, 0)), np.zeros((0, 3)), 0.0)
+NO_SLIDES = Slides(np.inf, np.zeros(0), np.zeros(0), np.zeros((6, 0)), np.zeros((0, 3)), 0.0)
 
 
 class SlideObservability:
@@ -91,8 +95,10 @@ class SlideObservability:
         inside = [isinstance(part, PointLinearization) for part in optimum.sensed]
         moved = _moved(vertices, *frame)
         motions, held = _held(known, feigned, moved)
+        by_outline, outline = np.zeros(6), np.logical_not(inside)
+        add_held(motions, known[outline], feigned[outline], by_outline)
         without_outline = _deviation(_held(known[inside], feigned[inside], moved)[1])
-        return Slides(_deviation(held), without_outline, held, motions, vertices, frame[1])
+        return Slides(without_outline, held, by_outline, motions, vertices, frame[1])
 
 
 def _held(
