@@ -65,6 +65,9 @@ def read(text: str, hints: Hints) -> Content:
         _numbers(info["rectification_matrix"], 9), np.eye(3).ravel()
     ):
         lost += ("rectification_matrix and projection_matrix: images are used as they are, not rectified",)
+    projection = _numbers(info["projection_matrix"], 12).tolist() if "projection_matrix" in info else [0.0] * 12
+    if projection[3]:
+        lost += (f"projection_matrix: it stands {-projection[3] / projection[0]:g} m beside another camera, along x",)
     return Content({str(info.get("camera_name") or hints.name): one}, lost)
 
 
@@ -118,7 +121,7 @@ def _numbers(table: Any, count: int | None = None) -> Any:
     try:
         numbers = np.array([float(number) for number in table["data"]])
     except (TypeError, ValueError) as error:
-        raise FormatError(f"no numbers: {error}") from None
+        raise FormatError(f"numbers have to be in a table, as data: […]: {error}") from None
     if count is not None and numbers.size != count:
         raise FormatError(f"{count} numbers are needed, not {numbers.size}")
     return numbers
