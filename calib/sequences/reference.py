@@ -62,7 +62,10 @@ def known(static: Static, depth: float, region: NDArray[np.bool_], generator: np
         NoiseError: there is no plane.
     """
     tolerance = _tolerance(static)
-    _, pixels = plane.find(static.mean, static.rays, static.still & region, tolerance, generator)
+    try:
+        _, pixels = plane.find(static.mean, static.rays, static.still & region, tolerance, generator)
+    except NoiseError as error:
+        raise NoiseError(f"{static.name}: {error}; {static.moving:.0%} of its pixels moved") from error
     q = plane.through(depth, static.mean[pixels], static.rays[pixels], tolerance[pixels])
     return _of(Kind.KNOWN, q, static, pixels)
 

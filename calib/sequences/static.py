@@ -1,5 +1,6 @@
 """Static sequence: mean and variance of each pixel while nothing moves."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,6 +51,13 @@ class Static:
     def still(self) -> NDArray[np.bool_]:
         """Pixels that were static during at least one segment."""
         return np.isfinite(self.mean)
+
+    @property
+    def common(self) -> float:
+        """Deviation of all pixels together from frame to frame, over that of a pixel alone [1]."""
+        off = (self.distance - self.mean).reshape(len(self.distance), -1)
+        frames = np.nanmean(off[np.isfinite(off).any(axis=1)], axis=1)
+        return float(np.std(frames) / math.sqrt(np.nanmedian(self.variance) or math.inf))
 
     def samples(self, reference: NDArray[np.floating], kept: slice = slice(None)) -> Samples:
         """Measurements of some kept frames, with true distances (height, width) [m]; NaN where unknown."""

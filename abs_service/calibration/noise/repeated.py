@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from abs_service.calibration.shots import sequences as recorded
 from calib.noise.base import NoiseError
 from calib.sequences.static_board import StaticBoard
+from calib.sequences.stillness import MIN_FRAMES
 
 Target = float | StaticBoard
 
@@ -46,8 +47,10 @@ def counted_once(
         given: sequences of one sensor, each with its target: depth [m], NaN if unknown, or the pose of a board.
 
     Raises:
-        NoiseError: one scene is said to be at two distances.
+        NoiseError: one scene is said to be at two distances, or images repeat each other too often.
     """
+    said = [text for one, _ in given if (text := _repeats(one))]
+    given = [(_different(one), target) for one, target in given]
     groups: list[list[int]] = []
     summaries = [_summary(one) for one, _ in given]
     for number, summary in enumerate(summaries):
@@ -61,12 +64,36 @@ def counted_once(
         (_joined([given[number][0] for number in group]) if len(group) > 1 else given[group[0]][0], given[group[0]][1])
         for group in groups
     ]
-    said = [
+    said += [
         f"{', '.join(given[number][0].name for number in group)} show the same scene, and count as one sequence"
         for group in groups
         if len(group) > 1
     ]
     return joined, said
+
+
+def _new(one: recorded.Sequence) -> list[int]:
+    """Numbers of the images that do not repeat the one before, as those of a camera do that is read too often."""
+    return [
+        number
+        for number, image in enumerate(one.lengths)
+        if not number or image.tobytes() != one.lengths[number - 1].tobytes()
+    ]
+
+
+def _repeats(one: recorded.Sequence) -> str:
+    """Sentence on images that repeat the one before; "" without any."""
+    count = len(one.lengths) - len(_new(one))
+    return f"{one.name}: {count} of {len(one.lengths)} images repeat the one before, and are left out" if count else ""
+
+
+def _different(one: recorded.Sequence) -> recorded.Sequence:
+    new = _new(one)
+    if len(new) == len(one.lengths):
+        return one
+    if len(new) < MIN_FRAMES:
+        raise NoiseError(f"{_repeats(one)}: fewer than {MIN_FRAMES} are left")
+    return replace(one, lengths=one.lengths[new], amplitude=one.amplitude[new])
 
 
 def _summary(one: recorded.Sequence) -> _Summary:

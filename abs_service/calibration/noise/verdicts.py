@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from abs_service.calibration.noise import recordings
 from abs_service.calibration.noise.measurement import NoiseCalibration
 from abs_service.report.content import Level, Verdict
 from calib.sequences.candidates import Level as Places
@@ -15,9 +16,6 @@ _COVERAGE, _VARIANCE = 0.03, (0.8, 1.25)
 
 #: Ratio of largest to smallest distance below which a model covers a single distance; likewise for amplitudes.
 _SPREAD = 1.3
-
-#: Fraction of moving pixels that triggers a warning.
-_MOVING = 0.3
 
 #: Largest uncertainty of true distances at which an offset is meaningful [m].
 _WELL_KNOWN = 2e-3
@@ -35,13 +33,14 @@ def verdicts(found: NoiseCalibration) -> tuple[Verdict, ...]:
         _use(found),
         _agreement(found),
         *_measured(found),
+        *recordings.distances(found),
         *_boards(found),
         *_undetermined(found),
         *_missing(found),
         *_places(found),
         _outside(found),
         *_steps(found),
-        *_motion(found),
+        *recordings.motion(found),
     )
 
 
@@ -221,12 +220,3 @@ def _steps(found: NoiseCalibration) -> list[Verdict]:
         return [Verdict(Level.GOOD, text)]
     text = f"Distances come in steps of {step * 1e3:.2g} mm at {far:.2f} m; σ contains their share."
     return [Verdict(Level.GOOD, text)] if step > 0 else []
-
-
-def _motion(found: NoiseCalibration) -> list[Verdict]:
-    said = []
-    for static in found.statics:
-        if static.moving > _MOVING:
-            text = f"{static.moving:.0%} of the pixels moved and were left out."
-            said.append(Verdict(Level.DOUBTFUL, text, "Look at the map of what was taken as static.", static.name))
-    return said

@@ -66,3 +66,20 @@ def test_a_pattern_of_the_pixels_that_a_map_holds_is_no_noise_that_is_missed() -
     assert max(row.fixed / row.temporal for _, row in result.rows) > 2
     assert worst(result)[0] < Level.BAD
     assert worst(replace(result, model=Constant(2e-4)))[0] is Level.BAD
+
+
+def test_a_distance_that_the_target_cannot_have_is_named(found: measurement.NoiseCalibration) -> None:
+    assert not any("--distance-m says" in one.text for one in verdicts(found))
+    rows = tuple((name, replace(row, offset=-0.04 * row.distance)) for name, row in found.rows)
+    (said,) = (one for one in verdicts(replace(found, rows=rows)) if "--distance-m says" in one.text)
+    assert said.level is Level.DOUBTFUL
+    assert "4.0% shorter" in said.text
+
+
+def test_a_sensor_that_shakes_is_named(found: measurement.NoiseCalibration) -> None:
+    assert not any("change together" in one.text for one in verdicts(found))
+    (static,) = found.statics
+    shifts = np.sqrt(np.nanmedian(static.variance)) * np.sin(np.arange(len(static.distance)))[:, None, None]
+    shaken = replace(found, statics=(replace(static, distance=static.distance + shifts),))
+    (said,) = (one for one in verdicts(shaken) if "change together" in one.text)
+    assert said.level is Level.DOUBTFUL

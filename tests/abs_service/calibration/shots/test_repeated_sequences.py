@@ -59,3 +59,19 @@ def test_other_distances_and_other_materials_are_kept_apart(other: sequences.Seq
 def test_one_scene_cannot_be_at_two_distances() -> None:
     with pytest.raises(NoiseError, match=r"a and b show the same scene, but are said to be 1.2 and 0.8 m away"):
         counted_once([(wall("a"), 1.2), (wall("b"), 0.8)])
+
+
+def test_images_that_a_camera_repeats_are_left_out_and_counted() -> None:
+    once = wall("a")
+    twice = replace(once, lengths=once.lengths.repeat(2, axis=0), amplitude=once.amplitude.repeat(2, axis=0))
+    ((joined, _),), said = counted_once([(twice, 1.2)])
+    np.testing.assert_array_equal(joined.lengths, once.lengths)
+    np.testing.assert_array_equal(joined.amplitude, once.amplitude)
+    assert said == ["a: 20 of 40 images repeat the one before, and are left out"]
+
+
+def test_a_camera_that_repeats_one_image_is_refused() -> None:
+    once = wall("a")
+    stuck = replace(once, lengths=once.lengths[:1].repeat(20, axis=0), amplitude=once.amplitude[:1].repeat(20, axis=0))
+    with pytest.raises(NoiseError, match="a: 19 of 20 images repeat the one before, and are left out: fewer than 8"):
+        counted_once([(stuck, 1.2)])
