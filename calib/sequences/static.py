@@ -57,7 +57,7 @@ class Static:
         """Deviation of all pixels together from frame to frame, over that of a pixel alone [1]."""
         off = (self.distance - self.mean).reshape(len(self.distance), -1)
         frames = np.nanmean(off[np.isfinite(off).any(axis=1)], axis=1)
-        return float(np.std(frames) / math.sqrt(np.nanmedian(self.variance) or math.inf))
+        return float(np.std(frames) / math.sqrt(np.mean(self.variance[self.still]) or math.inf))
 
     def samples(self, reference: NDArray[np.floating], kept: slice = slice(None)) -> Samples:
         """Measurements of some kept frames, with true distances (height, width) [m]; NaN where unknown."""
