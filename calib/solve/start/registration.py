@@ -17,9 +17,10 @@ SPANNING = 0.03
 def fit_plane(camera: Camera, view: PlaneView) -> tuple[NDArray[np.float64], float]:
     """Normal n (3,), away from the sensor, and distance h [m] of the plane n · p = h, in the sensor's frame."""
     points = camera.directions(view.pixels) * view.distances[:, None]
-    center = np.median(points, axis=0)
-    kept = np.ones(len(points), np.bool_)
-    normal = center
+    normal = center = np.median(points, axis=0)
+    # Flying pixels would turn the first plane towards themselves; on a tilted board distances are 2 medians off at most.
+    away = np.abs(view.distances - np.median(view.distances))
+    kept = away <= 3 * np.median(away) + 1e-9
     for _ in range(3):  # refitted without outliers
         _, _, axes = np.linalg.svd(points[kept] - points[kept].mean(axis=0), full_matrices=False)
         normal, center = axes[2], points[kept].mean(axis=0)
