@@ -126,7 +126,8 @@ def cameras(solution: Solution) -> Iterator[str]:
         rms = [view.rms for view in solution.views if (view.sensor, view.of) == (name, "corners")]
         fit = [f"corners miss by {np.sqrt(np.mean(np.square(rms))):.2g} px"] if rms else []
         near, far = reach(solution, name)
-        yield f"{name}: {', '.join([*known, *fit])}, boards {near:.2g} to {far:.2g} m away{_stretched(own, name)}"
+        boards = f"boards {near:.2g} to {far:.2g} m away{_stretched(own, name)}"
+        yield f"{name}: {', '.join([*known, *fit, boards])}"
 
 
 def _stretched(parameters: Mapping[str, Parameter], name: str) -> str:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from abs_service.calibration.cameras.report import cameras
 from calib import pose
 from calib.pose import Pose
 from calib.solve.bundle.tasks import SensorTask, Task
@@ -114,6 +115,7 @@ def test_a_depth_sensor_without_corners_is_placed_by_planes_alone() -> None:
     error = pose_error(solution, "light", camera.T_rs)
     assert np.linalg.norm(error[3:]) < 2e-3
     assert np.linalg.norm(error[:3]) < 4e-3
+    assert any(line.startswith("light: boards ") for line in cameras(solution))
 
 
 @pytest.mark.slow
