@@ -13,12 +13,15 @@ from calib.solve.start.extrinsics_graph import NotConnectedError
 #: Normals span the space if their smallest singular value, relative to the largest, is above this.
 SPANNING = 0.03
 
+#: Units differ by a larger factor; it has to leave less than this share of the misfit, of this many planes.
+OTHER_UNIT, CLEARLY, MIN_FOR_UNIT = 2.0, 0.1, 6
+
 
 def fit_plane(camera: Camera, view: PlaneView) -> tuple[NDArray[np.float64], float]:
     """Normal n (3,), away from the sensor, and distance h [m] of the plane n · p = h, in the sensor's frame."""
     points = camera.directions(view.pixels) * view.distances[:, None]
     normal = center = np.median(points, axis=0)
-    # Flying pixels would turn the first plane towards themselves; on a tilted board distances are 2 medians off at most.
+    # Flying pixels would turn the first plane to themselves; on a tilted board distances are 2 medians off at most.
     away = np.abs(view.distances - np.median(view.distances))
     kept = away <= 3 * np.median(away) + 1e-9
     for _ in range(3):  # refitted without outliers
@@ -55,4 +58,20 @@ def register(name: str, camera: Camera, views: Sequence[PlaneView], boards: Mapp
     heights_r = np.array([boards[view.shot][:3, 2] @ boards[view.shot][:3, 3] for view in shared])
     heights_s = np.array([height for _, height in found])
     T_rs[:3, 3] = np.linalg.lstsq(normals_r, heights_r - heights_s, rcond=None)[0]
+    _check_unit(name, normals_r, heights_r, heights_s)
     return T_rs
+
+
+def _check_unit(
+    name: str, normals_r: NDArray[np.float64], heights_r: NDArray[np.float64], heights_s: NDArray[np.float64]
+) -> None:
+    """Refuses distances that fit the boards only if all are multiplied by a factor that no sensor errs by."""
+    columns = np.column_stack([normals_r, heights_s])
+    fitted = np.linalg.lstsq(columns, heights_r, rcond=None)[0]
+    as_given = np.linalg.lstsq(normals_r, heights_r - heights_s, rcond=None)[0]
+    left, off = np.std(heights_r - columns @ fitted), np.std(heights_r - heights_s - normals_r @ as_given)
+    if len(heights_s) >= MIN_FOR_UNIT and left < CLEARLY * off and not 1 / OTHER_UNIT < fitted[3] < OTHER_UNIT:
+        raise NotConnectedError(
+            f"{name}: its distances are {1 / fitted[3]:.3g} times as long as those of the boards: correct their unit, "
+            "or the size in the description of the board"
+        )

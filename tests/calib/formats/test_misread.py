@@ -97,3 +97,10 @@ def test_exchanged_width_and_height_are_named() -> None:
     assert "is in the middle of images of 640 × 480 pixels, not of 480 × 640" in said
     assert not doubts({"color": Camera(640, 480, 500.0, 500.0, 321.0, 238.0)})
     assert not doubts({"color": Camera(480, 480, 500.0, 500.0, 321.0, 238.0)})  # cropped
+
+
+def test_the_baseline_in_a_camera_info_is_listed_as_lost() -> None:
+    info = ros.write({"right": Camera(640, 480, 500, 500, 320, 240)}).text
+    assert not ros.read(info, Hints()).lost
+    (lost,) = ros.read(info.replace("320.0, 0.0, 0.0, 500.0", "320.0, -50.0, 0.0, 500.0"), Hints()).lost
+    assert "it stands 0.1 m beside another camera" in lost

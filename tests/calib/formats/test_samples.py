@@ -105,13 +105,6 @@ def test_a_camera_info_by_hand() -> None:
             ros.read(CAMERA_INFO.replace(model, wrong), HINTS)
 
 
-def test_the_baseline_in_a_camera_info_is_listed_as_lost() -> None:
-    info = ros.write({"right": Camera(640, 480, 500, 500, 320, 240)}).text
-    assert not ros.read(info, HINTS).lost
-    (lost,) = ros.read(info.replace("320.0, 0.0, 0.0, 500.0", "320.0, -50.0, 0.0, 500.0"), HINTS).lost
-    assert "it stands 0.1 m beside another camera" in lost
-
-
 CAMERAMODEL = """# written by hand
 {
     'lensmodel':  'LENSMODEL_OPENCV4',
