@@ -25,9 +25,9 @@ MIN_VARIANCE = 1e-8
 #: A slide is no longer than the object: larger variances are those of a surface that is anywhere, in squares of `size`.
 _MAX_VARIANCE = 4.0
 
-#: A surface that may have drifted farther than this [m], as within a sixth of a second, is held by an outline again if
+#: A surface that may have drifted farther than this [m], as within a third of a second, is held by an outline again if
 #: that is the object's end in so many images in a row.
-LONG_DRIFT_M, IN_A_ROW = 0.03, 8
+LONG_DRIFT_M, IN_A_ROW = 0.045, 8
 
 
 class SlideDrift:
