@@ -123,7 +123,7 @@ def _consistent(stored: Stored, views: Views, pair: tuple[str, str]) -> tuple[So
 def _of_the_rest(
     stored: Stored, views: Views, pair: tuple[str, str], suspected: list[Contradiction]
 ) -> tuple[Solution, list[Contradiction]] | None:
-    """Solution of the shots that agree with each other, and the others; None without any, or if too few agree.
+    """Solution of the shots that agree with each other, and the others; None without any or if too few agree.
 
     What contradicts distorts the solution of all shots, so that others seem to. Each that is suspected is tried with
     those that are not, the least suspected first.
@@ -138,7 +138,9 @@ def _of_the_rest(
             rest.add(one.shot)
         else:
             found.append(worse)
-    return solve(stored, views.of(pair, rest), pair[1:]), found[::-1]
+    with suppress(NotSolvedError):  # if others contradict as well
+        return solve(stored, views.of(pair, rest), pair[1:]), found[::-1]
+    return None
 
 
 def _contradiction(
