@@ -37,8 +37,8 @@ def motion(found: NoiseCalibration) -> list[Verdict]:
         if static.moving > _MOVING:
             text = f"{static.moving:.0%} of the pixels moved and were left out."
             said.append(Verdict(Level.DOUBTFUL, text, "Look at the map of what was taken as static.", static.name))
-        if static.common > _TOGETHER:
-            text = f"From image to image all pixels change together, by {static.common:.2g} times what one scatters by."
+        if (together := static.common) > _TOGETHER:
+            text = f"From image to image all pixels change together, by {together:.2g} times what one scatters by."
             advice = (
                 "Fasten the sensor and its target, and let the sensor warm up: σ and μ are those of things at rest."
             )

@@ -49,8 +49,9 @@ def counted_once(
     Raises:
         NoiseError: one scene is said to be at two distances, or images repeat each other too often.
     """
-    said = [text for one, _ in given if (text := _repeats(one))]
-    given = [(_different(one), target) for one, target in given]
+    different = [_different(one) for one, _ in given]
+    said = [text for _, text in different if text]
+    given = [(one, target) for (one, _), (_, target) in zip(different, given)]
     groups: list[list[int]] = []
     summaries = [_summary(one) for one, _ in given]
     for number, summary in enumerate(summaries):
@@ -72,28 +73,23 @@ def counted_once(
     return joined, said
 
 
-def _new(one: recorded.Sequence) -> list[int]:
-    """Numbers of the images that do not repeat the one before, as those of a camera do that is read too often."""
-    return [
+def _different(one: recorded.Sequence) -> tuple[recorded.Sequence, str]:
+    """The sequence without images that repeat the one before, as of a camera that is read too often, and what is said.
+
+    That is "" without any.
+    """
+    count = len(one.lengths)
+    new = [
         number
         for number, image in enumerate(one.lengths)
         if not number or image.tobytes() != one.lengths[number - 1].tobytes()
     ]
-
-
-def _repeats(one: recorded.Sequence) -> str:
-    """Sentence on images that repeat the one before; "" without any."""
-    count = len(one.lengths) - len(_new(one))
-    return f"{one.name}: {count} of {len(one.lengths)} images repeat the one before, and are left out" if count else ""
-
-
-def _different(one: recorded.Sequence) -> recorded.Sequence:
-    new = _new(one)
-    if len(new) == len(one.lengths):
-        return one
+    if len(new) == count:
+        return one, ""
+    said = f"{one.name}: {count - len(new)} of {count} images repeat the one before, and are left out"
     if len(new) < MIN_FRAMES:
-        raise NoiseError(f"{_repeats(one)}: fewer than {MIN_FRAMES} are left")
-    return replace(one, lengths=one.lengths[new], amplitude=one.amplitude[new])
+        raise NoiseError(f"{said}: fewer than {MIN_FRAMES} are left")
+    return replace(one, lengths=one.lengths[new], amplitude=one.amplitude[new]), said
 
 
 def _summary(one: recorded.Sequence) -> _Summary:

@@ -12,6 +12,7 @@ to be an end, at the place to which it has drawn the mesh. So after a long drift
 
 from collections import deque
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +31,18 @@ _MAX_VARIANCE = 4.0
 LONG_DRIFT_M, IN_A_ROW = 0.045, 8
 
 
+class Drift(NamedTuple):
+    """Drift in one frame.
+
+    Attributes:
+        covariance: of the vertices (n, 3, 3) by drift [m²], or (1, 1, 1) without any.
+        slides: those of the estimate, without what an outline holds for the moment after a long drift.
+    """
+
+    covariance: NDArray[np.float64]
+    slides: Slides
+
+
 class SlideDrift:
     """Variance of six motions of the surface, those that are held least first, over time.
 
@@ -44,10 +57,20 @@ class SlideDrift:
         self._variance = np.zeros(6)
         self._by_outline = deque[NDArray[np.float64]](maxlen=IN_A_ROW)
 
-    def believed(self, slides: Slides) -> Slides:
-        """The slides of the estimate of a frame without what an outline holds for the moment, after a long drift."""
+    def update(self, slides: Slides, prediction: MotionPrediction) -> Drift:
+        """The drift up to a frame.
+
+        Args:
+            slides: those of the estimate of the frame.
+            prediction: its motion prior. The first frame defines where the surface is.
+        """
         if not len(slides.held):
-            return slides
+            return Drift(np.zeros((1, 1, 1)), slides)
+        slides = self._without_momentary(slides)
+        return Drift(self._covariance(slides, prediction), slides)
+
+    def _without_momentary(self, slides: Slides) -> Slides:
+        """The slides without what an outline holds for the moment, after a long drift."""
         order = np.argsort(slides.held)
         self._by_outline.append(slides.by_outline[order])
         momentary = np.zeros(6)
@@ -55,14 +78,9 @@ class SlideDrift:
         momentary[order] *= self._variance > LONG_DRIFT_M**2
         return replace(slides, held=slides.held - momentary)
 
-    def update(self, slides: Slides, prediction: MotionPrediction) -> NDArray[np.float64]:
-        """Covariance of the vertices (n, 3, 3) by drift [m²], or (1, 1, 1) without any.
-
-        Args:
-            slides: those of the estimate of a frame.
-            prediction: its motion prior. The first frame defines where the surface is.
-        """
-        if prediction.is_first or not len(slides.held):
+    def _covariance(self, slides: Slides, prediction: MotionPrediction) -> NDArray[np.float64]:
+        """Covariance of the vertices (n, 3, 3), see `Drift`."""
+        if prediction.is_first:
             return np.zeros((1, 1, 1))
         order = np.argsort(slides.held)
         moved = self._variance + prediction.wandered_m2

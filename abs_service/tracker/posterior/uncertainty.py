@@ -65,11 +65,11 @@ class Uncertainty:
         """
         theta = self._theta.update(optimum, frame, recent)
         vertices = self._vertices.update(optimum, frame, theta)
-        slides = self._drift.believed(self._slides.of(optimum))
+        drift = self._drift.update(self._slides.of(optimum), frame.motion)
         return EstimateCovariance(
             theta,
-            vertices + self._drift.update(slides, frame.motion),
+            vertices + drift.covariance,
             without_drift=vertices,
-            single_frame_deviation_m=max(single_frame_deviation(optimum, frame.motion), slides.deviation_m),
-            no_outline_deviation_m=slides.no_outline_deviation_m,
+            single_frame_deviation_m=max(single_frame_deviation(optimum, frame.motion), drift.slides.deviation_m),
+            no_outline_deviation_m=drift.slides.no_outline_deviation_m,
         )

@@ -58,19 +58,26 @@ def register(name: str, camera: Camera, views: Sequence[PlaneView], boards: Mapp
     heights_r = np.array([boards[view.shot][:3, 2] @ boards[view.shot][:3, 3] for view in shared])
     heights_s = np.array([height for _, height in found])
     T_rs[:3, 3] = np.linalg.lstsq(normals_r, heights_r - heights_s, rcond=None)[0]
-    _check_unit(name, normals_r, heights_r, heights_s)
+    off = heights_r - heights_s - normals_r @ T_rs[:3, 3]
+    _check_unit(name, normals_r, heights_r, heights_s, float(np.std(off)))
     return T_rs
 
 
 def _check_unit(
-    name: str, normals_r: NDArray[np.float64], heights_r: NDArray[np.float64], heights_s: NDArray[np.float64]
+    name: str,
+    normals_r: NDArray[np.float64],
+    heights_r: NDArray[np.float64],
+    heights_s: NDArray[np.float64],
+    off_m: float,
 ) -> None:
-    """Refuses distances that fit the boards only if all are multiplied by a factor that no sensor errs by."""
+    """Refuses distances that fit the boards only if all are multiplied by a factor that no sensor errs by.
+
+    `off_m` is the deviation by which they miss the boards as they are.
+    """
     columns = np.column_stack([normals_r, heights_s])
     fitted = np.linalg.lstsq(columns, heights_r, rcond=None)[0]
-    as_given = np.linalg.lstsq(normals_r, heights_r - heights_s, rcond=None)[0]
-    left, off = np.std(heights_r - columns @ fitted), np.std(heights_r - heights_s - normals_r @ as_given)
-    if len(heights_s) >= MIN_FOR_UNIT and left < CLEARLY * off and not 1 / OTHER_UNIT < fitted[3] < OTHER_UNIT:
+    left_m = np.std(heights_r - columns @ fitted)
+    if len(heights_s) >= MIN_FOR_UNIT and left_m < CLEARLY * off_m and not 1 / OTHER_UNIT < fitted[3] < OTHER_UNIT:
         raise NotConnectedError(
             f"{name}: its distances are {1 / fitted[3]:.3g} times as long as those of the boards: correct their unit, "
             "or the size in the description of the board"

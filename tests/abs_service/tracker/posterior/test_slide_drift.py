@@ -48,12 +48,8 @@ BY_OUTLINE = replace(ADRIFT, held=HELD_AGAIN, by_outline=HELD_AGAIN - HELD)
 
 def deviations(frames: list[Slides]) -> list[float]:
     """Deviations along the slide [m] that are believed in each frame."""
-    drift, found = SlideDrift(), []
-    for slides in frames:
-        believed = drift.believed(slides)
-        drift.update(believed, PREDICTION)
-        found.append(believed.deviation_m)
-    return found
+    drift = SlideDrift()
+    return [drift.update(slides, PREDICTION).slides.deviation_m for slides in frames]
 
 
 def test_after_a_long_drift_an_outline_holds_a_surface_that_it_holds_in_many_frames():
