@@ -1,6 +1,7 @@
 """Calibration from views to a solution."""
 
 from collections.abc import Callable
+from contextlib import suppress
 
 from calib.solve import diagnoses
 from calib.solve.bundle.adjustment import NotSolvedError, adjust
@@ -12,6 +13,7 @@ from calib.solve.regrouping.two_groups import two_groups
 from calib.solve.solution import Solution
 from calib.solve.start.board_poses import untilted
 from calib.solve.start.start import start
+from calib.solve.start.undistorted import lenses_beside_distances, undistorted
 
 #: Two groups explain why there is no minimum if corners miss this many times more with the cameras of the other group.
 _APART = 3.0
@@ -42,6 +44,10 @@ def _solve(task: Task, start: State, note: Callable[[str], None]) -> Solution:
     try:
         return Solution(task, adjust(formulation, start, len(groups), note))
     except NotSolvedError as error:
+        if bent := lenses_beside_distances(task):
+            note("no minimum; once more, from lenses without distortion")
+            with suppress(NotSolvedError):
+                return Solution(task, adjust(formulation, undistorted(task, bent, start), len(groups), note))
         why = _two(task, start) or diagnoses.unlike_the_rest(task, start) or untilted(start.boards.values())
         raise NotSolvedError(f"{error}{why}") from error
 

@@ -41,6 +41,10 @@ NO_MINIMUM = (
 #: Deviations are as large as the residuals say: before the first estimate they may be many times too small.
 MIN_GAIN = 0.005
 
+#: Largest gradient at a minimum, in deviations of the scaled parameters; they likewise grow with the residuals. Found
+#: minima have 0.003; where a search ends because beyond are lenses without an inverse, it is 100 to 500.
+MAX_GRADIENT = 3.0
+
 #: Lower bound of a group's deviation factor.
 MIN_FACTOR = 0.01
 
@@ -192,8 +196,9 @@ def _stage(equations: Equations) -> tuple[NDArray[np.float64], bool]:
         max_nfev=STEPS,
     )
     gained = _cost(residuals) - float(found.cost)
-    minimum = MIN_GAIN * max(1.0, 2 * float(found.cost) / len(residuals))
-    return metric @ found.x, found.status > 0 or gained < minimum
+    variance = max(1.0, 2 * float(found.cost) / len(residuals))
+    flat = float(found.optimality) < MAX_GRADIENT * np.sqrt(variance)
+    return metric @ found.x, flat and (found.status > 0 or gained < MIN_GAIN * variance)
 
 
 def _cost(residuals: NDArray[np.float64]) -> float:
