@@ -21,8 +21,6 @@ class Kind(StrEnum):
     IR = "ir"
     COLOR = "color"
     BAYER = "bayer"
-    PHASE = "phase"
-    DISPARITY = "disparity"
     BINARY = "binary"
     DEVIATION = "deviation"
 

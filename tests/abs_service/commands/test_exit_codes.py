@@ -71,6 +71,22 @@ def test_130_for_ctrl_c_while_the_command_line_is_imported(monkeypatch):
     assert ended.value.code == Exit.INTERRUPTED
 
 
+def test_the_first_process_of_a_container_ends_by_sigterm_while_the_command_line_is_imported(monkeypatch):
+    before = signal.getsignal(signal.SIGTERM)
+    ends = Mock(side_effect=SystemExit)
+    monkeypatch.setattr(os, "_exit", ends)
+    monkeypatch.setattr(os, "getpid", lambda: 1)
+    importer = Mock(find_spec=lambda *_: signal.raise_signal(signal.SIGTERM))
+    monkeypatch.setattr(sys, "meta_path", [importer])
+    monkeypatch.delitem(sys.modules, "abs_service.cli")
+    try:
+        with pytest.raises(SystemExit):
+            start()
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    ends.assert_called_once_with(128 + signal.SIGTERM)
+
+
 def test_130_for_ctrl_c_in_a_native_import_which_would_make_a_failure_of_its_own_of_an_exception(monkeypatch):
     ends = Mock(side_effect=SystemExit)
     monkeypatch.setattr(os, "_exit", ends)
