@@ -5,6 +5,7 @@ from pathlib import Path
 
 from abs_service.calibration.shots.shots import SensorShot, Shot, ShotsError
 from calib.camera import Camera
+from calib.solve.regrouping.two_groups import numbered
 
 
 def checked(shots: Iterable[Shot]) -> Iterator[Shot]:
@@ -15,19 +16,35 @@ def checked(shots: Iterable[Shot]) -> Iterator[Shot]:
     """
     # Distances may have another size than the image, and either may be missing in a shot.
     first: dict[tuple[str, bool], tuple[tuple[int, int], str]] = {}
-    for shot in shots:
+    numbers: dict[tuple[str, bool], dict[tuple[int, int], set[int]]] = {}
+    every = iter(shots)
+    for shot in every:
         for sensor, look in shot.sensor_shots.items():
             if (size := _size(look)) is None:
                 continue
-            before, there = first.setdefault((sensor, bool(look.image.size)), (size, _source(shot, look)))
+            kind = sensor, bool(look.image.size)
+            before, there = first.setdefault(kind, (size, _source(shot, look)))
+            numbers.setdefault(kind, {}).setdefault(size, set()).add(shot.number)
             if size != before:
+                following = every if look.file is not None else ()  # the images of a device never end
                 turned = "Was it turned by 90°? Then turn it back, or leave" if size == before[::-1] else "Leave"
                 raise ShotsError(
                     f"{_source(shot, look)}: the image of {sensor} is {_text(size)}, but {_text(before)} in {there}; "
                     f"all images of a sensor must have one size. {turned} out those of the other size, "
-                    f"such as by --skip {shot.number}"
+                    f"such as by --skip {_fewer(numbers[kind], following, kind)}"
                 )
         yield shot
+
+
+def _fewer(found: dict[tuple[int, int], set[int]], following: Iterable[Shot], kind: tuple[str, bool]) -> str:
+    """Numbers of the shots whose images have not the most frequent size, with those that follow the ones found."""
+    sensor, has_image = kind
+    for shot in following:
+        look = shot.sensor_shots.get(sensor)
+        if look is not None and bool(look.image.size) == has_image and (size := _size(look)) is not None:
+            found.setdefault(size, set()).add(shot.number)
+    most = max(found.values(), key=len)
+    return numbered({number for own in found.values() for number in own} - most)
 
 
 def checked_for(shots: Iterable[Shot], cameras: Mapping[str, Camera], calibration: Path) -> Iterator[Shot]:

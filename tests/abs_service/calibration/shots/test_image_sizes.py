@@ -44,6 +44,14 @@ def test_a_calibration_refuses_images_of_two_sizes(folder: Path, capsys, command
     assert not (folder / "out.toml").exists()
 
 
+def test_of_two_sizes_all_images_of_the_rarer_one_are_named(folder: Path, capsys) -> None:
+    for number, size in ((0, (32, 24)), (4, (64, 48)), (5, (64, 48)), (6, (16, 12))):
+        cv2.imwrite(f"left{number}.png", np.full((size[1], size[0]), 128, np.uint8))
+    given = ["--images", "left=left*.png", "--target", "board.toml", "--out", "out.toml"]
+    assert cli.main(["calibrate", "intrinsics", *given]) == Exit.USER
+    assert capsys.readouterr().err.endswith("such as by --skip 0,3,6\n")
+
+
 def test_a_verification_refuses_images_that_the_stored_camera_is_not_for(folder: Path, capsys) -> None:
     given = ["--images", "left=left3*.png", "--target", "board.toml"]
     assert cli.main(["calibrate", "verify", "lab.toml", *given]) == Exit.USER
