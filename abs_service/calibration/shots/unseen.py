@@ -3,11 +3,14 @@
 from collections import Counter
 from collections.abc import Collection, Iterable, Sequence
 
+import numpy as np
+
 from abs_service.calibration.shots.corner_extraction import BoardObservations
 from abs_service.calibration.shots.shots import Shot
 from calib.board.april_grid import AprilGrid
 from calib.board.corners import description, errors
 from calib.board.corners.other_discs import other_discs
+from calib.board.corners.quality import is_saturated
 from calib.board.corners.search import chessboard_size
 from calib.board.corners.to_8bit import Grey, grey
 from calib.board.target import AsymmetricCircles, Charuco, Chessboard, Circles, Target
@@ -24,6 +27,11 @@ _WORDS = {
     errors.MovedError: "moved since the image before",
 }
 
+#: Saturated part of an image that may hide a board, and the level [of 255] below which nearly all of a dark one is.
+_BRIGHT, _DARK = 0.3, 16
+
+_CORRECT = "correct the description of the board, or the images"
+
 #: What to do about stills, which seem to move when they are given the times of a film.
 STILLS = "If these are single photographs, give them times of their own: abs-service import … --rate 1"
 
@@ -39,7 +47,7 @@ def reason(target: Target, seen: BoardObservations, shown: Sequence[Shot]) -> st
     count = len(seen.rejected)
     parts = reasons(seen.rejected.values())
     advice = f". {STILLS}" if mostly_moved(seen) else ""
-    other = f". {said}" if (said := instead(target, shown) or _advice(seen.rejected.values())) else ""
+    other = f". {said}" if (said := instead(target, shown, seen.rejected.values())) else ""
     return f"no {_name(target)} in any of {count} images: {parts}{other}{advice}"
 
 
@@ -57,10 +65,21 @@ def looked_at(shown: Sequence[Shot], shot: Shot) -> list[Shot]:
     return [*shown[:1], *shown[1:][-1:], shot]
 
 
-def instead(target: Target, shown: Sequence[Shot]) -> str:
-    """Clause on what shots show in place of the described board, and what to do; "" if that is not clear."""
-    said = _instead(target, shown)
-    return f"{said}: correct the description of the board, or the images" if said else ""
+def instead(target: Target, shown: Sequence[Shot], errors_: Collection[Exception]) -> str:
+    """Clauses on what shots show in place of the described board, and what to do; "" if that is not clear.
+
+    Args:
+        target: the board.
+        shown: some of the shots.
+        errors_: why images are not used.
+    """
+    images = _images(shown)
+    if said := _instead(target, images):
+        return f"{said}: {_CORRECT}"
+    if said := _advice(errors_):
+        return said
+    said = f"{said}: {_CORRECT}" if (said := _chessboard(target, images)) else ""
+    return ". ".join(filter(None, (said, _exposure(shown))))
 
 
 def more_than_described(target: Target, shown: Sequence[Shot]) -> str:
@@ -76,8 +95,7 @@ def more_than_described(target: Target, shown: Sequence[Shot]) -> str:
         if count > 1 and columns >= longer and rows >= shorter and (columns, rows) != (longer, shorter):
             return (
                 f"{count} images show a board of {columns} × {rows} inner corners, more than the {target.columns} × "
-                f"{target.rows} of the description, so that other corners may be taken in each image: correct the "
-                "description of the board, or the images"
+                f"{target.rows} of the description, so that other corners may be taken in each image: {_CORRECT}"
             )
     return ""
 
@@ -126,17 +144,38 @@ def _images(shown: Sequence[Shot]) -> list[tuple[str, Grey]]:
     ]
 
 
-def _instead(target: Target, shown: Sequence[Shot]) -> str:
-    """Clause on what shots show in place of the described board; "" if that is not clear."""
-    images = _images(shown)
+def _instead(target: Target, images: Sequence[tuple[str, Grey]]) -> str:
+    """Clause on markers or discs that images show in place of the described board; "" if that is not clear."""
     for image, levels in images:
         if said := description.mismatch(target, levels):
             return f"{image} {said}"
     if isinstance(target, Circles | AsymmetricCircles):
         clauses = ((image, other_discs(target, levels)) for image, levels in images)
         return next((f"{image} {said}" for image, said in clauses if said), "")
-    # Of some images only a part of the board is found, so that two have to agree.
+    return ""
+
+
+def _chessboard(target: Target, images: Sequence[tuple[str, Grey]]) -> str:
+    """Clause on a chessboard in place of the described board; "" if it is that, or two images do not agree on it."""
+    if isinstance(target, Circles | AsymmetricCircles):
+        return ""
     sizes = Counter(chessboard_size(levels) for _, levels in images)
     ((columns, rows), count), *_ = sizes.most_common(1) or [((0, 0), 0)]
-    is_other = columns > 0 and not (isinstance(target, Chessboard) and {columns, rows} == {*target.grid})
-    return f"{count} images show a board of {columns} × {rows} inner corners" if count > 1 and is_other else ""
+    is_same = {columns, rows} == {*target.grid}
+    if count < 2 or columns == 0 or (is_same and isinstance(target, Chessboard)):
+        return ""
+    unread = ", and no markers that can be read" if is_same and isinstance(target, Charuco) else ""
+    return f"{count} images show a board of {columns} × {rows} inner corners{unread}"
+
+
+def _exposure(shown: Sequence[Shot]) -> str:
+    """Clause on the first image that is too bright or too dark to show a board well, and what to do; "" without one."""
+    for shot in shown:
+        for image in (each.image for each in shot.sensor_shots.values() if each.image.size):
+            if (bright := is_saturated(image).mean()) > _BRIGHT:
+                said = f"{bright:.0%} of image {shot.number} is as bright as the sensor can tell"
+                return f"{said}: use a shorter exposure, or less light"
+            if image.dtype == np.uint8 and (level := np.percentile(image, 99)) < _DARK:
+                said = f"Image {shot.number} is nearly black, 99% of it at most {level:.0f} of 255"
+                return f"{said}: use a longer exposure, or more light"
+    return ""

@@ -85,7 +85,7 @@ def material(arguments: argparse.Namespace) -> Material:
     corner_file.write(seen, corner_file.path_beside(arguments.out))
     if arguments.corners is not None:
         mrcal_corners.write(seen, target, arguments.corners)
-    other = "" if is_seen else unseen.instead(target, shown)
+    other = "" if is_seen else unseen.instead(target, shown, seen.rejected.values())
     return _checked(seen, known, data, other)
 
 

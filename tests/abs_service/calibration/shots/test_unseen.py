@@ -73,6 +73,9 @@ def test_only_images_that_agree_tell_that_a_board_has_more_corners() -> None:
 
 PRINT = Charuco(7, 5, 0.03, 0.022, "5x5_50")
 
+#: All that light leaves of it where white swallows the markers.
+SQUARES = Chessboard(6, 4, 0.03)
+
 
 @pytest.mark.parametrize(
     ("described", "reported"),
@@ -88,6 +91,20 @@ def test_a_wrong_description_of_a_board_with_markers_is_named(
     shown = photograph(PRINT, VGA, centered(PRINT, (0.2, 0.1, 0.3), 0.45))
     cv2.imwrite(str(tmp_path / "c_1.png"), as_bytes(shown))
     assert f"{reported}: correct the description" in said(described, "--images", f"color={tmp_path}/c_*.png")
+
+
+@pytest.mark.parametrize("board", [PRINT, Chessboard(8, 5, 0.025)])
+def test_images_that_are_too_bright_or_too_dark_are_said_to_be_so(said, tmp_path: Path, board: Target) -> None:
+    for number in range(2):
+        image = as_bytes(photograph(SQUARES, VGA, centered(SQUARES, (0.2, 0.1, 0.3 * number), 0.35)))
+        cv2.imwrite(str(tmp_path / f"bright_{number}.png"), np.where(image > 100, 255, 120).astype(np.uint8))
+        cv2.imwrite(str(tmp_path / f"dark_{number}.png"), image // 100)
+    error = said(board, "--images", f"color={tmp_path}/bright_*.png")
+    unread = "" if board != PRINT else ", and no markers that can be read"
+    assert f"2 images show a board of 6 × 4 inner corners{unread}: correct the description" in error
+    assert "of image 0 is as bright as the sensor can tell: use a shorter exposure, or less light" in error
+    error = said(board, "--images", f"color={tmp_path}/dark_*.png")
+    assert "Image 0 is nearly black, 99% of it at most 2 of 255: use a longer exposure, or more light" in error
 
 
 def test_images_without_a_board_are_counted_by_what_is_wrong(said, tmp_path: Path) -> None:
