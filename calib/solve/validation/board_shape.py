@@ -27,6 +27,9 @@ CERTAIN, CERTAIN_UNEVEN = 5.0, 8.0
 #: motion imitate, by more.
 NOTICED, NOTICED_BEND = 0.15, 0.25
 
+#: Tags are named from this size on [%] in any case: if it is their gaps, all lengths are wrong by as much, and no lens.
+_NOTICED_TAGS = 0.5
+
 #: Size of the errors of lengths that columns of the equations stand for.
 _SHARE = 0.01
 
@@ -100,6 +103,7 @@ class ShapeError:
             case Shape.TAGS:
                 than = "larger" if self.size > 0 else "smaller"
                 found = f"tags are {size} {than} than described, compared with their distances"
+                effect += ", and all lengths by as many per cent if the gaps are not as described"
             case Shape.UNEVEN:
                 found = f"the print is uneven: from its middle to its edges points are displaced by {bend}"
             case Shape.BEND:
@@ -123,7 +127,10 @@ def shape_errors(solution: Solution, distance: float, needed_px: float) -> list[
         one
         for one in _estimates(solution, distance)
         if abs(one.size) > (CERTAIN_UNEVEN if one.shape == Shape.UNEVEN else CERTAIN) * one.sigma
-        and one.effect_px > (NOTICED if one.shape in (Shape.STRETCH, Shape.TAGS) else NOTICED_BEND) * needed_px
+        and (
+            one.effect_px > (NOTICED if one.shape in (Shape.STRETCH, Shape.TAGS) else NOTICED_BEND) * needed_px
+            or (one.shape == Shape.TAGS and abs(one.size) > _NOTICED_TAGS)
+        )
     ]
     misprints = sorted((one for one in found if one.is_misprint), key=lambda one: -one.certainty)
     bends = sorted((one for one in found if not one.is_misprint), key=lambda one: -one.effect_px)

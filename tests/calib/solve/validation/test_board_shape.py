@@ -99,6 +99,15 @@ def test_tags_that_are_not_as_large_as_described_beside_their_gaps_are_named(gap
     assert f"% {than} than described" in str(found)
 
 
+def test_tags_that_hardly_move_projections_are_named_as_lengths_are_wrong_by_as_much() -> None:
+    made, described = AprilGrid(6, 5, 0.045, 0.0105), AprilGrid(6, 5, 0.045, 0.0101)
+    solution = photographed(described.points(), made.points())
+    (found,) = shape_errors(solution, 1.0, 20.0)
+    assert found.effect_px < 0.15 * 20
+    assert found.size == pytest.approx(-0.72, rel=0.15)
+    assert "and all lengths by as many per cent" in str(found)
+
+
 def test_an_april_grid_as_described_has_no_error() -> None:
     points = AprilGrid(6, 5, 0.045, 0.0105).points()
     assert shape_errors(photographed(points, points), 1.0, 1.0) == []
