@@ -54,7 +54,11 @@ def chosen(page, listener, button, hint, gesture) -> int:
     page.get_by_role("button", name=button).click()
     says(page, hint)
     gesture()
-    wait_until(lambda: listener.states()[-1][1].mesh_version > version, PATIENCE_S, "a mesh of what was chosen")
+    try:
+        wait_until(lambda: listener.states()[-1][1].mesh_version > version, PATIENCE_S, "a mesh of what was chosen")
+    except AssertionError as error:
+        error.add_note(f"the page says: {page.inner_text('body')}")
+        raise
     says(page, "To keep this choice")
     return listener.states()[-1][1].mesh_version
 

@@ -46,22 +46,23 @@ class Choosing:
 
     def by_click(self, tracker: str) -> None:
         """Waits for a click at the object."""
-        self._say("Click the object among the measured points.")
+        # A browser takes one after the other: what it is told to do, it can.
         self._gestures.click(lambda ray: self._choose(tracker, lambda measured: at_ray(measured, ray)))
+        self._say("Click the object among the measured points.")
 
     def by_box(self, tracker: str) -> None:
         """Waits for a box around the object."""
-        self._say("Draw a box around the object: press in one corner, and release in the other.")
         self._gestures.box(lambda eye, drawn: self._choose(tracker, lambda measured: in_box(measured, eye, drawn)))
+        self._say("Draw a box around the object: press in one corner, and release in the other.")
 
     def by_lasso(self, tracker: str) -> None:
         """Waits for clicks around the object."""
         text = "Click around the object, corner by corner, and at last the first corner again."
-        self._say(text)
         self._gestures.lasso(
             lambda eye, drawn: self._choose(tracker, lambda measured: in_lasso(measured, eye, drawn)),
             lambda: self._say(f"The view has moved, so the lasso begins anew. {text}"),
         )
+        self._say(text)
 
     def _choose(self, tracker: str, choose: Callable[[Measured], Choice | None]) -> None:
         measured = self._look(tracker)

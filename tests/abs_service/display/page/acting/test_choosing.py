@@ -99,26 +99,36 @@ def test_a_polygon_of_any_shape_has_few_enough_corners():
 
 
 class Pointer:
-    """Gestures that are made at once."""
+    """Gestures that are made when the page says how."""
 
     def __init__(self, ray=None, drawn=None):
         self._ray, self._drawn = ray, drawn
+        self._gesture = None
 
     def click(self, call):
-        call(self._ray)
+        self._gesture = lambda: call(self._ray)
 
     def box(self, call):
-        call(eye(0.0), self._drawn)
+        self._gesture = lambda: call(eye(0.0), self._drawn)
 
     def lasso(self, call, restarted):
-        restarted()
-        call(eye(0.0), self._drawn)
+        self._gesture = lambda: (restarted(), call(eye(0.0), self._drawn))
+
+    def make(self):
+        gesture, self._gesture = self._gesture, None
+        if gesture is not None:
+            gesture()
 
 
 def page(pointer, measured: Measured | None = MEASURED):
     """The page's part with what it says and asks."""
     said, asked = [], []
-    return Choosing(pointer, {"sheet": measured}.get, said.append, lambda *one: asked.append(one)), said, asked
+
+    def say(text):
+        said.append(text)
+        pointer.make()
+
+    return Choosing(pointer, {"sheet": measured}.get, say, lambda *one: asked.append(one)), said, asked
 
 
 def test_a_click_chooses_the_pixel_under_it():
