@@ -125,6 +125,7 @@ def test_all_processes_log_where_run_was_told_to(rig_file, tmp_path):
     assert any(one["fields"].get("device") == "sim" for one in records if one["process"] == "capture")
 
 
+@pytest.mark.realtime
 def test_the_installed_command_complains_of_nothing(rig_file):
     """Warnings of the interpreter, such as of a module that runs twice, come of the console script alone."""
     command = [Path(sys.executable).with_name("abs-service"), "run", rig_file, "--no-record", "--duration", "5"]
