@@ -19,7 +19,6 @@ from calib.calibration_check.stored_calibration import Stored, Views
 from calib.solve.bundle import robust, rotations
 from calib.solve.bundle.blocks import Corners
 from calib.solve.bundle.equations import Equations
-from calib.solve.bundle.formulation import groups_of
 from calib.solve.bundle.parameters.layout import POSE
 from calib.solve.bundle.parameters.state import State
 
@@ -100,7 +99,7 @@ def linearise(stored: Stored, views: Views) -> Linearised:
     sensors = list(views.shots)
     found = solve(stored, views, sensors[1:]).state
     formulated = formulation(stored, views, sensors, {view.sensor for view in views.planes}, uncertain=True)
-    equations = formulated(found, (1.0,) * len(groups_of(formulated.task)))
+    equations = formulated.as_measured(found)
     offset, radius = _middle(views)
     by_shot: dict[int, list[_View]] = {}
     for views_of_group in _views(equations, _changes(stored, found, equations)):

@@ -37,6 +37,10 @@ class Formulation:
         groups = [self._group(sensor, views, state) for sensor, views in groups_of(self.task)]
         return rescale(Equations(self.layout, state, groups, self.shot_times, self.poses), factors)
 
+    def as_measured(self, state: State) -> Equations:
+        """Equations about a state, with the deviations that the measurements come with."""
+        return self(state, (1.0,) * len(groups_of(self.task)))
+
     def _group(self, sensor: str, views: Sequence[CornerView | PlaneView], state: State) -> Group:
         shots = [view.shot for view in views]
         times = np.array([view.t_s for view in views])

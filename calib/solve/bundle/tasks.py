@@ -55,6 +55,10 @@ class SensorTask:
                     f"{self.width} × {self.height}"
                 )
 
+    def with_lens(self, lens: LensKind) -> "SensorTask":
+        """The sensor with another kind of lens, on which what it does not have is not fixed."""
+        return replace(self, lens=lens, fixed=tuple(name for name in self.fixed if name in lens.fixable))
+
     def free_parameters(self, moves: bool) -> FreeParameters:
         """Free parameters of the sensor."""
         held = {*self.fixed}

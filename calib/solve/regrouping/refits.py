@@ -11,7 +11,7 @@ from calib.board.views import CornerView
 from calib.camera import Camera
 from calib.pose import Pose
 from calib.solve.bundle.adjustment import search
-from calib.solve.bundle.formulation import formulate, groups_of
+from calib.solve.bundle.formulation import formulate
 from calib.solve.bundle.parameters.layout import turned
 from calib.solve.bundle.parameters.lens_parameters import ASPECT
 from calib.solve.bundle.tasks import Task
@@ -56,7 +56,7 @@ def fitted(task: Task, shots: Sequence[int]) -> dict[str, Camera]:
         ValueError: nothing does.
     """
     usable, state = start(task.of_shots(shots), lambda _: None)
-    found = search(formulate(usable)(state, (1.0,) * len(groups_of(usable))))
+    found = search(formulate(usable).as_measured(state))
     return {name: sensor.camera for name, sensor in found.sensors.items()}
 
 

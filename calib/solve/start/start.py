@@ -101,15 +101,14 @@ def fit_camera(name: str, sensor: SensorTask, views: Sequence[CornerView], first
     """
     for simpler in sensor.lens.simpler:  # numerator and denominator of a rational lens are redundant without distortion
         if first.lens.is_pinhole:
-            fixed = tuple(each for each in sensor.fixed if each in simpler.fixable)
-            first = fit_camera(name, replace(sensor, lens=simpler, fixed=fixed), views, first)
+            first = fit_camera(name, sensor.with_lens(simpler), views, first)
     boards = {view.shot: found[0].T_sb for view in views if (found := pose_candidates(first, view))}
     if not boards:
         raise NotSolvedError(f"{name}: no view shows a board that its camera could have seen")
     free = replace(sensor, fixed_intrinsics=False, fixed_pose=False, free_running=False, depth_terms=())
     task = Task({name: free}, views, (), name).of_shots([*boards])
     state = State({name: SensorState(replace(first, T_rs=pose.identity()))}, boards)
-    return search(formulate(task)(state, (1.0,))).sensors[name].camera
+    return search(formulate(task).as_measured(state)).sensors[name].camera
 
 
 def _numbered_alike(

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from calib.solve.bundle.adjustment import search
-from calib.solve.bundle.formulation import formulate, groups_of
+from calib.solve.bundle.formulation import formulate
 from calib.solve.bundle.parameters.state import SensorState, State
 from calib.solve.bundle.tasks import SensorTask, Task
 
@@ -29,11 +29,7 @@ def undistorted(task: Task, bent: Mapping[str, SensorTask], state: State) -> Sta
     straight = {name: _straight(sensor, state.sensors[name]) for name, sensor in bent.items()}
     held = {name: replace(each, fixed=(*each.fixed, *each.lens.coefficients)) for name, each in bent.items()}
     found = _searched(task, held, replace(state, sensors={**state.sensors, **straight}))
-    simpler = {
-        name: replace(each, lens=kind, fixed=tuple(one for one in each.fixed if one in kind.fixable))
-        for name, each in bent.items()
-        for kind in each.lens.simpler
-    }
+    simpler = {name: each.with_lens(kind) for name, each in bent.items() for kind in each.lens.simpler}
     return _searched(task, simpler, found) if simpler else found
 
 
@@ -50,4 +46,4 @@ def _straight(sensor: SensorTask, state: SensorState) -> SensorState:
 
 def _searched(task: Task, changed: Mapping[str, SensorTask], state: State) -> State:
     task = replace(task, sensors={**task.sensors, **changed})
-    return search(formulate(task)(state, (1.0,) * len(groups_of(task))))
+    return search(formulate(task).as_measured(state))

@@ -114,6 +114,13 @@ class ShapeError:
         """The finding, and what to do."""
         return f"{self.finding}: {self.shape.value}"
 
+    def matters(self, needed_px: float) -> bool:
+        """True if projections, required to be accurate to `needed_px` [px], or lengths are wrong by too much."""
+        if self.shape == Shape.TAGS and abs(self.size) > _NOTICED_TAGS:
+            return True
+        noticed = NOTICED if self.shape in (Shape.STRETCH, Shape.TAGS) else NOTICED_BEND
+        return self.effect_px > noticed * needed_px
+
 
 def shape_errors(solution: Solution, distance: float, needed_px: float) -> list[ShapeError]:
     """Errors of the board that are certain and matter: the surest of the print, the bend with the largest effect.
@@ -127,10 +134,7 @@ def shape_errors(solution: Solution, distance: float, needed_px: float) -> list[
         one
         for one in _estimates(solution, distance)
         if abs(one.size) > (CERTAIN_UNEVEN if one.shape == Shape.UNEVEN else CERTAIN) * one.sigma
-        and (
-            one.effect_px > (NOTICED if one.shape in (Shape.STRETCH, Shape.TAGS) else NOTICED_BEND) * needed_px
-            or (one.shape == Shape.TAGS and abs(one.size) > _NOTICED_TAGS)
-        )
+        and one.matters(needed_px)
     ]
     misprints = sorted((one for one in found if one.is_misprint), key=lambda one: -one.certainty)
     bends = sorted((one for one in found if not one.is_misprint), key=lambda one: -one.effect_px)

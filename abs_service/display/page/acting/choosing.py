@@ -37,7 +37,10 @@ Look = Callable[[str], Measured | None]
 
 
 class Choosing:
-    """Waits for a gesture, and asks for a detection of what it chooses."""
+    """Waits for a gesture, then says how to make it, and asks for a detection of what it chooses.
+
+    Messages reach a browser in their order, so that it takes the gesture when it shows the hint.
+    """
 
     def __init__(
         self, gestures: Gestures, look: Look, say: Callable[[str], None], ask: Callable[[str, Choice], None]
@@ -46,7 +49,6 @@ class Choosing:
 
     def by_click(self, tracker: str) -> None:
         """Waits for a click at the object."""
-        # A browser takes one after the other: what it is told to do, it can.
         self._gestures.click(lambda ray: self._choose(tracker, lambda measured: at_ray(measured, ray)))
         self._say("Click the object among the measured points.")
 
