@@ -3,6 +3,7 @@
 import queue
 import signal
 import threading
+import time
 
 import numpy as np
 from absmsg.v1.deformation_state_pb2 import DeformationState
@@ -27,7 +28,7 @@ class Stream:
         self._clock = WallClock()
         self._headers = HeaderFactory("demo", self._clock)
         self._pixels = np.random.default_rng(1).integers(0, 65535, shape, np.uint16)
-        self._stop = threading.Event()
+        self._stop, self._turn = threading.Event(), threading.Lock()
         self._bus = ZenohBus.open("demo", endpoint, SessionMode.ROUTER)
         self.health = queue.SimpleQueue()
         self._received, self._ended = "", ""  # boot identities of the newest recorder, and of one that ended
@@ -65,6 +66,12 @@ class Stream:
             if condition(health):
                 return health
 
+    def stop_between_frames(self, recorder):
+        """Stops a recorder that is reading no frame: one that it was reading would be refused when it goes on."""
+        with self._turn:
+            time.sleep(0.1)
+            recorder.send_signal(signal.SIGSTOP)
+
     def kill(self, recorder):
         """Kills the recorder; what it said before and was not yet looked at is not taken for its successor's."""
         recorder.send_signal(signal.SIGKILL)
@@ -74,11 +81,15 @@ class Stream:
     def _run(self):
         publisher = self._bus.publisher(TOPIC, codec.IMAGE_SCHEMA, IMAGES)
         while not self._stop.wait(0.005):
-            t_ns, seq = self._clock.monotonic(), self._published
-            frame = Frame("tof", "depth", Kind.DEPTH, self._pixels, "16UC1", t_ns, t_ns, seq, geometry=Geometry.RADIAL)
-            header = self._headers.at(t_ns, seq)
-            publisher.put(codec.encode_image(frame, self._clock.wall(t_ns)), codec.encode_info(frame, header))
-            self._published += 1
+            with self._turn:
+                self._publish(publisher)
+
+    def _publish(self, publisher):
+        t_ns, seq = self._clock.monotonic(), self._published
+        frame = Frame("tof", "depth", Kind.DEPTH, self._pixels, "16UC1", t_ns, t_ns, seq, geometry=Geometry.RADIAL)
+        header = self._headers.at(t_ns, seq)
+        publisher.put(codec.encode_image(frame, self._clock.wall(t_ns)), codec.encode_info(frame, header))
+        self._published += 1
 
 
 def frames(path):

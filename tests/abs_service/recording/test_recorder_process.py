@@ -205,7 +205,7 @@ def test_what_was_sent_to_a_recorder_that_stood_still_is_recorded_though_it_is_t
     recorder = launch("record", rig)
     with Stream(endpoint) as stream:
         stream.wait_for(is_recording)
-        recorder.send_signal(signal.SIGSTOP)
+        stream.stop_between_frames(recorder)
         time.sleep(0.8)
         published = stream.end()
         recorder.send_signal(signal.SIGTERM)
