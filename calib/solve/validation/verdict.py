@@ -96,7 +96,7 @@ def assess(
     reasons += doubts(pixels, needed_px)
     try:
         agreements = cross_validate(solution, distance, note, half)
-        reasons += _disagreeing(agreements, needed_px)
+        reasons += _disagreeing(agreements, {view.sensor for view in solution.task.planes}, needed_px)
     except TooFewToSplitError as error:
         agreements = []
         reasons.append(f"two halves could not be compared: {error}")
@@ -153,15 +153,29 @@ def _given(kept: Sequence[str]) -> str:
     return f" That takes the intrinsics of {names} as given." if kept else ""
 
 
-def _disagreeing(agreements: Sequence[Agreement], needed_px: float) -> list[str]:
-    between = ", if only between the images of a shot" if any("→" in each.of for each in agreements) else ""
+def _disagreeing(agreements: Sequence[Agreement], measuring: Set[str], needed_px: float) -> list[str]:
     bad = [each for each in agreements if each.ratio > MAX_RATIO and each.difference_px > HARMLESS * needed_px]
+    # A wrong kind of lens shows in each sensor, wrong distances only beside another one.
+    right = {each.of for each in agreements if each not in bad} - measuring
     return [
         f"{each.of}: the halves of the shots differ by {each.difference_px:.2g} px where {each.predicted_px:.2g} px "
-        f"were predicted; the kind of lens does not fit, the board is not flat, or something moved{between}: "
-        "take more tilted views, and try another kind of lens"
+        f"were predicted{_why(each.of, right, in_rig='→' in agreements[-1].of)}"
         for each in sorted(bad, key=lambda each: -each.ratio)
     ]
+
+
+def _why(of: str, right: Set[str], in_rig: bool) -> str:
+    """Why halves differ in the projection of a sensor or pair, beside sensors whose own agree, and what to do."""
+    if {*of.split(" → ")} <= right:
+        return (
+            ", and agree about each of the two: the images of a shot were not taken at the same moment, a sensor was "
+            "moved, or the board is not flat; hold the board still in every shot, or synchronise the sensors"
+        )
+    between = ", if only between the images of a shot" if in_rig else ""
+    return (
+        f"; the kind of lens does not fit, the board is not flat, or something moved{between}: take more tilted views, "
+        "and try another kind of lens"
+    )
 
 
 def _uncertain(radii: Mapping[str, float], needed_px: float) -> list[str]:

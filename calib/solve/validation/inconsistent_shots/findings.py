@@ -17,8 +17,11 @@ from calib.solve.validation.inconsistent_shots.scatter import SCATTERS_PX, Scatt
 from calib.solve.validation.inconsistent_shots.steadiness import changes_of_optics, changes_of_place, focal_scatter
 from calib.solve.validation.rolling_shutter import Motion
 
-#: Two groups are the explanation if corners then miss by at most this many times what they do in each image alone.
+#: Two groups are the explanation if corners then miss by at most this many times what they do in each image alone, …
 _EXPLAINED = 1.5
+#: … and with the cameras of the other group by this many times as much at least. Groups of cameras that were moved have
+#: 6; any shots can be split into two that differ by chance, as those of a hand-held board by 1.4.
+_APART = 3.0
 
 
 class ShotDoubts(NamedTuple):
@@ -65,7 +68,8 @@ def _two(solution: Solution, contradicting: Sequence[Contradiction], scattered: 
         return []
     guesses = [by_residuals(solution), {one.shot for one in contradicting}]
     found = two_groups(solution.task, solution.cameras, guesses)
-    return [one for one in found if one.alone_px < _EXPLAINED * typical_alone(solution)]
+    apart = [one for one in found if one.other_px > _APART * one.alone_px]
+    return [one for one in apart if one.alone_px < _EXPLAINED * typical_alone(solution)]
 
 
 def _contradicting(found: Sequence[Contradiction]) -> list[str]:

@@ -12,6 +12,7 @@ from calib.solve.solution import Solution
 from calib.solve.validation.free_shape import free_shape
 from calib.solve.validation.inconsistent_shots.contradictions import completed, contradictions
 from calib.solve.validation.inconsistent_shots.findings import inconsistent_shots
+from calib.solve.validation.verdict import assess
 from tests.calib.solve.validation.test_contradictions import BOARDS, moved, solved
 
 FEW, HALF = (2, 3, 7, 11, 16), (0, 2, 3, 5, 7, 11, 12, 14, 16, 19)
@@ -48,6 +49,21 @@ def test_of_equal_groups_none_is_called_the_wrong_one() -> None:
     assert "One of both groups is wrong, and nothing says which" in said
     assert f"--skip {numbered(HALF)}" in said
     assert f"--skip {numbered({*BOARDS} - {*HALF})}" in said
+
+
+def test_shots_that_scatter_are_not_two_groups_that_differ_by_chance() -> None:
+    random = np.random.default_rng(5)
+    (said,) = reasons(
+        solved({shot: moved(T_rb, tuple(0.0004 * random.standard_t(2, 3))) for shot, T_rb in BOARDS.items()})
+    )
+    assert said.startswith("one shot contradicts the others: shot 4: corners of light miss by 1.4 px")
+
+
+def test_halves_that_agree_about_each_sensor_do_not_doubt_its_lens() -> None:
+    _, said = assess(bumped((0, 4, 8, 12, 16), 0.001), 1.0, 1.0).reasons
+    assert said.startswith("light → color: the halves of the shots differ by ")
+    assert "and agree about each of the two: the images of a shot were not taken at the same moment" in said
+    assert "kind of lens" not in said
 
 
 def test_groups_that_have_no_minimum_together_are_told_from_the_start() -> None:
