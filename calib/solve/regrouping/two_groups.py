@@ -1,7 +1,8 @@
 """Two groups of shots, by two means: each is solved anew, and each shot goes to the one that explains it better."""
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,17 +32,24 @@ class TwoGroups:
         smaller, larger: their shots.
         alone_px: median over the shots of how far corners miss with the cameras of their own group [px].
         other_px: and with those of the other group.
+        exchanged: two sensors whose images are those of each other in one of the groups; empty if none are.
     """
 
     smaller: tuple[int, ...]
     larger: tuple[int, ...]
     alone_px: float
     other_px: float
+    exchanged: tuple[str, ...] = ()
 
     @property
     def advice(self) -> str:
-        """Advice: shots to leave out; of groups that are about as large, either."""
+        """Advice: shots to leave out or to mend; of groups that are about as large, either."""
         smaller = numbered(self.smaller)
+        if self.exchanged:
+            return (
+                f"The images of {' and '.join(self.exchanged)} were exchanged in one of both groups, as then one rig "
+                f"explains all: exchange them back in shots {smaller}, or leave these out: --skip {smaller}"
+            )
         if len(self.smaller) <= _EQUAL * len(self.larger):
             return f"Look at both groups, and leave one out: --skip {smaller}"
         return (
@@ -51,11 +59,11 @@ class TwoGroups:
 
     def __str__(self) -> str:
         """The finding, and what to do."""
+        is_open = ": was a sensor moved, turned or zoomed between them, or are their images paired otherwise? "
         return (
             f"two groups of shots contradict each other: {numbered(self.smaller)} and {numbered(self.larger)}. With "
             f"cameras of its own each misses by {self.alone_px:.2g} px, with those of the other by {self.other_px:.2g} "
-            "px: was a sensor moved, turned or zoomed between them, or are their images paired otherwise? "
-            f"{self.advice}"
+            f"px{'. ' if self.exchanged else is_open}{self.advice}"
         )
 
 
@@ -94,13 +102,35 @@ def _settled(held: Task, members: NDArray[np.bool_]) -> list[TwoGroups]:
 
 
 def _judged(held: Task, members: NDArray[np.bool_], off: NDArray[np.float64]) -> list[TwoGroups]:
-    """The groups, if both are explained alike, by what shots miss by with the cameras of both (2, shots) [px]."""
+    """The groups, if both are explained alike or by exchanged images, by what shots miss with the cameras of both.
+
+    Args:
+        held: with all shots.
+        members: shots of one of the groups (shots,).
+        off: what corners miss by, root mean square (2, shots) [px].
+    """
     own, other = off.min(axis=0), off.max(axis=0)
-    typical = sorted(float(np.median(own[part])) for part in (members, ~members))
-    if typical[1] > _ALIKE * typical[0]:
-        return []
     smaller, larger = sorted((tuple(_part(held, part)) for part in (members, ~members)), key=len)
-    return [TwoGroups(smaller, larger, float(np.median(own)), float(np.median(other)))]
+    found = TwoGroups(smaller, larger, float(np.median(own)), float(np.median(other)))
+    # Lenses that were begun with exchanged images are those of neither sensor, and fit neither group well.
+    if exchanged := _exchanged(held, found):
+        return [replace(found, exchanged=exchanged)]
+    typical = sorted(float(np.median(own[part])) for part in (members, ~members))
+    return [] if typical[1] > _ALIKE * typical[0] else [found]
+
+
+def _exchanged(held: Task, found: TwoGroups) -> tuple[str, ...]:
+    """Two sensors of one size with which the larger group explains the smaller one, once their images are exchanged."""
+    sizes = {name: (sensor.width, sensor.height) for name, sensor in held.sensors.items()}
+    pairs = [(one, other) for one, other in combinations(sorted(sizes), 2) if sizes[one] == sizes[other]]
+    rest, cameras = held.of_shots(found.smaller), fitted(held, found.larger) if pairs else {}
+    for pair in pairs:
+        to = dict(zip(pair, reversed(pair), strict=True))
+        views = [replace(view, sensor=to.get(view.sensor, view.sensor)) for view in rest.corners]
+        off = float(np.median(misses(replace(rest, corners=views), cameras)))
+        if _FAR * off < found.other_px and off < max(_FAR * found.alone_px, _FAR_PX):
+            return pair
+    return ()
 
 
 def _part(held: Task, members: NDArray[np.bool_]) -> Sequence[int]:

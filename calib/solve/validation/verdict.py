@@ -165,7 +165,7 @@ def _disagreeing(agreements: Sequence[Agreement], measuring: Set[str], needed_px
 
 
 def _why(of: str, right: Set[str], in_rig: bool) -> str:
-    """Why halves differ in the projection of a sensor or pair, beside sensors whose own agree, and what to do."""
+    """The likely cause of halves that differ in a sensor or pair, beside sensors whose own agree, and what to do."""
     if {*of.split(" → ")} <= right:
         return (
             ", and agree about each of the two: the images of a shot were not taken at the same moment, a sensor was "

@@ -1,11 +1,15 @@
 """Two groups of shots that contradict each other: each shot is found; the smaller group is named, or both."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 
+from calib import pose
 from calib.solve.bundle.adjustment import NotSolvedError
+from calib.solve.bundle.tasks import SensorTask, Task
+from calib.solve.calibrate import calibrate
 from calib.solve.regrouping.initial_groups import by_residuals
 from calib.solve.regrouping.two_groups import TwoGroups, numbered, two_groups, unexplained
 from calib.solve.solution import Solution
@@ -13,6 +17,7 @@ from calib.solve.validation.free_shape import free_shape
 from calib.solve.validation.inconsistent_shots.contradictions import completed, contradictions
 from calib.solve.validation.inconsistent_shots.findings import inconsistent_shots
 from calib.solve.validation.verdict import assess
+from evaluation.scenes.boards import board_views
 from tests.calib.solve.validation.test_contradictions import BOARDS, moved, solved
 
 FEW, HALF = (2, 3, 7, 11, 16), (0, 2, 3, 5, 7, 11, 12, 14, 16, 19)
@@ -90,3 +95,31 @@ def test_a_shot_that_others_hid_is_named_with_them() -> None:
 def test_shots_are_written_as_skip_reads_them() -> None:
     assert numbered({9, 3, 8, 7, 12}) == "3,7-9,12"
     assert TwoGroups((1, 2), (0, 3, 4, 5), 0.1, 2.0).advice.endswith("--skip 1-2")
+
+
+def exchanged(shots: tuple[int, ...]) -> Task:
+    """Two cameras side by side, whose files were exchanged in these shots."""
+    camera = board_views.three_heads()["color"].camera
+    beside = camera.T_rs @ pose.from_rotation_vector((0, 0.06, 0), (0.1, 0, 0))
+    heads = {
+        "left": board_views.Head(replace(camera, T_rs=pose.identity()), 0.1),
+        "right": board_views.Head(replace(camera, fx=camera.fx * 0.99, T_rs=beside), 0.1),
+    }
+    generator, other = np.random.default_rng(1), {"left": "right", "right": "left"}
+    seen = board_views.look(heads, board_views.random_boards(20, generator), generator).corners
+    views = [replace(view, sensor=other[view.sensor]) if view.shot in shots else view for view in seen]
+    sensors = {name: SensorTask(camera.width, camera.height) for name in heads}
+    return Task(sensors, views, (), "left")
+
+
+@pytest.mark.parametrize("shots", [FEW, HALF[:9]])
+def test_images_that_were_exchanged_in_some_shots_are_named(shots: tuple[int, ...]) -> None:
+    """That a sensor was moved, or that images are paired otherwise, led nobody to two exchanged files."""
+    with pytest.raises(NotSolvedError, match=f"images of left and right were exchanged .* shots {numbered(shots)}, "):
+        calibrate(exchanged(shots))
+
+
+def test_a_sensor_that_moved_has_no_exchanged_images() -> None:
+    solution = bumped(FEW)
+    (found,) = two_groups(solution.task, solution.cameras, [FEW])
+    assert found.exchanged == ()
