@@ -85,6 +85,7 @@ def program() -> None:
     try:
         standard_files.check_folder()
         standard_files.allow_files()
+        kernel_cache.check_threads()
         kernel_cache.ensure()
         _preload(sys.argv[1:])
         code = main()

@@ -1,4 +1,4 @@
-"""The folder in which Numba keeps compiled kernels, without which it compiles none."""
+"""What Numba reads of the environment: the folder for compiled kernels, without which it keeps none, and threads."""
 
 import atexit
 import os
@@ -11,6 +11,8 @@ from abs_service.supervision.process_setup import standard_files
 VARIABLE = "NUMBA_CACHE_DIR"
 #: The environment variable for the folder of the user in which it keeps them where it cannot beside the code.
 USER = "XDG_CACHE_HOME"
+#: The environment variable for the number of threads of a kernel, and the most: with 100,000 a process is killed.
+THREADS, MAX_THREADS = "NUMBA_NUM_THREADS", 1000
 #: Room for the kernels of a rig, on a disk that is not full [bytes].
 MIN_BYTES = 50_000_000
 
@@ -23,6 +25,15 @@ def ensure() -> None:
     if not (_can_be_written(given) if given else _own_folder() or _folders_of_the_code()):
         os.environ[VARIABLE] = folder = standard_files.temporary_folder("abs-service-kernels-")
         atexit.register(shutil.rmtree, folder, ignore_errors=True)
+
+
+def check_threads() -> None:
+    """Raises StartError if the number of threads is none: each tracker would fail at its first image, for ever."""
+    given = os.environ.get(THREADS, "1")
+    if not (given.strip().isdecimal() and 1 <= int(given) <= MAX_THREADS):
+        raise standard_files.StartError(
+            f'the environment variable {THREADS} is "{given}"; allowed: 1 to {MAX_THREADS}, or not set'
+        )
 
 
 def _own_folder() -> bool:

@@ -8,6 +8,7 @@ import pytest
 
 import abs_service
 from abs_service.supervision.process_setup import kernel_cache, standard_files
+from calib import jit
 
 
 @pytest.fixture
@@ -70,3 +71,10 @@ def test_a_full_temporary_folder_is_replaced_by_one_in_memory(given, monkeypatch
 def test_a_full_disk_is_replaced(given, tmp_path, monkeypatch):
     monkeypatch.setattr(kernel_cache, "MIN_BYTES", 1 << 62)
     assert given(tmp_path) != str(tmp_path)
+
+
+@pytest.mark.parametrize("threads", ["", "0", "-1", "abc", "2.0", "100000"])
+def test_a_number_of_threads_that_is_none_ends_a_command(monkeypatch, threads):
+    monkeypatch.setenv(jit.THREADS, threads)
+    with pytest.raises(standard_files.StartError, match=f'NUMBA_NUM_THREADS is "{threads}"; allowed: 1 to 1000'):
+        kernel_cache.check_threads()
