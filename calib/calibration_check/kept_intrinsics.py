@@ -9,6 +9,7 @@ from calib.calibration_check.optics import QUANTILE, optics_change
 from calib.calibration_check.stored_calibration import Stored, Views
 from calib.solve.bundle.adjustment import NotSolvedError
 from calib.solve.bundle.parameters.lens_parameters import MATRIX
+from calib.solve.rounding import rounded
 from calib.solve.solution import Solution
 from calib.solve.validation.inconsistent_shots.steadiness import HARMLESS
 from calib.solve.validation.verdict import Assessment
@@ -50,5 +51,5 @@ def _contradicted(solution: Solution, sensor: str, needed_px: float) -> str:
     return (
         f"{sensor}: its images contradict the intrinsics that are kept: they have a focal length {focal:+.1%} ± "
         f"{change.sigmas[0]:.1%} and a principal point ({across:+.1f}, {down:+.1f}) px from these, which shifts its "
-        f"corners by {change.shift_px:.2g} px: do not keep them, or look for another mode, zoom or focus"
+        f"corners by {rounded(change.shift_px)} px: do not keep them, or look for another mode, zoom or focus"
     )

@@ -22,6 +22,7 @@ from calib.solve.bundle.uncertainty import (
     pose_covariance,
     pose_information,
 )
+from calib.solve.rounding import rounded
 
 #: Threshold of significance: exceeded by chance in one check of a thousand.
 QUANTILE = float(stats.chi2.ppf(0.999, 3))
@@ -56,7 +57,7 @@ class OpticsChange:
         (focal, across, down), sigma = self.values.tolist(), float(self.sigmas[0])
         return (
             f"its focal length is {focal:+.2%} ± {sigma:.2%} and its principal point ({across:+.1f}, {down:+.1f}) px "
-            f"from what was calibrated, which shifts its pictures by {self.shift_px:.2g} px"
+            f"from what was calibrated, which shifts its pictures by {rounded(self.shift_px)} px"
         )
 
 

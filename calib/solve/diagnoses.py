@@ -13,6 +13,7 @@ from calib.camera import Camera
 from calib.solve.bundle.parameters.layout import DEPTH_TERMS
 from calib.solve.bundle.parameters.state import State
 from calib.solve.bundle.tasks import SensorTask, Task
+from calib.solve.rounding import rounded
 from calib.solve.solution import Parameter
 from calib.solve.start.board_poses import pose_candidates
 from calib.solve.start.registration import fit_plane
@@ -109,8 +110,9 @@ def _require_not_swapped(a: str, b: str, factory: Mapping[str, Camera], task: Ta
     other = [_miss(factory[b], a, task), _miss(factory[a], b, task)]
     if all(np.isfinite([*own, *other])) and all(BETTER * y < x for x, y in zip(own, other, strict=True)):
         raise MixedUpError(
-            f"{a} and {b} are mixed up: with each other's given intrinsics the corners miss by {other[0]:.2g} and "
-            f"{other[1]:.2g} px, with their own by {own[0]:.2g} and {own[1]:.2g} px; exchange their names"
+            f"{a} and {b} are mixed up: with each other's given intrinsics the corners miss by {rounded(other[0])} and "
+            f"{rounded(other[1])} px, with their own by {rounded(own[0])} and {rounded(own[1])} px; "
+            "exchange their names"
         )
 
 
@@ -122,9 +124,9 @@ def _require_factory_fits(name: str, camera: Camera, task: Task) -> None:
     given, own = _miss(camera, name, task), _miss(fit_camera(name, task.sensors[name], views, camera), name, task)
     if given > FACTORY_RATIO * own and given > FACTORY_MISS * camera.width / 1000:
         raise MixedUpError(
-            f"{name}: with the given intrinsics the corners miss by {given:.2g} px, with intrinsics of their own by "
-            f"{own:.2g} px; the given ones are of another sensor, of another mode of it, or no longer right: check the "
-            "name, or do not keep them"
+            f"{name}: with the given intrinsics the corners miss by {rounded(given)} px, with intrinsics of their own "
+            f"by {rounded(own)} px; the given ones are of another sensor, of another mode of it, or no longer right: "
+            "check the name, or do not keep them"
         )
 
 
@@ -165,7 +167,7 @@ def _missing(
     sensors = dict.fromkeys(far[shot][1] for shot in run)
     numbers = f"shots {run[0]} to {run[-1]}" if len(run) > 1 else f"shot {run[0]}"
     miss, median = float(np.median([far[shot][0] for shot in run])), max(typical[name] for name in sensors)
-    said = f"{numbers} of {' and '.join(sensors)} by {miss:.2g} px, {median:.2g} px are typical"
+    said = f"{numbers} of {' and '.join(sensors)} by {rounded(miss)} px, {rounded(median)} px are typical"
     if len(run) < MIN_VIEWS or (run[0] > shots[0]) == (run[-1] < shots[-1]):
         return said
     moment = f"before shot {run[0]}" if run[0] > shots[0] else f"after shot {run[-1]}"

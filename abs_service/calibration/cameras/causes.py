@@ -11,6 +11,7 @@ from calib.calibration_check.comparison import Comparison, Explanation
 from calib.calibration_check.hypotheses import TERMS, Kind
 from calib.calibration_check.mistakes import Mistake
 from calib.calibration_check.stored_calibration import Views
+from calib.solve.rounding import rounded
 from calib.solve.validation.board_shape import ShapeError
 from calib.solve.validation.inconsistent_shots.contradictions import Contradiction
 from calib.solve.validation.inconsistent_shots.foreign_distances import DistanceError
@@ -139,7 +140,7 @@ def _of_size(size: float) -> Verdict:
 def _mistaken(mistake: Mistake) -> str:
     names = mistake.sensors if mistake.kind in _OF_TWO else (" and ".join(mistake.sensors),)
     said = _MISTAKES[mistake.kind][0].format(*names)
-    return said if np.isnan(mistake.undone_px) else f"{said} corners miss by {mistake.undone_px:.2g} px"
+    return said if np.isnan(mistake.undone_px) else f"{said} corners miss by {rounded(mistake.undone_px)} px"
 
 
 def _level(explanation: Explanation, motion: Level, reaches: Mapping[str, DistanceRange]) -> Level:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from abs_service.report import plots
+from calib.solve.rounding import rounded
 from calib.solve.solution import ViewFit
 from calib.solve.validation.cross_validation import Agreement
 from calib.solve.validation.projection_uncertainty import UncertaintyMap
@@ -43,7 +44,7 @@ def cross_validation(agreement: Agreement) -> "Figure":
     arrows = axes.quiver(u, v, du, dv, angles="xy", scale_units="xy", scale=unit / (0.04 * float(u.max())), width=0.003)
     plots.key_of_arrows(figure, axes, arrows, unit)
     axes.set_title(
-        f"{agreement.of}: {agreement.difference_px:.2g} px, predicted {agreement.predicted_px:.2g} px",
+        f"{agreement.of}: {rounded(agreement.difference_px)} px, predicted {rounded(agreement.predicted_px)} px",
         loc="left", fontsize="medium",
     )  # fmt: skip
     axes.set(xlabel="u [px]", ylabel="v [px]", ylim=(float(v.max()), 0), aspect="equal")

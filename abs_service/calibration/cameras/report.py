@@ -11,6 +11,7 @@ from abs_service.report import figures
 from abs_service.report.content import Column, Level, Picture, Report, Section, Table, Verdict, drawing
 from abs_service.report.provenance import Provenance
 from calib.board.distinct import counts_of
+from calib.solve.rounding import rounded
 from calib.solve.solution import Parameter, Solution, ViewFit
 from calib.solve.validation.projection_uncertainty import reach
 from calib.solve.validation.verdict import Assessment
@@ -124,9 +125,9 @@ def cameras(solution: Solution) -> Iterator[str]:
             f"{key} {each.value:.{(digits := _digits(each.sigma))}f} ± {each.sigma:.{digits}f}" for key, each in free
         ]
         rms = [view.rms for view in solution.views if (view.sensor, view.of) == (name, "corners")]
-        fit = [f"corners miss by {np.sqrt(np.mean(np.square(rms))):.2g} px"] if rms else []
+        fit = [f"corners miss by {rounded(np.sqrt(np.mean(np.square(rms))))} px"] if rms else []
         near, far = reach(solution, name)
-        boards = f"boards {near:.2g} to {far:.2g} m away{_stretched(own, name)}"
+        boards = f"boards {rounded(near)} to {rounded(far)} m away{_stretched(own, name)}"
         yield f"{name}: {', '.join([*known, *fit, boards])}"
 
 

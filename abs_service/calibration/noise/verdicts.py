@@ -10,6 +10,7 @@ from abs_service.report.content import Level, Verdict
 from calib.sequences.candidates import Level as Places
 from calib.sequences.reference import Kind
 from calib.sequences.selection import NOTHING, Trial, extremes, typical_sigma
+from calib.solve.rounding import rounded
 
 #: Tolerances of coverage and variance of held-out residuals about 68.3 %, 95 % and 1.
 _COVERAGE, _VARIANCE = 0.03, (0.8, 1.25)
@@ -196,8 +197,8 @@ def _outside(found: NoiseCalibration) -> Verdict:
     _, high, _ = extremes(found.model, found.distances, _amplitudes(found))
     beyond = extremes(found.model, (near / _OUTSIDE, far * _OUTSIDE), (0.0, 65535.0))
     text = (
-        f"Outside what was measured σ stays between {beyond[0] * 1e3:.2g} and {beyond[1] * 1e3:.2g} mm, and μ within "
-        f"{float(f'{beyond[2] * 1e3:.2g}'):g} mm, up to {far * _OUTSIDE:.0f} m and at any amplitude."
+        f"Outside what was measured σ stays between {rounded(beyond[0] * 1e3)} and {rounded(beyond[1] * 1e3)} mm, and "
+        f"μ within {rounded(beyond[2] * 1e3)} mm, up to {far * _OUTSIDE:.0f} m and at any amplitude."
     )
     sound = all(map(math.isfinite, beyond)) and beyond[0] > 0
     grows = beyond[1] > 1.001 * high

@@ -28,6 +28,7 @@ from abs_service.supervision.exit_codes import Exit
 from calib.camera import Camera
 from calib.formats import opencv
 from calib.formats.content import Hints
+from calib.solve.rounding import rounded
 from calib.solve.validation.projection_difference import DifferenceError, DifferenceMap, chance, projection_difference
 
 #: Step between the printed rows and columns of the map.
@@ -136,7 +137,9 @@ def _beyond(part: Mapping[str, Any]) -> str:
     """Clause on chance; "" if nothing is known of it."""
     if "chance_px" not in part:
         return ""
-    return f", by chance {part['chance_px']:.2g} px there (95 %); more than by chance in {part['beyond']:.0%} of it"
+    return (
+        f", by chance {rounded(part['chance_px'])} px there (95 %); more than by chance in {part['beyond']:.0%} of it"
+    )
 
 
 def _print(name: str, found: Mapping[str, Any], difference: DifferenceMap) -> None:

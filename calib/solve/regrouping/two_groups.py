@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from calib.camera import Camera
 from calib.solve.bundle.tasks import Task
 from calib.solve.regrouping.refits import corners_alone, fitted, misses, with_held_lenses
+from calib.solve.rounding import rounded
 
 #: Minimum number of shots in a group, and largest number of times that all shots are assigned.
 _MEMBERS, _STEPS = 3, 8
@@ -62,8 +63,8 @@ class TwoGroups:
         is_open = ": was a sensor moved, turned or zoomed between them, or are their images paired otherwise? "
         return (
             f"two groups of shots contradict each other: {numbered(self.smaller)} and {numbered(self.larger)}. With "
-            f"cameras of its own each misses by {self.alone_px:.2g} px, with those of the other by {self.other_px:.2g} "
-            f"px{'. ' if self.exchanged else is_open}{self.advice}"
+            f"cameras of its own each misses by {rounded(self.alone_px)} px, with those of the other by "
+            f"{rounded(self.other_px)} px{'. ' if self.exchanged else is_open}{self.advice}"
         )
 
 

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from calib import pose
 from calib.pose import Pose
+from calib.solve.rounding import rounded
 from calib.solve.start.board_poses import PoseCandidate
 
 #: Relative poses from two shots agree within this angle [rad] and this share of the distance to the board.
@@ -67,10 +68,10 @@ def relative_pose(seen: PoseCandidates, a: str, b: str) -> Pose:
         alone = [np.median([seen[name][shot][0].rms_px for shot in shots]) for name in (a, b)]
         agreed = ", ".join(str(shot) for shot, cost in zip(shots, costs[best], strict=True) if cost < 1)
         raise ContradictionError(
-            f"{a} and {b}: each fits its own corners, to {alone[0]:.2g} and {alone[1]:.2g} px, but only {agreeing} of "
-            f"their {len(shots)} common shots agree on where they stand to each other ({agreed}): the images of a shot "
-            "were not taken at the same moment, one of the sensors was moved or mirrors its images, or names are mixed "
-            "up"
+            f"{a} and {b}: each fits its own corners, to {rounded(alone[0])} and {rounded(alone[1])} px, but only "
+            f"{agreeing} of their {len(shots)} common shots agree on where they stand to each other ({agreed}): the "
+            f"images of a shot were not taken at the same moment, one of the sensors was moved or mirrors its images, "
+            "or names are mixed up"
         )
     return candidates[best]
 

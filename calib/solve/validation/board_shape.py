@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from calib.solve.bundle.additional_parameters import further
 from calib.solve.bundle.bent_boards import curves, shape_columns
+from calib.solve.rounding import rounded
 from calib.solve.solution import Solution
 from calib.solve.validation import projection_uncertainty
 from calib.solve.validation.support import supported
@@ -91,8 +92,8 @@ class ShapeError:
     def finding(self) -> str:
         """One clause for people."""
         size = f"{abs(self.size):.2f} ± {self.sigma:.2f} %"
-        effect = f"projections by up to {self.effect_px:.2g} px"
-        bend = f"{abs(self.size):.2g} ± {self.sigma:.1g} mm"
+        effect = f"projections by up to {rounded(self.effect_px)} px"
+        bend = f"{rounded(abs(self.size))} ± {rounded(self.sigma, 1)} mm"
         match self.shape:
             case Shape.STRETCH:
                 longer, other = ("rows", "columns") if self.size > 0 else ("columns", "rows")

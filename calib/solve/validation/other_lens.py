@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from calib.solve.bundle.parameters.lens_parameters import FISHEYE, RATIONAL
 from calib.solve.bundle.tasks import SensorTask
+from calib.solve.rounding import rounded
 from calib.solve.solution import Solution
 from calib.solve.start.board_poses import initial_camera, pose_candidates
 from calib.solve.start.start import fit_unknown
@@ -35,8 +36,8 @@ def other_lenses(solution: Solution) -> list[str]:
         given, best = misses[sensor.lens.name], min(misses, key=lambda kind: misses[kind])
         if given > _BETTER * misses[best]:
             found.append(
-                f"{name}: with a {best} lens, corners of an image miss by {misses[best]:.2g} px, with a "
-                f"{sensor.lens.name} one by {given:.2g} px: --lens {name}={best}"
+                f"{name}: with a {best} lens, corners of an image miss by {rounded(misses[best])} px, with a "
+                f"{sensor.lens.name} one by {rounded(given)} px: --lens {name}={best}"
             )
     return found
 
@@ -69,7 +70,7 @@ def undescribed(solution: Solution, needed_px: float) -> list[str]:
         miss = _common_miss(solution, name)
         if miss > _HARMLESS * needed_px:
             found.append(
-                f"{name}: corners miss by {miss:.2g} px in the same places of the image in all shots, which a "
+                f"{name}: corners miss by {rounded(miss)} px in the same places of the image in all shots, which a "
                 f"{solution.task.sensors[name].lens.name} lens does not describe: try another kind of lens, and take "
                 "away what is in front of it, such as a window; images must be neither rectified nor stabilised"
             )

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from calib.solve.bundle.additional_parameters import further
 from calib.solve.bundle.bent_boards import ByPlaces, by_places, shape_columns
+from calib.solve.rounding import rounded
 from calib.solve.solution import Solution
 from calib.solve.validation.board_shape import CERTAIN, bends, effect_px
 
@@ -50,9 +51,9 @@ class Motion:
     def __str__(self) -> str:
         """The finding, and what to do."""
         return (
-            f"{self.sensor}: its images look as if board or camera moved by {abs(self.size):.2g} ± {self.sigma:.1g} mm "
-            "in the same way while each was read, row by row, which changes projections by up to "
-            f"{self.effect_px:.2g} px: hold both still in each shot"
+            f"{self.sensor}: its images look as if board or camera moved by {rounded(abs(self.size))} ± "
+            f"{rounded(self.sigma, 1)} mm in the same way while each was read, row by row, which changes projections "
+            f"by up to {rounded(self.effect_px)} px: hold both still in each shot"
         )
 
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from calib.solve.rounding import rounded
 from calib.solve.solution import Solution
 from calib.solve.validation.board_shape import effect_px
 
@@ -85,7 +86,7 @@ def doubts(found: Mapping[str, NotSquare], needed_px: float) -> list[str]:
 def remarks(found: Mapping[str, NotSquare]) -> str:
     """Sentences on pixels that may be square, and what that would change; "" where it is not worth a word."""
     return "".join(
-        f" If pixels of {name} are square, projections change by up to {one.effect_px:.2g} px: they would be "
+        f" If pixels of {name} are square, projections change by up to {rounded(one.effect_px)} px: they would be "
         f"{abs(one.ratio):.2%} {one.shape}."
         for name, one in found.items()
         if one.effect_px > _WORTH_PX

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib.formats.plausibility import exchanged
+from calib.solve.rounding import rounded
 from calib.solve.solution import Solution
 from calib.solve.validation import projection_uncertainty
 from calib.solve.validation.board_shape import shape_errors
@@ -137,12 +138,12 @@ def _praise(
     maximum = max((each for each in known.values() if not np.isnan(each)), default=0)
     seen = min(field.inside.mean() for field in images.values())
     where = f" where boards were seen, in {seen:.0%} of the image" if seen < 1 else ""
-    text = f"Trust it: projections at {distance:.2g} m are known to {maximum:.2g} px (95 %){where}"
+    text = f"Trust it: projections at {rounded(distance)} m are known to {rounded(maximum)} px (95 %){where}"
     if agreements:
         worst = max(agreements, key=lambda each: each.ratio)
         text += (
-            f", and the halves of the shots differ by {worst.difference_px:.2g} px where "
-            f"{worst.predicted_px:.2g} px were predicted ({worst.of}, the worst)"
+            f", and the halves of the shots differ by {rounded(worst.difference_px)} px where "
+            f"{rounded(worst.predicted_px)} px were predicted ({worst.of}, the worst)"
         )
     return text + "."
 
@@ -158,8 +159,8 @@ def _disagreeing(agreements: Sequence[Agreement], measuring: Set[str], needed_px
     # A wrong kind of lens shows in each sensor, wrong distances only beside another one.
     right = {each.of for each in agreements if each not in bad} - measuring
     return [
-        f"{each.of}: the halves of the shots differ by {each.difference_px:.2g} px where {each.predicted_px:.2g} px "
-        f"were predicted{_why(each.of, right, in_rig='→' in agreements[-1].of)}"
+        f"{each.of}: the halves of the shots differ by {rounded(each.difference_px)} px where "
+        f"{rounded(each.predicted_px)} px were predicted{_why(each.of, right, in_rig='→' in agreements[-1].of)}"
         for each in sorted(bad, key=lambda each: -each.ratio)
     ]
 
@@ -183,8 +184,8 @@ def _uncertain(radii: Mapping[str, float], needed_px: float) -> list[str]:
     for of, known in radii.items():
         if known > needed_px:
             found.append(
-                f"{of}: projections are known to {known:.2g} px only (95 %) where {needed_px:.2g} px are needed; take "
-                "more tilted views, and fill the corners of the image"
+                f"{of}: projections are known to {rounded(known)} px only (95 %) where {rounded(needed_px)} px are "
+                "needed; take more tilted views, and fill the corners of the image"
             )
         if np.isnan(known):
             found.append(f"{of}: nothing that the one sees at this distance is near the image of the other")

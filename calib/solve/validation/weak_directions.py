@@ -8,6 +8,7 @@ import numpy as np
 from scipy import linalg
 
 from calib.solve.bundle.parameters.layout import DEPTH_TERMS, POSE
+from calib.solve.rounding import rounded
 from calib.solve.solution import Solution
 
 #: Directions are weak if they are known to less than this share of the distance (95 %).
@@ -68,8 +69,8 @@ def _reason(named: dict[str, list[str]], parts: dict[tuple[str, str], float], re
     fixed = " ".join(f"--fixed-pose {sensor}" for sensor in named if (sensor, "x") in parts)
     remedy = f", or keep a pose that is known ({fixed})" if fixed else ""
     return (
-        f"{changes}: held by the shots to {reach * 1e3:.2g} mm only (95 %, at {distance:g} m), as one looks like the "
-        f"other; show the board at more distances, from near to far{remedy}"
+        f"{changes}: held by the shots to {rounded(reach * 1e3)} mm only (95 %, at {distance:g} m), as one looks like "
+        f"the other; show the board at more distances, from near to far{remedy}"
     )
 
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from calib.solve.bundle.adjustment import NotSolvedError
 from calib.solve.bundle.parameters.lens_parameters import ASPECT
+from calib.solve.rounding import rounded
 from calib.solve.solution import Solution
 from calib.solve.start.start import fit_camera
 from calib.solve.validation.inconsistent_shots.steadiness import Change, rms
@@ -40,9 +41,9 @@ def of_place(one: Change) -> str:
     """A sensor that moved."""
     turn, move = np.linalg.norm(one.values[:3]), np.linalg.norm(one.values[3:])
     return (
-        f"{one.sensor}: stands elsewhere from about shot {one.shot} on, by about {move * 1e3:.2g} mm and "
-        f"{np.degrees(turn):.2g}°, which shifts its corners by {one.shift_px:.2g} px: it or the reference was moved; "
-        "fasten the sensors, and leave out the shots before or after with --skip"
+        f"{one.sensor}: stands elsewhere from about shot {one.shot} on, by about {rounded(float(move) * 1e3)} mm and "
+        f"{rounded(float(np.degrees(turn)))}°, which shifts its corners by {rounded(one.shift_px)} px: it or the "
+        "reference was moved; fasten the sensors, and leave out the shots before or after with --skip"
     )
 
 
@@ -52,7 +53,7 @@ def of_optics(one: Change, sensors: int) -> str:
     cause = "it was refocused, zoomed or moved: fasten the sensors," if sensors > 1 else "it was refocused or zoomed:"
     return (
         f"{one.sensor}: projects otherwise from about shot {one.shot} on: focal length by {focal:+.1%}, principal "
-        f"point by ({across:+.1f}, {down:+.1f}) px, which shifts its corners by {one.shift_px:.2g} px: {cause} "
+        f"point by ({across:+.1f}, {down:+.1f}) px, which shifts its corners by {rounded(one.shift_px)} px: {cause} "
         "switch autofocus, zoom and image stabilisation off, and leave out the shots before or after with --skip; if "
         "nothing changed but where the boards were, the kind of lens fits nearly only, or the board is bent"
     )

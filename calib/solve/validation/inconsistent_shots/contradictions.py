@@ -15,6 +15,7 @@ from calib import pose
 from calib.board.views import CornerView
 from calib.pose import Pose
 from calib.solve.regrouping.two_groups import unexplained
+from calib.solve.rounding import rounded
 from calib.solve.solution import Solution
 from calib.solve.start.board_poses import PoseCandidate, pose_candidates
 
@@ -60,7 +61,7 @@ class Contradiction:
     def __str__(self) -> str:
         """One clause for people."""
         unit, scale = ("px", 1.0) if self.of == "corners" else ("mm", 1e3)
-        miss, median = (f"{scale * each:.2g} {unit}" for each in (self.miss, self.median))
+        miss, median = (f"{rounded(scale * each)} {unit}" for each in (self.miss, self.median))
         said = f"{self.of} of {self.sensors[0]} miss by {miss}, {median} are typical"
         if self.apart:
             said += f"; {' and '.join(self.sensors)} see the board {self.apart * 1e3:.1f} mm apart, and each fits alone"

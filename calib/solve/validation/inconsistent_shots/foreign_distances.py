@@ -10,6 +10,7 @@ import numpy as np
 
 from calib.board.views import PlaneView
 from calib.solve.diagnoses import robust_line
+from calib.solve.rounding import rounded
 from calib.solve.solution import Solution
 from calib.solve.start.registration import fit_plane
 from calib.solve.validation.distance_errors import DistanceShift, Misread, distance_errors
@@ -48,10 +49,10 @@ class ForeignDistances:
         """The finding, without the sensor's name."""
         if self.is_far:
             return (
-                f"its distances miss the boards by {_rounded(self.miss * 1e3)} mm, and planes of their own by "
-                f"{_rounded(self.own * 1e3)} mm only"
+                f"its distances miss the boards by {rounded(self.miss * 1e3)} mm, and planes of their own by "
+                f"{rounded(self.own * 1e3)} mm only"
             )
-        return f"its distances are {_rounded(self.factor)} times as long as those of the boards"
+        return f"its distances are {rounded(self.factor)} times as long as those of the boards"
 
     @property
     def remedy(self) -> str:
@@ -105,8 +106,3 @@ def _of_sensor(solution: Solution, name: str, views: list[PlaneView]) -> list[Fo
     one = ForeignDistances(name, factor, float(np.median(misses)), float(np.median(own)))
     is_foreign = one.is_far and one.miss > _SHARE * float(np.median(medians[1]))
     return [one] if is_foreign or (not one.is_far and abs(factor - 1) > _GROSS) else []
-
-
-def _rounded(value: float) -> str:
-    """Two digits, and never an exponent of ten: 140, not 1.4e+02."""
-    return f"{float(f'{value:.2g}'):g}"

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from calib.solve.rounding import rounded
 from calib.solve.solution import Solution
 from calib.solve.start.board_poses import pose_candidates
 from calib.solve.start.start import fit_camera
@@ -31,9 +32,10 @@ class Scatter:
     def __str__(self) -> str:
         """The finding, and what to do."""
         return (
-            f"{' and '.join(self.sensors)}: each fits its own corners to {self.alone_px:.2g} px, but together they "
-            f"miss by {self.apart_px:.2g} px in most shots: the images of a shot were not taken at the same moment, or "
-            "a sensor was moved or zoomed between them; hold the board still in every shot, or synchronise the sensors"
+            f"{' and '.join(self.sensors)}: each fits its own corners to {rounded(self.alone_px)} px, but together "
+            f"they miss by {rounded(self.apart_px)} px in most shots: the images of a shot were not taken at the same "
+            "moment, or a sensor was moved or zoomed between them; hold the board still in every shot, "
+            "or synchronise the sensors"
         )
 
 
