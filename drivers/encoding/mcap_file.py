@@ -37,6 +37,9 @@ CHUNK_SIZE = 1 << 20
 #: Name of the metadata records with id, topic and schema of each channel, redundant to the channel records.
 CHANNEL_METADATA = "abs.channel"
 
+#: Size of a file at which its channels are described again, and then whenever it has doubled [bytes].
+DESCRIBED_AGAIN = 200_000
+
 
 class Compression(StrEnum):
     """Compression of chunks; `LZ4` takes half the time of `ZSTD` and saves half as much."""
@@ -72,6 +75,7 @@ class McapFile:
         self._writer = Writer(stream, chunk_size=chunk_size, compression=CompressionType[compression.name])
         self._schemas: dict[str, int] = {}
         self._channels: dict[str, tuple[str, int]] = {}
+        self._described_again = DESCRIBED_AGAIN
         self.failure = ""
         self._writer.start(profile="", library="abs-service")
 
@@ -108,6 +112,11 @@ class McapFile:
         Otherwise chunks are closed by size only, and a low-rate topic would stay in memory for a minute. Messages
         written before a flush are readable after the process was killed; call it once a second.
         """
+        if self._stream.tell() >= self._described_again:
+            # Whoever overwrites the beginning, with all names, leaves messages that nobody knows.
+            self._described_again = 2 * self._stream.tell()
+            for topic, (schema_name, channel) in self._channels.items():
+                self._name(channel, topic, schema_name)
         self._attempt(self._writer.flush)
 
     def finish(self) -> None:
@@ -132,8 +141,11 @@ class McapFile:
             channel = self._writer.register_channel(topic, MessageEncoding.Protobuf, self._schema(schema_name))
             self._channels[topic] = (schema_name, channel)
             # In an unfinished file one chunk alone has the channel record. This record serves if that chunk is damaged.
-            self.describe(CHANNEL_METADATA, {"id": str(channel), "topic": topic, "schema": schema_name})
+            self._name(channel, topic, schema_name)
         return channel
+
+    def _name(self, channel: int, topic: str, schema_name: str) -> None:
+        self.describe(CHANNEL_METADATA, {"id": str(channel), "topic": topic, "schema": schema_name})
 
     def _schema(self, name: str) -> int:
         if name not in self._schemas:

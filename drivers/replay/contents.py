@@ -112,8 +112,9 @@ def _summary(path: Path, stream: BinaryIO) -> Summary | None:
     try:
         reader = SeekingReader(stream)
     except DAMAGE as error:
-        what = f"{path}: this is no MCAP file ({stream.seek(0, 2)} bytes)"
-        raise RecordingError(f"{what}; `abs-service import` reads recordings of other tools") from error
+        what = f"{path}: this is no MCAP file ({stream.seek(0, 2)} bytes), or its beginning is damaged"
+        remedy = "`abs-service recover` saves what can be read, `abs-service import` reads recordings of other tools"
+        raise RecordingError(f"{what}; {remedy}") from error
     try:
         summary = reader.get_summary()
     except (*DAMAGE, OSError):  # the latter if the file is shorter than the end of a finished one

@@ -96,7 +96,10 @@ def test_a_file_that_is_no_recording_is_refused(tmp_path):
     with pytest.raises(a.RecordingError, match="No such file"):
         a.open_recording(tmp_path / "none.mcap")
     (tmp_path / "text.mcap").write_text("no MCAP")
-    with pytest.raises(a.RecordingError, match=r"this is no MCAP file .* `abs-service import` reads"):
+    with pytest.raises(
+        a.RecordingError,
+        match=r"this is no MCAP file .* its beginning is damaged; `abs-service recover` .* `abs-service import` reads",
+    ):
         a.open_recording(tmp_path / "text.mcap")
 
 

@@ -9,6 +9,7 @@ import pytest
 from abs_service.recording.recording_file import RecordingFile
 from abs_service.recording.recovery import InUseError, recover
 from drivers.encoding.mcap_file import Compression
+from drivers.replay.contents import Topic, scan
 from tests.abs_service.recording.test_recovery import FRAMES, write
 
 SCHEMA, SIZE = "absmsg.v1.Health", 1 << 20
@@ -65,3 +66,16 @@ def test_on_nfs_a_file_that_is_only_read_can_be_locked_as_well(tmp_path, monkeyp
         with pytest.raises(InUseError):
             recover(source)
     assert recover(source).messages == 2 * FRAMES
+
+
+def test_an_overwritten_beginning_costs_what_was_there(tmp_path):
+    """The names of the channels are there, too; without them no message of the rest would be known."""
+    file = RecordingFile(tmp_path / "a.mcap", 1, {}, Compression.NONE)
+    for number in range(1, 5):
+        file.write("health/a", SCHEMA, bytes(150_000), number, number)
+        file.flush()
+    active = file.abandon()
+    active.write_bytes(bytes(100_000) + active.read_bytes()[100_000:])
+    report = recover(active)
+    assert (report.messages, report.orphans) == (3, 0)
+    assert list(scan(report.target).topics.values()) == [Topic("/health/a", SCHEMA, 3)]
