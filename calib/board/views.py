@@ -6,7 +6,8 @@ front of an unrotated camera is close to a translation along +z.
 """
 
 import hashlib
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +37,10 @@ class CornerView:
     def digest(self) -> str:
         """Digest of the corners, rounded to 1e-3 px: images that are the same have the same, and no others."""
         return hashlib.sha256(np.round(self.pixels, 3).tobytes()).hexdigest()[:16]
+
+    def renamed(self, to: Mapping[str, str]) -> "CornerView":
+        """View of the sensor that this one's images belong to; of a sensor that is not named, as it is."""
+        return replace(self, sensor=to.get(self.sensor, self.sensor))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

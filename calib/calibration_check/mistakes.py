@@ -131,7 +131,7 @@ def _undone(stored: Stored, shots: Shots, names: Sequence[str]) -> Iterator[tupl
     sizes = {name: (stored.sensors[name].camera.width, stored.sensors[name].camera.height) for name in names}
     for a, b in combinations(names, 2):
         if sizes[a] == sizes[b]:
-            yield (Kind.EXCHANGED, (a, b)), _each(shots, partial(_exchanged, to={a: b, b: a}))
+            yield (Kind.EXCHANGED, (a, b)), _each(shots, partial(CornerView.renamed, to={a: b, b: a}))
     extent = np.max([view.points_b.max(axis=0) for views in shots for view in views], axis=0)[:2]
     for group, image, board in product([*((name,) for name in names), tuple(names)], _FLIPS[1:], _FLIPS):
         # A mirrored board is numbered from another corner, and a turned one from the other end if its ends look alike.
@@ -139,11 +139,6 @@ def _undone(stored: Stored, shots: Shots, names: Sequence[str]) -> Iterator[tupl
             kind = Kind.MIRRORED if sum(image) % 2 else Kind.TURNED
             own, along = {name: sizes[name] for name in group}, tuple(np.multiply(board, extent).tolist())
             yield (kind, group), _each(shots, partial(_flipped, sizes=own, image=image, board=along))
-
-
-def _exchanged(view: CornerView, to: Mapping[str, str]) -> CornerView:
-    """View of the sensor that gets the images of another one; one of further sensors as it is."""
-    return replace(view, sensor=to.get(view.sensor, view.sensor))
 
 
 def _flipped(

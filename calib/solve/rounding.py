@@ -1,4 +1,4 @@
-"""Numbers in sentences about a solution."""
+"""Numbers in sentences about a calibration."""
 
 
 def rounded(value: float, digits: int = 2) -> str:

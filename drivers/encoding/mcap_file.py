@@ -75,7 +75,7 @@ class McapFile:
         self._writer = Writer(stream, chunk_size=chunk_size, compression=CompressionType[compression.name])
         self._schemas: dict[str, int] = {}
         self._channels: dict[str, tuple[str, int]] = {}
-        self._described_again = DESCRIBED_AGAIN
+        self._next_description = DESCRIBED_AGAIN
         self.failure = ""
         self._writer.start(profile="", library="abs-service")
 
@@ -112,9 +112,9 @@ class McapFile:
         Otherwise chunks are closed by size only, and a low-rate topic would stay in memory for a minute. Messages
         written before a flush are readable after the process was killed; call it once a second.
         """
-        if self._stream.tell() >= self._described_again:
+        if (size := self._stream.tell()) >= self._next_description:
             # Whoever overwrites the beginning, with all names, leaves messages that nobody knows.
-            self._described_again = 2 * self._stream.tell()
+            self._next_description = 2 * size
             for topic, (schema_name, channel) in self._channels.items():
                 self._name(channel, topic, schema_name)
         self._attempt(self._writer.flush)

@@ -14,6 +14,7 @@ from calib.calibration_check.changes import PairChange
 from calib.calibration_check.comparison import Comparison
 from calib.calibration_check.optics import OpticsChange
 from calib.calibration_check.sensor_fits import CornerFit, DistanceBias
+from calib.solve.rounding import rounded
 
 
 def sensors(
@@ -71,8 +72,8 @@ def _explanations(comparison: Comparison) -> Section:
     how = (
         "Each shot is predicted from all others; an explanation that predicts worse by more than 3 nats and by two "
         "standard errors over the shots is out. Of the others the one with the fewest parameters is named. From shot "
-        f"to shot, corners scatter by {comparison.corners_m * 1e3:.2g} mm and distances by "
-        f"{comparison.distances_m * 1e3:.2g} mm beyond their noise."
+        f"to shot, corners scatter by {rounded(comparison.corners_m * 1e3)} mm and distances by "
+        f"{rounded(comparison.distances_m * 1e3)} mm beyond their noise."
     )
     return Section("What has changed", (how, explained))
 

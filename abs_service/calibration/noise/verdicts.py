@@ -56,7 +56,7 @@ def _use(found: NoiseCalibration) -> Verdict:
         )
     return Verdict(
         Level.GOOD,
-        f"Use {found.chosen.candidate.name}: σ is {low * 1e3:.2g} to {high * 1e3:.2g} mm for {domain}. "
+        f"Use {found.chosen.candidate.name}: σ is {rounded(low * 1e3)} to {rounded(high * 1e3)} mm for {domain}. "
         f"{len(found.trials)} models were compared by the likelihood of what they were not fitted to.",
     )
 
@@ -87,7 +87,8 @@ def _measured(found: NoiseCalibration) -> list[Verdict]:
         # What pixels differ by for good is no scatter about a mean offset of each pixel.
         minimum = max(row.temporal, steps) if found.chosen.candidate.level == "pixel" else measured
         if not minimum / _MISS < sigma < measured * _MISS:
-            text = f"σ is {sigma * 1e3:.2g} mm at {row.distance:.2f} m, where {measured * 1e3:.2g} mm were measured."
+            there = f"at {row.distance:.2f} m, where {rounded(measured * 1e3)} mm were measured."
+            text = f"σ is {rounded(sigma * 1e3)} mm {there}"
             said.append(Verdict(Level.BAD, text, "Do not use the model there: look at its plot.", name))
     return said
 
@@ -101,8 +102,8 @@ def _boards(found: NoiseCalibration) -> list[Verdict]:
     near, far = found.distances
     share = f"{near:.1f} to {far:.1f} mm" if f"{near:.1f}" != f"{far:.1f}" else f"{far:.1f} mm"
     text = (
-        f"The reference is known to {worst * 1e3:.2g} mm: the real distances are those of the board, whose pose its "
-        f"corners tell in the images of {' and '.join(seers)}. The offset cannot be known better, and "
+        f"The reference is known to {rounded(worst * 1e3)} mm: the real distances are those of the board, whose pose "
+        f"its corners tell in the images of {' and '.join(seers)}. The offset cannot be known better, and "
         f"errors of the cameras, of their poses in the rig and of the squares' size come on top: 0.1 % of focal length "
         f"or size is {share}."
     )
@@ -215,9 +216,9 @@ def _steps(found: NoiseCalibration) -> list[Verdict]:
     step = float(found.steps.at(np.array(far)))
     if found.steps.growth > 0:
         text = (
-            f"Distances come in steps of {found.steps.growth:.3g} x² (a disparity), {step * 1e3:.2g} mm at {far:.2f} m;"
-            " σ contains their share, step²/12."
+            f"Distances come in steps of {found.steps.growth:.3g} x² (a disparity), {rounded(step * 1e3)} mm at "
+            f"{far:.2f} m; σ contains their share, step²/12."
         )
         return [Verdict(Level.GOOD, text)]
-    text = f"Distances come in steps of {step * 1e3:.2g} mm at {far:.2f} m; σ contains their share."
+    text = f"Distances come in steps of {rounded(step * 1e3)} mm at {far:.2f} m; σ contains their share."
     return [Verdict(Level.GOOD, text)] if step > 0 else []

@@ -1,4 +1,4 @@
-"""What Numba reads of the environment: the folder for compiled kernels, without which it keeps none, and threads."""
+"""The environment that Numba reads: the folder for compiled kernels, without which it keeps none, and threads."""
 
 import atexit
 import os
@@ -6,13 +6,14 @@ import shutil
 
 import abs_service
 from abs_service.supervision.process_setup import standard_files
+from calib.jit import THREADS
 
 #: Numba's environment variable for it.
 VARIABLE = "NUMBA_CACHE_DIR"
 #: The environment variable for the folder of the user in which it keeps them where it cannot beside the code.
 USER = "XDG_CACHE_HOME"
-#: The environment variable for the number of threads of a kernel, and the most: with 100,000 a process is killed.
-THREADS, MAX_THREADS = "NUMBA_NUM_THREADS", 1000
+#: Largest number of threads of a kernel; with 100,000 a process is killed.
+MAX_THREADS = 1000
 #: Room for the kernels of a rig, on a disk that is not full [bytes].
 MIN_BYTES = 50_000_000
 

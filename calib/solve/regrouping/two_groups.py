@@ -93,44 +93,47 @@ def _settled(held: Task, members: NDArray[np.bool_]) -> list[TwoGroups]:
         if not _MEMBERS <= members.sum() <= len(members) - _MEMBERS:
             return []
         try:
-            off = np.stack([misses(held, fitted(held, _part(held, part))) for part in (~members, members)])
+            cameras = [fitted(held, _part(held, part)) for part in (~members, members)]
         except ValueError:  # nothing explains one of them
             return []
+        off = np.stack([misses(held, each) for each in cameras])
         before, members = members, off[1] < off[0]
         if np.array_equal(before, members):
-            return _judged(held, members, off)
+            return _judged(held, members, cameras, off)
     return []
 
 
-def _judged(held: Task, members: NDArray[np.bool_], off: NDArray[np.float64]) -> list[TwoGroups]:
+def _judged(
+    held: Task, members: NDArray[np.bool_], cameras: Sequence[Mapping[str, Camera]], off: NDArray[np.float64]
+) -> list[TwoGroups]:
     """The groups, if both are explained alike or by exchanged images, by what shots miss with the cameras of both.
 
     Args:
         held: with all shots.
         members: shots of one of the groups (shots,).
-        off: what corners miss by, root mean square (2, shots) [px].
+        cameras: that explain the others, and these.
+        off: what corners miss by with both, root mean square (2, shots) [px].
     """
     own, other = off.min(axis=0), off.max(axis=0)
     smaller, larger = sorted((tuple(_part(held, part)) for part in (members, ~members)), key=len)
     found = TwoGroups(smaller, larger, float(np.median(own)), float(np.median(other)))
     # Lenses that were begun with exchanged images are those of neither sensor, and fit neither group well.
-    if exchanged := _exchanged(held, found):
+    if exchanged := _exchanged(held, found, cameras[int(2 * members.sum() > len(members))]):
         return [replace(found, exchanged=exchanged)]
     typical = sorted(float(np.median(own[part])) for part in (members, ~members))
     return [] if typical[1] > _ALIKE * typical[0] else [found]
 
 
-def _exchanged(held: Task, found: TwoGroups) -> tuple[str, ...]:
-    """Two sensors of one size with which the larger group explains the smaller one, once their images are exchanged."""
+def _exchanged(held: Task, found: TwoGroups, cameras: Mapping[str, Camera]) -> tuple[str, ...]:
+    """Two sensors of one size whose images in the smaller group, once exchanged, cameras of the larger one explain."""
     sizes = {name: (sensor.width, sensor.height) for name, sensor in held.sensors.items()}
     pairs = [(one, other) for one, other in combinations(sorted(sizes), 2) if sizes[one] == sizes[other]]
-    rest, cameras = held.of_shots(found.smaller), fitted(held, found.larger) if pairs else {}
-    for pair in pairs:
-        to = dict(zip(pair, reversed(pair), strict=True))
-        views = [replace(view, sensor=to.get(view.sensor, view.sensor)) for view in rest.corners]
+    rest = held.of_shots(found.smaller)
+    for one, other in pairs:
+        views = [view.renamed({one: other, other: one}) for view in rest.corners]
         off = float(np.median(misses(replace(rest, corners=views), cameras)))
         if _FAR * off < found.other_px and off < max(_FAR * found.alone_px, _FAR_PX):
-            return pair
+            return one, other
     return ()
 
 

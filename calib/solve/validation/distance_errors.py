@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from calib.solve.bundle.additional_parameters import further
 from calib.solve.bundle.blocks import Planes
 from calib.solve.bundle.equations import Equations
+from calib.solve.rounding import rounded
 from calib.solve.solution import Solution
 
 #: Mistakes are named from this many deviations on.
@@ -73,7 +74,9 @@ class DistanceShift:
     @property
     def finding(self) -> str:
         """The finding, without the sensor's name."""
-        across, down = (f"{a:+.1f} ± {b:.2g}" for a, b in zip(self.shift.tolist(), self.sigmas.tolist(), strict=True))
+        across, down = (
+            f"{a:+.1f} ± {rounded(b)}" for a, b in zip(self.shift.tolist(), self.sigmas.tolist(), strict=True)
+        )
         return f"its depth image is displaced by ({across}, {down}) px from the image that shows the corners"
 
     def __str__(self) -> str:

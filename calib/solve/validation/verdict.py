@@ -158,23 +158,30 @@ def _disagreeing(agreements: Sequence[Agreement], measuring: Set[str], needed_px
     bad = [each for each in agreements if each.ratio > MAX_RATIO and each.difference_px > HARMLESS * needed_px]
     # A wrong kind of lens shows in each sensor, wrong distances only beside another one.
     right = {each.of for each in agreements if each not in bad} - measuring
+    in_rig = any("→" in each.of for each in agreements)
+    between = ", if only between the images of a shot" if in_rig else ""
     return [
         f"{each.of}: the halves of the shots differ by {rounded(each.difference_px)} px where "
-        f"{rounded(each.predicted_px)} px were predicted{_why(each.of, right, in_rig='→' in agreements[-1].of)}"
+        f"{rounded(each.predicted_px)} px were predicted{_why(each.of, right, between)}"
         for each in sorted(bad, key=lambda each: -each.ratio)
     ]
 
 
-def _why(of: str, right: Set[str], in_rig: bool) -> str:
-    """The likely cause of halves that differ in a sensor or pair, beside sensors whose own agree, and what to do."""
+def _why(of: str, right: Set[str], when: str) -> str:
+    """The likely cause of halves that differ in a sensor or pair, and what to do.
+
+    Args:
+        of: the sensor or pair.
+        right: sensors about which the halves agree.
+        when: clause on when something may have moved; "" if it goes without saying.
+    """
     if {*of.split(" → ")} <= right:
         return (
             ", and agree about each of the two: the images of a shot were not taken at the same moment, a sensor was "
             "moved, or the board is not flat; hold the board still in every shot, or synchronise the sensors"
         )
-    between = ", if only between the images of a shot" if in_rig else ""
     return (
-        f"; the kind of lens does not fit, the board is not flat, or something moved{between}: take more tilted views, "
+        f"; the kind of lens does not fit, the board is not flat, or something moved{when}: take more tilted views, "
         "and try another kind of lens"
     )
 

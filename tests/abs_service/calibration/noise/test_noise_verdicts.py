@@ -40,7 +40,7 @@ def test_a_curve_that_misses_what_was_measured_is_bad(found: measurement.NoiseCa
     for sigma in (6e-5, 0.1):
         level, (text,) = worst(replace(found, model=Constant(sigma)))
         assert level is Level.BAD
-        assert f"σ is {sigma * 1e3:.2g} mm at 1.2" in text
+        assert f"σ is {sigma * 1e3:g} mm at 1.2" in text
 
 
 def test_what_is_not_a_number_is_bad(found: measurement.NoiseCalibration) -> None:
