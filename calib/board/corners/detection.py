@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from calib.board.april_grid import AprilGrid
 from calib.board.corners import description, ellipse, errors, other_discs, quality, saddle
-from calib.board.corners.markers import require_one_board
+from calib.board.corners.markers import cell_px, require_one_board
 from calib.board.corners.misplaced import is_in_place
 from calib.board.corners.order import canonical_order
 from calib.board.corners.search import MIN_POINTS, Found, find, is_cut_off
@@ -17,6 +17,8 @@ from calib.board.views import CornerView
 
 #: Minimum distance of neighbouring points [px].
 MIN_SPACING_PX = 5.0
+#: Width of a marker's cells below which it is hardly read [px].
+MIN_CELL_PX = 2.0
 #: Largest saturated fraction of a board. Saturated white leaves corners in place, saturated black does not …
 MAX_SATURATED = 0.85
 #: … while distances of an active depth sensor are wrong wherever it is saturated.
@@ -193,6 +195,11 @@ def _detection_error(target: Target, image: Image, levels: Grey, found: int) -> 
         )
     if is_cut_off(target, levels):
         return errors.CutOffError(_CUT_OFF)
+    if isinstance(target, Charuco | AprilGrid) and (cell := cell_px(target, levels)) < MIN_CELL_PX:
+        return errors.TooSmallError(
+            f"the board is too small: the cells of its markers are {cell:.1f} pixels wide, at least {MIN_CELL_PX:g} "
+            "are needed. Come closer, or use a board with larger squares"
+        )
     seen = f"only {found} of its points" if found else "none of its points"
     hint = f" {bright}, which may be why." if share > _MAY_BE_SATURATED else ""
     return errors.NothingFoundError(

@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 
 from calib.board.april_grid import AprilGrid
 from calib.board.corners.april_tags import find_april_grid
+from calib.board.corners.markers import find_charuco
 from calib.board.corners.order import brightness, cells
-from calib.board.corners.to_8bit import Grey, local_contrast
+from calib.board.corners.to_8bit import Grey, local_contrast, scaled, unscaled
 from calib.board.target import AsymmetricCircles, Charuco, Chessboard, Circles, Target
 
 Found = tuple[NDArray[np.intp], NDArray[np.float64]]
@@ -47,10 +48,9 @@ def find(target: Target, levels: Grey) -> Found:
     """
     best = _NOTHING
     for image, scale, search in _attempts(target, levels):
-        ids, pixels = search(target, _scaled(image, scale))
+        ids, pixels = search(target, scaled(image, scale))
         if len(ids) > len(best[0]):
-            # Both images cover the same area, and pixel centres are integers in both.
-            best = ids, (pixels + 0.5) / scale - 0.5
+            best = ids, unscaled(pixels, scale)
         if len(best[0]) >= MIN_POINTS:
             break
     return best
@@ -74,6 +74,8 @@ def _scales(target: Target, levels: Grey) -> Iterator[float]:
         yield _reduction(levels, maximum)
         return
     yield 1
+    if isinstance(target, Charuco):
+        return  # is enlarged as its squares need it
     if size < (_MIN_SIDE_OF_DISCS if isinstance(target, Circles | AsymmetricCircles) else _MIN_SIDE):
         yield 2
         yield 4
@@ -84,19 +86,12 @@ def _reduction(levels: Grey, maximum: int) -> float:
     return 1 / int(np.ceil(max(levels.shape) / maximum))
 
 
-def _scaled(levels: Grey, scale: float) -> Grey:
-    if scale == 1:
-        return levels
-    method = cv2.INTER_AREA if scale < 1 else cv2.INTER_CUBIC
-    return cv2.resize(levels, None, fx=scale, fy=scale, interpolation=method).astype(np.uint8, copy=False)
-
-
 def _find(target: Target, levels: Grey) -> Found:
     match target:
         case Chessboard():
             return _find_chessboard(target, levels)
         case Charuco():
-            return _find_charuco(target, levels)
+            return find_charuco(target, levels)
         case AprilGrid():
             return find_april_grid(target, levels)
         case Circles():
@@ -148,7 +143,7 @@ def chessboard_size(levels: Grey) -> tuple[int, int]:
     Some images show only a part of their board to this search. In others it takes the ends of the outermost squares for
     corners, where a dark frame follows; beyond corners there are squares.
     """
-    levels = _scaled(levels, next(_scales(_ANY, levels)))
+    levels = scaled(levels, next(_scales(_ANY, levels)))
     corners = _part_of_chessboard(levels)
     if not corners.size:
         return 0, 0
@@ -160,7 +155,8 @@ def chessboard_size(levels: Grey) -> tuple[int, int]:
         contrasts = np.median(np.abs(np.diff(squares, axis=1)), axis=1)
         ends = contrasts[[0, -1]] < _FRAME * np.median(contrasts[1:-1])
         sizes.append(len(squares) - 1 - int(ends.sum()))
-    return (max(sizes), min(sizes)) if min(sizes) > 2 else (0, 0)
+    # 3 × 3 corners are the least that is searched for, and are found by chance, as among the squares of markers.
+    return (max(sizes), min(sizes)) if min(sizes) > 2 and max(sizes) > 3 else (0, 0)
 
 
 def _part_of_chessboard(levels: Grey) -> NDArray[np.float64]:
@@ -172,7 +168,7 @@ def _part_of_chessboard(levels: Grey) -> NDArray[np.float64]:
 
 def is_cut_off(target: Target, levels: Grey) -> bool:
     """True if an image without a detection shows part of a board that continues beyond the border."""
-    levels = _scaled(levels, next(_scales(target, levels)))
+    levels = scaled(levels, next(_scales(target, levels)))
     match target:
         case Chessboard():
             corners = _part_of_chessboard(levels)
@@ -197,7 +193,7 @@ def is_cut_off(target: Target, levels: Grey) -> bool:
 
 def count_of_discs(target: Circles | AsymmetricCircles, levels: Grey) -> int:
     """Number of blobs in an image that may be discs of a board."""
-    levels = _scaled(levels, next(_scales(target, levels)))
+    levels = scaled(levels, next(_scales(target, levels)))
     return len(_disc_detector(target, levels).detect(levels))
 
 
@@ -222,13 +218,3 @@ def _disc_detector(target: Circles | AsymmetricCircles, levels: Grey) -> cv2.Sim
     parameters.minDistBetweenBlobs = 4
     parameters.thresholdStep = 5
     return cv2.SimpleBlobDetector.create(parameters)
-
-
-def _find_charuco(target: Charuco, levels: Grey) -> Found:
-    size = (target.columns, target.rows)
-    layout = cv2.aruco.CharucoBoard(size, target.square, target.marker, target.markers(), target.ids())
-    layout.setLegacyPattern(target.legacy)
-    corners, ids, _, _ = cv2.aruco.CharucoDetector(layout).detectBoard(levels)
-    if ids is None or corners is None:
-        return _NOTHING
-    return ids.ravel().astype(np.intp), corners.reshape(-1, 2).astype(np.float64)

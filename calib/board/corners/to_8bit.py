@@ -1,4 +1,4 @@
-"""Conversion of images of any depth to 8-bit grey levels for OpenCV."""
+"""Conversion of images of any depth to 8-bit grey levels of any size for OpenCV."""
 
 from collections.abc import Iterator
 
@@ -40,3 +40,16 @@ def tones(image: Image) -> Iterator[Grey]:
 def local_contrast(levels: Grey) -> Grey:
     """Image with local contrast enhancement (CLAHE), for uneven lighting."""
     return cv2.createCLAHE(clipLimit=4.0, tileGridSize=(8, 8)).apply(levels).astype(np.uint8, copy=False)
+
+
+def scaled(levels: Grey, scale: float) -> Grey:
+    """Image that is enlarged, or reduced."""
+    if scale == 1:
+        return levels
+    method = cv2.INTER_AREA if scale < 1 else cv2.INTER_CUBIC
+    return cv2.resize(levels, None, fx=scale, fy=scale, interpolation=method).astype(np.uint8, copy=False)
+
+
+def unscaled(pixels: NDArray[np.float64], scale: float) -> NDArray[np.float64]:
+    """Points of a scaled image in the image itself; both cover one area, and pixel centres are integers in both."""
+    return (pixels + 0.5) / scale - 0.5
