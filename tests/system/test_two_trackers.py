@@ -1,4 +1,4 @@
-"""Two trackers in one rig, each on a sheet of its own, get the same images and equal shares of the cores."""
+"""Two trackers in one rig, each on a sheet of its own, get the same images, and neither waits for the other."""
 
 import json
 import signal
@@ -28,7 +28,7 @@ def both_track(listener):
     return all(Counter(state.status for state in states(listener, name))[TRACKING] > 10 for name in NAMES)
 
 
-def test_both_track_their_own_sheet_equally_often(endpoint, launch, tmp_path):
+def test_both_track_their_own_sheet_and_neither_starves(endpoint, launch, tmp_path):
     rig_file = tmp_path / "pair.toml"
     rig_file.write_text(f'{EXAMPLE.read_text("utf-8")}\n[bus]\nendpoint = "{endpoint}"\n', encoding="utf-8")
     output = tmp_path / "output.jsonl"
@@ -55,7 +55,8 @@ def test_both_track_their_own_sheet_equally_often(endpoint, launch, tmp_path):
         assert np.nanmedian(errors[name]) < 2
     counts = [len(watched[name]) for name in NAMES]
     assert min(counts) > WATCHED_S  # more than one in a second, on whatever machine
-    assert max(counts) <= 1.1 * min(counts)
+    # Neither starves. Idle cores differ by 1 %; on a machine that shares its cores with others, 19 % were seen.
+    assert max(counts) <= 1.5 * min(counts)
     centers = [
         np.median([np.reshape(state.theta, (-1, 3)).mean(axis=0)[0] for state in watched[name]]) for name in NAMES
     ]
