@@ -21,7 +21,8 @@ from abs_service.tracker.terms.photometric.texture_registration_noise import (
     NO_WIDENING,
     TextureRegistrationNoise,
 )
-from abs_service.tracker.terms.places.keypoints import Grey, Keypoints
+from abs_service.tracker.terms.places.keypoints import Keypoints
+from abs_service.tracker.terms.places.sift import Grey
 from calib.noise.base import LOG_SQRT_2PI, ImageNoise
 
 #: The texel of no measurement.

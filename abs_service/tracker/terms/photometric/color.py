@@ -25,8 +25,9 @@ from abs_service.tracker.terms.photometric.texture_registration_noise import (
     NO_REGISTRATION_NOISE,
     TextureRegistrationNoise,
 )
-from abs_service.tracker.terms.places.keypoints import Grey, Keypoints, ObservedKeypoints, Recognized
+from abs_service.tracker.terms.places.keypoints import Keypoints, ObservedKeypoints, Recognized
 from abs_service.tracker.terms.places.patches import Patches
+from abs_service.tracker.terms.places.sift import Grey
 from abs_service.tracker.terms.sensor_fit import SensorFit, summarize
 from abs_service.tracker.terms.vertex_counts import VertexMasks
 from calib.noise.base import LOG_SQRT_2PI

@@ -2,8 +2,7 @@
 
 Patches are found within some pixels (`terms.photometric.matching`). After a large motion, or when a lost surface is
 found again, the print is further away. The surroundings of its keypoints are described independently of place, turn and
-scale, so that each is recognised by itself (SIFT: D. Lowe, Distinctive image features from scale-invariant keypoints.
-International Journal of Computer Vision 60, 2004). A surface without print has none.
+scale, so that each is recognised by itself (`sift`). A surface without print has none.
 """
 
 from collections.abc import Callable
@@ -18,15 +17,10 @@ from numpy.typing import NDArray
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.perspective import project_with_jacobian
 from abs_service.tracker.terms.linearization import PointLinearization
+from abs_service.tracker.terms.places.sift import Grey, detect, match
 from calib import pose
 from calib.camera import Camera
 from calib.lenses.lens import LensError
-
-#: Longest side of the image in which keypoints are looked for [px]; finer ones are recognised no better. And how many.
-SIDE_PX, MAX_KEYPOINTS = 320, 500
-
-#: The descriptor of a keypoint is this much nearer to that of its match than to any other one's (D. Lowe).
-RATIO = 0.8
 
 #: Fewer that are recognised may be wrong matches.
 MIN_RECOGNIZED = 12
@@ -39,9 +33,6 @@ RIGID_PX = 40.0
 
 #: Vertices around a keypoint that tell its place.
 _AROUND = 4
-
-#: An 8-bit image (height, width) of one channel, or values (height, width) of any range.
-Grey = NDArray[np.uint8] | NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -94,7 +85,7 @@ class ObservedKeypoints:
         vertices, normals = (part[0].T.astype(np.float64) for part in (surface.vertices, surface.normals))
         camera = self._keypoints.camera
         places = camera.project(vertices)
-        found, descriptors = _detected(self._grey(), places)
+        found, descriptors = detect(self._grey(), places)
         places[np.vecdot(normals, vertices - camera.center) >= 0] = np.nan  # turned away
         self._keypoints.known = _bound(found, descriptors, places)
 
@@ -105,14 +96,10 @@ class ObservedKeypoints:
         if len(known.descriptors) < MIN_RECOGNIZED:
             return NOTHING_RECOGNIZED
         places = camera.project(self._predicted.vertices[0].T.astype(np.float64))
-        found, descriptors = _detected(self._grey(), places)
-        if len(descriptors) < 2:
+        found, descriptors = detect(self._grey(), places)
+        which, of_found = match(known.descriptors, descriptors)
+        if len(which) < MIN_RECOGNIZED:
             return NOTHING_RECOGNIZED
-        pairs = cv2.BFMatcher(cv2.NORM_L2).knnMatch(known.descriptors, descriptors, 2)
-        matches = [(one.queryIdx, one.trainIdx) for one, other in pairs if one.distance < RATIO * other.distance]
-        if len(matches) < MIN_RECOGNIZED:
-            return NOTHING_RECOGNIZED
-        which, of_found = np.array(matches).T
         return Recognized(camera, known.corners[which], known.weights[which], found[of_found])
 
 
@@ -186,44 +173,6 @@ class Recognized:
 
 #: Of a sensor without appearance, of a surface without print, or of one that is hidden.
 NOTHING_RECOGNIZED = Recognized(Camera(1, 1, 1.0, 1.0, 0.0, 0.0), NOT_YET.corners, NOT_YET.weights, np.zeros((0, 2)))
-
-
-def _detected(grey: Grey, places: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float32]]:
-    """Places (k, 2) [px] and descriptors (k, 128) of the keypoints of an image around a mesh at pixels (n, 2).
-
-    In a window three times as large as the mesh, in the middle of which it is.
-    """
-    (left, top), (right, bottom) = _window(places, grey.shape)
-    image = _as_levels(grey[top:bottom, left:right])
-    scale = min(1.0, SIDE_PX / max(image.shape))
-    size = [max(round(scale * side), 1) for side in image.shape[::-1]]
-    keypoints, descriptors = cv2.SIFT.create(MAX_KEYPOINTS).detectAndCompute(
-        cv2.resize(image, size, interpolation=cv2.INTER_AREA), None
-    )
-    if not keypoints:
-        return np.zeros((0, 2)), np.zeros((0, 128), np.float32)
-    scales = np.array(size) / image.shape[::-1]
-    found = (np.array([keypoint.pt for keypoint in keypoints]) + 0.5) / scales - 0.5
-    return found + np.array([left, top]), np.asarray(descriptors, np.float32)
-
-
-def _window(places: NDArray[np.float64], shape: tuple[int, ...]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """First and end (2,) of the columns and rows of a window; the whole image if the mesh is not in it."""
-    end = np.array(shape[1::-1])
-    inside = places[((places >= 0) & (places < end)).all(axis=1)]
-    if not len(inside):
-        return np.zeros(2, np.intp), end
-    low, high = inside.min(axis=0), inside.max(axis=0)
-    side = (high - low).max()
-    return np.maximum(low - side, 0).astype(np.intp), np.minimum(high + side + 2, end).astype(np.intp)
-
-
-def _as_levels(grey: Grey) -> NDArray[np.uint8]:
-    """Values as levels of 8 bits: the largest hundredth of them, and unknown ones, are at the ends of the range."""
-    if grey.dtype == np.uint8:
-        return np.asarray(grey, np.uint8)
-    values = np.nan_to_num(np.asarray(grey, np.float32), posinf=0.0, neginf=0.0)
-    return np.clip(values * (255 / max(float(np.quantile(values, 0.99)), 1e-9)), 0, 255).astype(np.uint8)
 
 
 def _bound(found: NDArray[np.float64], descriptors: NDArray[np.float32], places: NDArray[np.float64]) -> Described:

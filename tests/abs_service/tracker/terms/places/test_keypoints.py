@@ -13,10 +13,10 @@ from abs_service.tracker.terms.places.keypoints import (
     MIN_RECOGNIZED,
     NOTHING_RECOGNIZED,
     SIGMA_PX,
-    Grey,
     Keypoints,
     Recognized,
 )
+from abs_service.tracker.terms.places.sift import Grey
 from calib import pose
 from calib.camera import Camera
 from tests.abs_service.tracker.scenes import as_surface, flat, sheet
@@ -88,6 +88,13 @@ def test_nothing_is_recognised_without_a_print_in_another_one_and_before_any_is_
     other = recognized(picture, blobs(2))
     assert other is NOTHING_RECOGNIZED or other.apart(MESH.vertices) > 15
     assert np.isinf(NOTHING_RECOGNIZED.apart(MESH.vertices))
+
+
+def test_a_part_of_a_pattern_that_repeats_itself_is_not_all_of_it():
+    tile, pattern = (slice(80, 120), slice(120, 160)), np.tile(np.asarray(blobs(1, 2.0)[:40, :40], np.uint8), (6, 8))
+    part = np.full(pattern.shape, 128, np.uint8)
+    part[tile] = pattern[tile]
+    assert recognized(pattern, part) is NOTHING_RECOGNIZED
 
 
 def test_a_mesh_beside_the_image_is_looked_for_in_all_of_it():
