@@ -178,6 +178,8 @@ class RigView:
         lines = [f"{self.elapsed_s:.1f} s, {frames} images, {dropped} dropped"]
         for name, tracker in self.live.trackers.items():
             lines += [f"{name}: {line}" for line in tracker.summary()]
+            if images := lost(self.live.counters(f"track/{name}")):
+                lines.append(f"{name}: {images} images were lost on their way to it")
         if recording:
             files = f"; {recording.files} files" if recording.files > 1 else ""
             numbers = f"{files}, {recording.recorded} messages, {recording.dropped} dropped"
@@ -202,7 +204,12 @@ class RigView:
 
 def dropped(counters: Mapping[str, int]) -> int:
     """Messages that a component could not take, and those that never came to it, by the counters of its health."""
-    return sum(number for name, number in counters.items() if name.startswith(("dropped.", "lost.")))
+    return sum(number for name, number in counters.items() if name.startswith("dropped.")) + lost(counters)
+
+
+def lost(counters: Mapping[str, int]) -> int:
+    """Messages that never came to a component, by the counters of its health."""
+    return sum(number for name, number in counters.items() if name.startswith("lost."))
 
 
 def size(number: float) -> str:

@@ -6,6 +6,7 @@ import os
 import threading
 
 import pytest
+from absmsg.v1.health_pb2 import Health
 from rich.console import Console
 
 from abs_service.display.terminal import output
@@ -39,6 +40,11 @@ def test_the_summary_says_what_there_is_of_a_recording_that_failed(live, tmp_pat
     summary = "\n".join(view(live, rig=RigPlaces("demo", directory=tmp_path)).summary())
     assert f"{tmp_path}/demo_2026.mcap.active (unfinished: `abs-service recover` completes it): 2.0 MB" in summary
     assert "recording failed 2×, last: No space left on device" in summary
+
+
+def test_the_summary_tells_what_did_not_come_to_a_tracker(live):
+    take_health(live, Health(component="track/sheet", counters={"lost.tof/depth/image": 180, "lost.tof/amplitude": 1}))
+    assert "sheet: 181 images were lost on their way to it" in view(live).summary()
 
 
 def test_the_summary_counts_all_processes_of_a_component_that_was_started_again(live, tmp_path):
