@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
-from annotated_types import Gt
+from annotated_types import Interval
 from numpy.typing import NDArray
 
 from calib.noise.base import Pixels
@@ -21,7 +21,7 @@ class Constant:
         offset: mean offset of a distance [m].
     """
 
-    sigma: Annotated[float, Gt(0)]
+    sigma: Annotated[float, Interval(gt=0, le=0.5)]  # millimetres are refused: no depth camera is that bad
     offset: float = 0.0
 
     @property

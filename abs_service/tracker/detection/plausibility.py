@@ -10,7 +10,7 @@ from abs_service.pairing.images import Image
 from abs_service.tracker.detection.image_alignment import alignment_warnings
 from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection
 from abs_service.tracker.mesh import Mesh, edge_lengths, pieces_of
-from calib.formats.plausibility import is_turned
+from calib.formats.plausibility import MAX_BASELINE_M, baselines, is_turned
 from calib.rig import Rig
 
 #: Range of the extent of an object [m]; outside, the distances have the wrong unit.
@@ -142,9 +142,14 @@ def doubts(detection: InitialDetection, mesh: Mesh, images: Mapping[str, Image],
 
 
 def camera_warnings(rig: Rig) -> tuple[str, ...]:
-    """Doubts about cameras that no image is needed for: intrinsics that seem to be those of others."""
-    found = []
-    for name, camera in ((name, sensor.camera) for name, sensor in rig.sensors.items()):
+    """Doubts about cameras that no image is needed for: intrinsics of others, and poses in another unit."""
+    cameras = {name: sensor.camera for name, sensor in rig.sensors.items()}
+    found = [
+        f"{pair.replace(', ', ' and ')} are {baseline.length:.1f} m apart: are their poses in metres?"
+        for pair, baseline in baselines(cameras).items()
+        if baseline.length > MAX_BASELINE_M
+    ]
+    for name, camera in cameras.items():
         what = f"the principal point of {name}, ({camera.cx:.0f}, {camera.cy:.0f}) px, is"
         if is_turned(camera):
             found.append(

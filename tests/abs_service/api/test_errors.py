@@ -92,6 +92,7 @@ def test_what_a_noise_model_depends_on_must_be_given(noise, missing):
         ({"model": {"type": "nurb"}}, r'model\.type = "nurb": no such type, did you mean "nurbs"\?'),
         ({"model": "nurbs"}, r"model = 'nurbs': must be settings, such as model=a\.Nurbs\(4, 4\), or a table"),
         ({"noise": a.noise.Constant(-1)}, r"^Tracker: noise\.sigma = -1(\.0)?: must be greater than 0"),
+        ({"noise": a.noise.Constant(3)}, r"^Tracker: noise\.sigma = 3(\.0)?: must be less than or equal to 0\.5"),
         ({"noise": a.noise.Color()}, r'noise = GaussianColor\(sigma=15\.0\): "depth" .* needs a model of distances'),
         ({"vertices": 2}, r"^Tracker: vertices = 2: must be greater than or equal to 4"),
         ({"range_m": 0}, r"^Tracker: range_m = 0: must be greater than 0"),

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from annotated_types import Ge, Gt
+from annotated_types import Ge, Gt, Interval
 
 from calib.noise import constant, gaussian_polynomial, structured_light, tof_amplitude
 from calib.noise.base import NoiseError, log_density
@@ -176,7 +176,7 @@ def test_ranges_of_numbers_are_declared():
     }
     assert bounds == {
         ("color", "sigma"): (Gt(0),),
-        ("constant", "sigma"): (Gt(0),),
+        ("constant", "sigma"): (Interval(gt=0, le=0.5),),
         ("gaussian_polynomial", "minimum_sigma"): (Gt(0),),
         ("structured_light", "noise"): (Gt(0),),
         ("structured_light", "step"): (Ge(0),),

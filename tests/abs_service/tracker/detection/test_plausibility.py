@@ -14,6 +14,7 @@ from abs_service.tracker.detection.plausibility import (
     warnings,
 )
 from abs_service.tracker.detection.regions import box, nearest, seed
+from calib import pose
 from calib.camera import Camera
 from calib.noise.structured_light import StructuredLight
 from calib.rig import Rig, Sensor
@@ -112,3 +113,15 @@ def test_an_exchanged_principal_point_is_doubted(width, height):
     assert doubt.endswith(
         f"in the middle of images of {height} × {width} pixels, not of {width} × {height}: are cx and cy exchanged?"
     )
+
+
+def test_a_pose_in_millimetres_is_doubted():
+    camera = Camera(640, 480, 585.0, 585.0, 320.0, 240.0)
+
+    def doubts_of(right_m):
+        color = replace(camera, T_rs=pose.from_rotation_vector((0, 0, 0), (right_m, 0, 0)))
+        sensors = {name: Sensor(name, one, StructuredLight()) for name, one in (("tof", camera), ("color", color))}
+        return camera_warnings(Rig("r", sensors))
+
+    assert doubts_of(0.025) == ()
+    assert doubts_of(25.0) == ("tof and color are 25.0 m apart: are their poses in metres?",)
